@@ -31,6 +31,10 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
         }
     }
 
+    /// Writes the traction, a force per reference area, at the [loaded points](crate::Polygons::loads) of a body at time `t`, in their
+    /// order. They are zero before the first call. Default: leaves them as they are.
+    fn traction(&self, _t: T, _tractions: &mut [SVector<T, D>]) {}
+
     /// Whether the force is zero everywhere and always, so that a step may leave it out.
     fn is_absent(&self) -> bool {
         false

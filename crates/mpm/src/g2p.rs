@@ -21,6 +21,7 @@ use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
 use crate::scheme::{Taken, Transfer};
+use crate::shared_corners::ids;
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::support::Support;
@@ -31,8 +32,12 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, F_early, support, buffers, .. } = self;
-        let (nodes, c) = (&nodes[..], *constants);
+        let Self { particles, constants, nodes, F_early, support, buffers, exchange, .. } = self;
+        let c = *constants;
+        if let Support::Polygons(corners) = support {
+            corners.interpolate(&c, nodes, exchange);
+        }
+        let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
         let (support, buffers) = (&*support, &*buffers);
         let found = SharedOutcome::default();
@@ -65,7 +70,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, nodes, bins, F_early, support, affine, transfer, .. } =
             self;
         let buffers = &self.buffers;
-        let (nodes, c, transfer) = (&nodes[..], *constants, *transfer);
+        let (c, transfer) = (*constants, *transfer);
+        let nodes = support.seen(nodes, &self.exchange.values);
         let arrays = (particles, affine);
         g2p(arrays, bins, c, support, buffers, transfer, |block, interpolated, first, of_block| {
             let OfBlock { x, v, F, affine } = of_block;
@@ -81,7 +87,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
         let Self { particles, constants, nodes, support, affine, transfer, buffers, .. } = self;
-        let (nodes, c, support, transfer) = (&nodes[..], *constants, &*support, *transfer);
+        let (c, support, transfer) = (*constants, &*support, *transfer);
+        let nodes = support.seen(nodes, &self.exchange.values);
         let buffers = &*buffers;
         let Particles { x, v, F, .. } = particles;
         each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
@@ -97,10 +104,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
         let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
-        let buffers = &self.buffers;
-        let (nodes, c) = (&nodes[..], *constants);
-        let reprojected =
-            if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
+        let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
+        if let Support::Polygons(corners) = support {
+            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
+            corners.interpolate(&c, reprojected, exchange);
+            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
+        }
+        let reprojected = support.seen(reprojected, &exchange.reprojected);
+        let nodes = support.seen(nodes, &exchange.values);
+        let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { reprojected };
         let arrays = (particles, &mut Vec::new());
         g2p(
             arrays,
@@ -131,7 +143,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, support, affine, buffers, .. } = self;
+        let Self { particles, constants, nodes, support, affine, buffers, exchange, .. } = self;
+        if let Support::Polygons(corners) = support {
+            corners.interpolate(constants, nodes, exchange);
+        }
+        let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
         let mut grid = FromGrid::new(constants, support, nodes, buffers.take(support, true));
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
@@ -143,11 +159,19 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
     }
 
-    /// CPDI2: the corners of domains move with the grid; their new positions are stored beside the old.
+    /// CPDI2 and polygons: the corners of domains move with the grid; their new positions are stored beside the old.
     pub(crate) fn move_corners(&mut self) {
-        let Self { constants, nodes, support, .. } = self;
+        let Self { constants, nodes, support, exchange, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
-        let Support::Cpdi2 { mesh, next } = support else { return };
+        let (mesh, next) = match support {
+            Support::Cpdi2 { mesh, next } => (mesh, next),
+            Support::Polygons(corners) => {
+                corners.interpolate(&c, nodes, exchange);
+                corners.follow(&c, &exchange.values);
+                return;
+            }
+            Support::Product(_) | Support::Cpdi { .. } => return,
+        };
         each_chunk(next, CHUNK, &|chunk, next| {
             for (next, x) in next.iter_mut().zip(&mesh.x[chunk * CHUNK..]) {
                 *next = *x;
@@ -157,11 +181,6 @@ impl<T: Lanes, const D: usize> State<T, D> {
             }
         });
     }
-}
-
-/// The ids of a block of particles in order.
-fn ids(first: usize) -> [u32; BLOCK] {
-    std::array::from_fn(|k| (first + k) as u32)
 }
 
 /// G2P of successive particles, block by block.
@@ -299,7 +318,7 @@ fn g2p<T: Lanes, const D: usize>(
             let count = of_block.x.len();
             block.compute_weights(&c, at_start, &ids(first)[..count], copies.kinematics());
             update(block, &mut interpolated[..count], first, &mut of_block);
-            if let Support::Cpdi2 { .. } = at_start {
+            if let Support::Cpdi2 { .. } | Support::Polygons(_) = at_start {
                 // Checked below, when all corners are at their new places.
                 return;
             }
@@ -309,8 +328,11 @@ fn g2p<T: Lanes, const D: usize>(
         buffers.give_back(own);
         found.add(outcome);
     });
-    let Support::Cpdi2 { mesh, next } = support else { return found.all() };
-    std::mem::swap(&mut mesh.x, next);
+    match support {
+        Support::Cpdi2 { mesh, next } => std::mem::swap(&mut mesh.x, next),
+        Support::Polygons(corners) => found.add(corners.arrive(&c, bin_of)),
+        Support::Product(_) | Support::Cpdi { .. } => return found.all(),
+    }
     let support = &*support;
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
@@ -333,7 +355,10 @@ fn check<T: Lanes, const D: usize>(
     F: &[SMatrix<T, D, D>],
 ) -> Outcome {
     let mut bins = [0; BLOCK];
-    bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
+    // Bins of polygons are those of their corners.
+    if !matches!(support, Support::Polygons(_)) {
+        bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
+    }
     let mut outcome = Outcome::default();
     if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.of_successive(x, F)) {
         return outcome;

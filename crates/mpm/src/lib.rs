@@ -64,6 +64,7 @@
 
 mod body;
 mod body_force;
+mod clip;
 mod domain;
 mod error;
 #[doc(hidden)]
@@ -81,9 +82,11 @@ mod node;
 mod p2g;
 mod parallel;
 mod particles;
+mod polygons;
 mod prefetch;
 mod scheme;
 mod shape_function;
+mod shared_corners;
 mod simd;
 mod simulation;
 mod solver;
@@ -97,11 +100,13 @@ mod xpic;
 
 pub use body::{Annulus, Body, Mesh};
 pub use body_force::{AtTime, BodyForce, NoBodyForce};
+pub use clip::{Clip, Edge, Side};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
 pub use particles::Particles;
+pub use polygons::{Load, Polygons};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;
 pub use simulation::{Simulated, Simulation};

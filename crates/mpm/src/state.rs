@@ -11,6 +11,7 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
+use crate::shared_corners::Exchange;
 use crate::simd::Lanes;
 use crate::support::Support;
 
@@ -40,6 +41,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) filtered: Vec<SVector<T, D>>,
     /// Buffers for blocks of particles.
     pub(crate) buffers: BufferPool<T, D>,
+    /// What passes between polygons and grid.
+    pub(crate) exchange: Exchange<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
 }
@@ -56,6 +59,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// Sorts the particles into bins.
     pub(crate) fn sort(&mut self) {
         let Self { constants: c, particles, support, bins, layout, .. } = self;
+        if let Support::Polygons(corners) = support {
+            bins.sort(layout, &|corner| corners.first_node(c, corner));
+            return;
+        }
         let Particles { x, F, .. } = &*particles;
         bins.sort(layout, &|p| support.first_node(c, p, &x[p], &F[p]));
     }

@@ -15,6 +15,7 @@ use crate::interrupt::StepLoop;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
+use crate::updated::LoadedPoint;
 use crate::{total, updated};
 
 /// A solver with the body force that drives it.
@@ -66,13 +67,15 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         f64: Precision<D>,
     {
         let time_step: T = Real::nearest(time_step);
-        let mut solver = match &case.scheme {
+        let (mut solver, loaded) = match &case.scheme {
             Scheme::Updated(updated) => {
                 updated::set_up(exact, model, updated, case, scene, time_step)?
             }
-            Scheme::Total(total) => total::set_up(exact, total, case, scene, time_step)?,
+            Scheme::Total(total) => {
+                (total::set_up(exact, total, case, scene, time_step)?, Vec::new())
+            }
         };
-        let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
+        let body_force = ExactBodyForce::new(model, &solver.observe().0.X, loaded);
         Ok(Self { solver, body_force, dt: time_step.to_f64() })
     }
 }
@@ -116,12 +119,18 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
     model: &'a dyn Solution<T, D>,
+    /// Where the exact traction acts, in the updated frame.
+    loaded: Vec<LoadedPoint<T, D>>,
     planted: Planted,
 }
 
 impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
-    fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>]) -> Self {
-        Self { kept: model.body_force_at(X), model, planted: Planted::here() }
+    fn new(
+        model: &'a dyn Solution<T, D>,
+        X: &[SVector<T, D>],
+        loaded: Vec<LoadedPoint<T, D>>,
+    ) -> Self {
+        Self { kept: model.body_force_at(X), model, loaded, planted: Planted::here() }
     }
 }
 
@@ -136,6 +145,14 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
 
     fn of_time(&self, t: T, values: &mut Vec<T>) {
         self.kept.of_time(t, values);
+    }
+
+    fn traction(&self, t: T, tractions: &mut [SVector<T, D>]) {
+        for (traction, LoadedPoint { surface, X }) in tractions.iter_mut().zip(&self.loaded) {
+            // A surface that the body does not have stops the run.
+            let none = || SVector::repeat(T::zero() / T::zero());
+            *traction = self.model.traction(*surface, X, t).unwrap_or_else(none);
+        }
     }
 
     fn evaluate_of(

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
-    self as verify, Case, CaseError, CflSpeed, Coordinates, Integrator, Parts, Placement, Scheme,
-    Shape, Stepping, Total, Transfer, Updated,
+    self as verify, Case, CaseError, CflSpeed, Coordinates, GridPose, Integrator, Parts, Placement,
+    Scheme, Shape, Stepping, Total, Transfer, Updated,
 };
 
 use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Weights};
@@ -149,8 +149,9 @@ fn says_updated(options: &SchemeOptions) -> bool {
     options.shape.is_some_and(|shape| shape.degree().is_none())
         || options.integrator != Integrator::Cd
         || options.transfer != Transfer::Flip
-        || options.layout == Some(Layout::BodyFitted)
+        || matches!(options.layout, Some(Layout::BodyFitted | Layout::Clipped))
         || options.offset != 0.0
+        || is_moved(options)
         || options.precision == Precision::F32
 }
 
@@ -175,9 +176,12 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
             "{option}: the updated Lagrangian formulation has none; use it with --formulation total-lagrangian"
         );
     }
-    let fitted = options.layout == Some(Layout::BodyFitted);
+    let layout = match options.layout {
+        None if is_moved(options) => Layout::Clipped,
+        layout => layout.unwrap_or(Layout::Lattice),
+    };
     // The boxes of GIMP lie along the axes.
-    let usual = Weights::Of(if fitted { Shape::Cpdi2 } else { Shape::Gimp });
+    let usual = Weights::Of(if layout == Layout::Lattice { Shape::Gimp } else { Shape::Cpdi2 });
     let shape = match options.shape.unwrap_or(usual) {
         Weights::Of(shape) => shape,
         high @ Weights::Spline(_) => bail!(
@@ -186,15 +190,41 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
             high.name()
         ),
     };
-    let placement = match (fitted, options.offset) {
-        (false, offset) => Placement::Lattice { offset },
-        (true, 0.0) => Placement::BodyFitted,
-        (true, offset) => {
+    let (pose, offset) = (pose(options), options.offset);
+    if layout != Layout::Clipped {
+        refuse_pose(options)?;
+    }
+    let placement = match layout {
+        Layout::Clipped => Placement::Clipped { offset, pose },
+        Layout::Lattice | Layout::Gauss => Placement::Lattice { offset },
+        Layout::BodyFitted if offset == 0.0 => Placement::BodyFitted,
+        Layout::BodyFitted => {
             let instead = "0 with particles fitted to the body, or the layout lattice";
             return Err(CaseError::setting("offset", format!("{offset:?}"), instead).into());
         }
     };
     Ok(Updated { shape, stepping: stepping(options), transfer: options.transfer, placement })
+}
+
+fn pose(options: &SchemeOptions) -> GridPose {
+    GridPose { angle: options.grid_angle, shift: options.grid_shift }
+}
+
+/// Whether the grid is asked to lie elsewhere than usually.
+fn is_moved(options: &SchemeOptions) -> bool {
+    !pose(options).is_usual()
+}
+
+/// Refuses a grid that is moved against a body whose particles lie along the lines of the usual one.
+fn refuse_pose(options: &SchemeOptions) -> Result<()> {
+    for (setting, value) in [("grid-angle", options.grid_angle), ("grid-shift", options.grid_shift)]
+    {
+        if value != 0.0 {
+            let instead = "0, or the layout clipped in the updated Lagrangian formulation";
+            return Err(CaseError::setting(setting, format!("{value:?}"), instead).into());
+        }
+    }
+    Ok(())
 }
 
 fn stepping(options: &SchemeOptions) -> Stepping {
@@ -220,6 +250,9 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
         None => Total::layout_for(exact),
         Some(Layout::Gauss) => verify::Layout::Gauss,
         Some(Layout::Lattice) => verify::Layout::Lattice,
+        Some(Layout::Clipped) => bail!(
+            "--layout clipped: the total Lagrangian formulation has grids that fit the body; use --layout gauss or lattice with it"
+        ),
         Some(Layout::BodyFitted) => bail!(
             "--layout body-fitted: the total Lagrangian formulation fits a ring by --grid polar; use --layout gauss or lattice with it"
         ),
@@ -233,6 +266,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
         let instead = "0 in the total Lagrangian formulation";
         return Err(CaseError::setting("offset", value, instead).into());
     }
+    refuse_pose(options)?;
     let usual = Total::of_degree(degree);
     Ok(Total {
         mass: options.mass.map_or(usual.mass, Into::into),
@@ -245,7 +279,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
 
 /// What weights and integrator leave unsaid, in words; of the updated frame what is not the usual.
 pub(super) fn words(scheme: &Scheme) -> String {
-    let Parts { composition, mass, layout, grid, start, .. } = scheme.parts();
+    let Parts { composition, mass, layout, grid, start, pose, .. } = scheme.parts();
     match scheme {
         Scheme::Updated(updated) => {
             let mut text = match updated.stepping {
@@ -255,8 +289,14 @@ pub(super) fn words(scheme: &Scheme) -> String {
             if updated.transfer != Transfer::Flip {
                 text += &format!(", transfer {}", updated.transfer);
             }
-            if updated.placement == Placement::BodyFitted {
+            if !matches!(updated.placement, Placement::Lattice { .. }) {
                 text += &format!(", {layout} layout");
+            }
+            if pose.angle != 0.0 {
+                text += &format!(", grid turned by {} degrees", pose.angle);
+            }
+            if pose.shift != 0.0 {
+                text += &format!(", grid shifted by {} cells", pose.shift);
             }
             text
         }
