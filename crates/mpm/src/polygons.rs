@@ -33,19 +33,23 @@ pub struct Polygons<T, const D: usize> {
     pub ends: Vec<u32>,
     /// For each particle where its polygons end in `ends`.
     pub of_particles: Vec<u32>,
-    /// Points of the boundary where a traction acts, see [`BodyForce::traction`](crate::BodyForce::traction).
+    /// Points of the boundary where a traction acts, see [`BodyForce::boundary_stress`](crate::BodyForce::boundary_stress).
     pub loads: Vec<Load<T>>,
     /// From the axes of the body to those of the grid, which is given in the latter; none where they are the same.
     pub turn: Option<SMatrix<T, D, D>>,
 }
 
-/// The part of the boundary that a point stands for.
+/// A point of the boundary with a given Cauchy stress, whose traction follows the edge: the force is that stress times the edge's
+/// current normal and length.
+///
+/// The dead load `P N` of the reference configuration has the same value as long as the motion is the exact one. Under pressure of the
+/// order of the shear modulus it makes short waves of the surface grow, however fine the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load<T> {
-    /// The ends of the edge on which it lies.
+    /// The ends of the edge on which it lies, with the body on the left of the way from the first to the second.
     pub corners: [u32; 2],
-    /// The reference area (a length) with which the traction acts on each end.
-    pub areas: [T; 2],
+    /// The share of the edge with which it acts on each end.
+    pub shares: [T; 2],
 }
 
 /// The shares `w` of a mean and `g` of a mean gradient, per length, that a corner of one of a particle's polygons has.

@@ -69,8 +69,8 @@ pub(crate) struct Exchange<T, const D: usize> {
     pub(crate) values: Vec<Node<T, D>>,
     /// The same of velocities that are projected again, where there are such.
     pub(crate) reprojected: Vec<Node<T, D>>,
-    /// The traction at each loaded point.
-    tractions: Vec<SVector<T, D>>,
+    /// The Cauchy stress at each loaded point.
+    stresses: Vec<SMatrix<T, D, D>>,
     /// Buffers for blocks of corners.
     buffers: BufferPool<T, D>,
 }
@@ -99,13 +99,13 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             affine_sums: vec![none; if_affine(corners)],
             values: vec![zero; corners],
             reprojected: vec![zero; if reprojects { corners } else { 0 }],
-            tractions: vec![SVector::zeros(); loads],
+            stresses: vec![none; loads],
             buffers: BufferPool::new(),
         }
     }
 }
 
-/// A traction, and the time at which it acts.
+/// What says the stress on the boundary, and the time.
 pub(crate) type Loading<'a, T, const D: usize> = Option<(&'a dyn BodyForce<T, D>, T)>;
 
 impl<T: Lanes, const D: usize> SharedCorners<T, D> {
@@ -240,7 +240,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         exchange: &mut Exchange<T, D>,
         loading: Loading<'_, T, D>,
     ) {
-        let Exchange { given, affine, is_affine, sums, affine_sums, tractions, .. } = exchange;
+        let Exchange { given, affine, is_affine, sums, affine_sums, stresses, .. } = exchange;
         let (given, affine) = (&given[..], if *is_affine { &affine[..] } else { &[] });
         let per_length = c.spacing();
         each_chunk(sums, CHUNK, &|chunk, sums| {
@@ -280,12 +280,17 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
                 *sum = self.polygons.turn.map_or(own, |turn| own * turn.transpose());
             }
         });
-        let Some((tractions_at, time)) = loading.filter(|_| !tractions.is_empty()) else { return };
-        tractions_at.traction(time, tractions);
-        for (load, traction) in self.polygons.loads.iter().zip(&*tractions) {
-            for (&corner, &area) in load.corners.iter().zip(&load.areas) {
+        let Some((loading, time)) = loading.filter(|_| !stresses.is_empty()) else { return };
+        loading.boundary_stress(time, stresses);
+        for (load, stress) in self.polygons.loads.iter().zip(&*stresses) {
+            let [from, to] = load.corners.map(|corner| self.polygons.x[corner as usize]);
+            let edge = to - from;
+            let mut normal = SVector::zeros();
+            (normal[0], normal[D - 1]) = (edge[D - 1], -edge[0]);
+            let force = stress * normal;
+            for (&corner, &share) in load.corners.iter().zip(&load.shares) {
                 let Node { values } = &mut sums[corner as usize];
-                (0..D).for_each(|i| values[D + i] += traction[i] * area);
+                (0..D).for_each(|i| values[D + i] += force[i] * share);
             }
         }
     }

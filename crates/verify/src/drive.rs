@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{AtTime, BodyForce, Solver, StepError};
 use mmsmith_runtime::{BodyForceAtPoints, Real, Solution};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use crate::case::Case;
 use crate::error::CaseError;
@@ -15,7 +15,6 @@ use crate::interrupt::StepLoop;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
-use crate::updated::LoadedPoint;
 use crate::{total, updated};
 
 /// A solver with the body force that drives it.
@@ -119,17 +118,13 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
     model: &'a dyn Solution<T, D>,
-    /// Where the exact traction acts, in the updated frame.
-    loaded: Vec<LoadedPoint<T, D>>,
+    /// Reference positions of points of the boundary with the exact stress, in the updated frame.
+    loaded: Vec<SVector<T, D>>,
     planted: Planted,
 }
 
 impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
-    fn new(
-        model: &'a dyn Solution<T, D>,
-        X: &[SVector<T, D>],
-        loaded: Vec<LoadedPoint<T, D>>,
-    ) -> Self {
+    fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>], loaded: Vec<SVector<T, D>>) -> Self {
         Self { kept: model.body_force_at(X), model, loaded, planted: Planted::here() }
     }
 }
@@ -147,11 +142,11 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
         self.kept.of_time(t, values);
     }
 
-    fn traction(&self, t: T, tractions: &mut [SVector<T, D>]) {
-        for (traction, LoadedPoint { surface, X }) in tractions.iter_mut().zip(&self.loaded) {
-            // A surface that the body does not have stops the run.
-            let none = || SVector::repeat(T::zero() / T::zero());
-            *traction = self.model.traction(*surface, X, t).unwrap_or_else(none);
+    fn boundary_stress(&self, t: T, stress: &mut [SMatrix<T, D, D>]) {
+        for (stress, X) in stress.iter_mut().zip(&self.loaded) {
+            let F = self.model.deformation_gradient(X, t);
+            *stress =
+                self.model.first_piola_kirchhoff(X, t) * F.transpose() / self.model.jacobian(X, t);
         }
     }
 

@@ -3,7 +3,7 @@
 use mmsmith_mpm::{
     Annulus, Body, Clip, Edge, Load, Particles, Settings, Shape, Side, Simulation, Solver,
 };
-use mmsmith_runtime::{Domain, Real, Solution, Surface};
+use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
 use crate::case::{Case, Extent, law};
@@ -53,20 +53,13 @@ pub(crate) fn bytes_expected<const D: usize>(
         + scalar as f64 * (particles * (of_shape + of_transfer) as f64 + nodes * of_node as f64)
 }
 
-/// A point of the boundary under a traction.
-pub(crate) struct LoadedPoint<T, const D: usize> {
-    pub(crate) surface: Surface,
-    /// Its reference position.
-    pub(crate) X: SVector<T, D>,
-}
-
-/// A body that a lattice clipped with its boundary makes, at rest, and the points where a traction acts on it.
+/// A body that a lattice clipped with its boundary makes, at rest, and the reference positions where a traction acts on it.
 fn clipped<T: Real, const D: usize>(
     scene: &Scene<D>,
     placement: Placement,
     per_cell: usize,
     density: f64,
-) -> Result<(Body<T, D>, Vec<LoadedPoint<T, D>>), CaseError> {
+) -> Result<(Body<T, D>, Vec<SVector<T, D>>), CaseError> {
     let clip = Clip {
         sides: scene.boundary.iter().map(|part| part.side).collect(),
         turn: scene.turn,
@@ -91,9 +84,9 @@ fn clipped<T: Real, const D: usize>(
                 continue;
             }
             let ends = corners.map(|corner| polygons.X[corner as usize].map(Real::to_f64));
-            for (X, areas) in gauss_points(part.side, ends) {
-                polygons.loads.push(Load { corners, areas: areas.map(Real::nearest) });
-                points.push(LoadedPoint { surface: part.surface, X: X.map(Real::nearest) });
+            for (X, shares) in gauss_points(part.side, ends) {
+                polygons.loads.push(Load { corners, shares: shares.map(Real::nearest) });
+                points.push(X.map(Real::nearest));
             }
         }
         polygons.x.clone_from(&polygons.X);
@@ -101,30 +94,19 @@ fn clipped<T: Real, const D: usize>(
     Ok((body, points))
 }
 
-/// Two Gauss points of a part of a side between two ends, with the areas that they give to either.
+/// Two Gauss points of a part of a side between two ends, with the shares that they give to either.
 fn gauss_points<const D: usize>(
     side: Side,
     [a, b]: [SVector<f64, D>; 2],
 ) -> [(SVector<f64, D>, [f64; 2]); 2] {
     let away = 0.5 / 3.0_f64.sqrt();
-    let chord = b - a;
-    let length = match side {
-        Side::Straight { .. } => chord.norm(),
-        Side::Outer { radius } | Side::Inner { radius } => {
-            2.0 * radius * (0.5 * chord.norm() / radius).asin()
-        }
-    };
     [0.5 - away, 0.5 + away].map(|s| {
+        let on_chord = a + (b - a) * s;
         let X = match side {
-            Side::Straight { .. } => a + chord * s,
-            Side::Outer { radius } | Side::Inner { radius } => {
-                // At equal shares of the arc.
-                let angle = length / radius;
-                let (from, to) = (((1.0 - s) * angle).sin(), (s * angle).sin());
-                (a * from + b * to).normalize() * radius
-            }
+            Side::Straight { .. } => on_chord,
+            Side::Outer { radius } | Side::Inner { radius } => on_chord.normalize() * radius,
         };
-        (X, [0.5 * length * (1.0 - s), 0.5 * length * s])
+        (X, [0.5 * (1.0 - s), 0.5 * s])
     })
 }
 
@@ -169,7 +151,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
-) -> Result<(Box<dyn Solver<T, D>>, Vec<LoadedPoint<T, D>>), CaseError> {
+) -> Result<(Box<dyn Solver<T, D>>, Vec<SVector<T, D>>), CaseError> {
     let (mut body, loaded) = if updated.placement.is_clipped() {
         clipped(scene, updated.placement, case.per_cell, exact.density())?
     } else {
