@@ -6,14 +6,14 @@
 //! n:
 //!
 //! ```text
-//! w_c = sum of (T_- + T_+)/3 + A/(3 k) over the particle's polygons at c, over V
-//! mean of grad N = (1/V) sum over edges of (N(x_a) + N(x_b))/2 L n
+//! w_c = sum of (T_- + T_+)/3 + A/(3 k) over the particle's polygons at c, over V     in the reference configuration
+//! mean of grad N = (1/V) sum over edges of (N(x_a) + N(x_b))/2 L n                   in the current one
 //! ```
 //!
 //! `T_-` and `T_+` are the triangles on either side of the corner, A the area of the polygon, k the number of its corners, V the area of the
-//! particle. An edge between two particles has opposite normals in both: in `sum_p V_p grad N` it cancels, and the integral of `N n` over
-//! the boundary remains. That is the condition under which a constant stress gives no force inside (Chen, Wu, Yoon & You, IJNME 50
-//! (2001) 435-466).
+//! particle. The mean goes by mass, which is spread evenly over the reference configuration. An edge between two particles has opposite
+//! normals in both: in `sum_p V_p grad N` it cancels, and the integral of `N n` over the boundary remains. That is the condition under
+//! which a constant stress gives no force inside (Chen, Wu, Yoon & You, IJNME 50 (2001) 435-466).
 
 use nalgebra::{RealField, SMatrix, SVector};
 
@@ -102,9 +102,9 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         start(&self.of_particles, p)..self.of_particles[p] as usize
     }
 
-    /// Writes the shares of a particle's corners at the positions `x`, as many as it has [places](Self::places), and returns its area.
-    pub(crate) fn shares(&self, x: &[SVector<T, D>], p: usize, shares: &mut [Share<T, D>]) -> T {
-        let first = self.places(p).start;
+    /// Writes the shares of means over a particle in the reference configuration, as many as it has [places](Self::places).
+    pub(crate) fn means(&self, p: usize, shares: &mut [Share<T, D>]) {
+        let (X, first) = (&self.X, self.places(p).start);
         // Twice the area.
         let mut whole = T::zero();
         for polygon in self.polygons(p) {
@@ -113,40 +113,53 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
             let shares = &mut shares[own.start - first..own.end - first];
             let count: T = real(corners.len() as f64);
             let mut mean = SVector::zeros();
-            for &corner in corners {
-                mean += x[corner as usize];
+            for (share, &corner) in shares.iter_mut().zip(corners) {
+                mean += X[corner as usize];
+                (share.corner, share.w) = (corner, T::zero());
             }
             mean /= count;
-            let mut area = T::zero();
-            let mut last = corners.len().saturating_sub(1);
-            for share in &mut *shares {
-                share.w = T::zero();
-            }
+            let (mut area, mut last) = (T::zero(), corners.len().saturating_sub(1));
             for k in 0..corners.len() {
-                let (from, to) = (x[corners[last] as usize], x[corners[k] as usize]);
+                let (from, to) = (X[corners[last] as usize], X[corners[k] as usize]);
                 let triangle = cross(&(from - mean), &(to - mean));
                 area += triangle;
                 shares[last].w += triangle;
                 shares[k].w += triangle;
                 last = k;
             }
-            let of_mean = area / count;
-            for k in 0..corners.len() {
-                let next = if k + 1 < corners.len() { k + 1 } else { 0 };
-                let before = if k > 0 { k - 1 } else { corners.len() - 1 };
-                let across = x[corners[next] as usize] - x[corners[before] as usize];
-                let share = &mut shares[k];
-                share.corner = corners[k];
-                share.w += of_mean;
-                share.g[0] = across[D - 1];
-                share.g[D - 1] = -across[0];
+            for share in shares {
+                share.w += area / count;
             }
             whole += area;
         }
+        let third = whole.recip() * real(1.0 / 3.0);
+        shares.iter_mut().for_each(|share| share.w *= third);
+    }
+
+    /// Writes the shares of mean gradients over a particle at the present positions, and returns its area.
+    pub(crate) fn slopes(&self, p: usize, shares: &mut [Share<T, D>]) -> T {
+        let (x, first) = (&self.x, self.places(p).start);
+        // Twice the area.
+        let mut whole = T::zero();
+        for polygon in self.polygons(p) {
+            let own = start(&self.ends, polygon)..self.ends[polygon] as usize;
+            let corners = &self.corners[own.clone()];
+            let shares = &mut shares[own.start - first..own.end - first];
+            let [.., before, last] = *corners else { continue };
+            let about = x[last as usize];
+            let (mut before, mut here) = (x[before as usize], about);
+            let mut index = corners.len() - 1;
+            for (k, &next) in corners.iter().enumerate() {
+                let next = x[next as usize];
+                let across = next - before;
+                let g = &mut shares[index].g;
+                (g[0], g[D - 1]) = (across[D - 1], -across[0]);
+                whole += cross(&(here - about), &(next - about));
+                (before, here, index) = (here, next, k);
+            }
+        }
         let inverse = whole.recip();
-        let third = inverse * real(1.0 / 3.0);
         for share in shares {
-            share.w *= third;
             share.g[0] *= inverse;
             share.g[D - 1] *= inverse;
         }

@@ -128,10 +128,12 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         }
         ends.pop();
         let share = Share { corner: 0, w: T::zero(), g: [T::zero(); D] };
+        let mut shares = vec![share; polygons.corners.len()];
+        (0..particles).for_each(|p| polygons.means(p, &mut shares[polygons.places(p)]));
         let mut own = Self {
             next: polygons.x.clone(),
             is_measured: false,
-            shares: vec![share; polygons.corners.len()],
+            shares,
             volumes: vec![T::zero(); particles],
             places,
             ends,
@@ -170,7 +172,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             for (k, volume) in volumes.iter_mut().enumerate() {
                 let places = polygons.places(first + k);
                 let own = &mut shares[places.start - before..places.end - before];
-                *volume = polygons.shares(&polygons.x, first + k, own);
+                *volume = polygons.slopes(first + k, own);
             }
         });
     }

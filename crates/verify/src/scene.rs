@@ -45,7 +45,6 @@ pub(crate) struct Scene<const D: usize> {
 /// A part of the boundary in the plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryPart {
-    pub(crate) surface: Surface,
     pub(crate) side: Side,
     /// Whether the traction of the solution acts on it.
     pub(crate) is_loaded: bool,
@@ -184,9 +183,7 @@ impl<const D: usize> Scene<D> {
         let reach =
             (largest_displacement(solution, &surfaces, end) / spacing).ceil() + MARGIN_CELLS;
         let (mut walls, mut boundary) = ([[false; 2]; D], Vec::new());
-        let mut add = |surface, side, is_loaded| {
-            boundary.push(BoundaryPart { surface, side, is_loaded });
-        };
+        let mut add = |side, is_loaded| boundary.push(BoundaryPart { side, is_loaded });
         let straight = |axis: usize, sign: f64, distance: f64| {
             let normal = std::array::from_fn(|a| if a == axis { sign } else { 0.0 });
             Side::Straight { normal, distance }
@@ -195,13 +192,13 @@ impl<const D: usize> Scene<D> {
         let (lower, cells): (SVector<f64, D>, [usize; D]) = match &domain {
             Domain::Annulus { inner, outer } => {
                 let (inner, outer) = (*inner, *outer);
-                add(Surface::Inner, Side::Inner { radius: inner }, is_given(sides[0][0]));
-                add(Surface::Outer, Side::Outer { radius: outer }, is_given(sides[0][1]));
+                add(Side::Inner { radius: inner }, is_given(sides[0][0]));
+                add(Side::Outer { radius: outer }, is_given(sides[0][1]));
                 let half = (outer / spacing).ceil() + reach;
                 if quarter {
                     for axis in 0..D {
                         walls[axis][0] = true;
-                        add(Surface::Lower(axis), straight(axis, -1.0, 0.0), false);
+                        add(straight(axis, -1.0, 0.0), false);
                     }
                     (SVector::zeros(), [half as usize; D])
                 } else {
@@ -222,8 +219,8 @@ impl<const D: usize> Scene<D> {
                     };
                     let (low, high) =
                         (straight(axis, -1.0, -lower[axis]), straight(axis, 1.0, upper[axis]));
-                    add(Surface::Lower(axis), low, is_loaded(0));
-                    add(Surface::Upper(axis), high, is_loaded(1));
+                    add(low, is_loaded(0));
+                    add(high, is_loaded(1));
                 }
                 // Along the axes of the grid.
                 let [cos, sin] = turn;
