@@ -20,6 +20,39 @@ pub fn needs_total_frame(exact: &AnySolution<f64>) -> Option<Boundary> {
     in_dimension!(exact, |s| s.boundaries().iter().find(needs).copied(), else None)
 }
 
+/// The conditions of `exact` in whose place clipped particles have the traction of its motion: sides that move as it says, and with a grid
+/// on whose lines they do not lie sliding ones.
+#[must_use]
+pub fn loaded_instead(exact: &AnySolution<f64>, case: &Case) -> Vec<Boundary> {
+    let Some(placement) = case.scheme.updated().map(|updated| updated.placement) else {
+        return Vec::new();
+    };
+    let AnySolution::Two(exact) = exact else { return Vec::new() };
+    if !placement.is_clipped() {
+        return Vec::new();
+    }
+    let is_loaded = |boundary: &&Boundary| match boundary.condition {
+        Condition::PrescribedMotion => true,
+        Condition::Sliding | Condition::Symmetry => match exact.domain() {
+            Domain::Box { lower, upper } => {
+                let spacing = exact.cell_length() / case.cells as f64;
+                !(placement.pose().is_usual() && are_multiples(&(upper - lower), spacing))
+            }
+            _ => false,
+        },
+        Condition::TractionFree | Condition::PrescribedTraction => false,
+    };
+    exact.boundaries().iter().filter(is_loaded).copied().collect()
+}
+
+/// Whether all sides of a box are whole multiples of the spacing.
+fn are_multiples<const D: usize>(sides: &SVector<f64, D>, spacing: f64) -> bool {
+    sides.iter().all(|side| {
+        let count = side / spacing;
+        count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0)
+    })
+}
+
 /// Whether the values of motion or traction come from the solution.
 fn is_given(condition: Condition) -> bool {
     matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction)
@@ -207,11 +240,7 @@ impl<const D: usize> Scene<D> {
                 }
             }
             Domain::Box { lower, upper } => {
-                let whole = |side: f64| {
-                    let count = side / spacing;
-                    count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0)
-                };
-                let fits = pose.is_usual() && (upper - lower).iter().all(|side| whole(*side));
+                let fits = pose.is_usual() && are_multiples(&(upper - lower), spacing);
                 for axis in 0..D {
                     walls[axis] = sides[axis].map(|side| fits && is_wall(side));
                     let is_loaded = |end: usize| {

@@ -31,6 +31,8 @@ pub(super) struct Settled {
     pub(super) json: Option<PathBuf>,
     /// What was chosen because the usual scheme would not do, and why.
     pub(super) chosen: Option<Choice>,
+    /// Conditions in whose place the traction of the exact motion acts.
+    pub(super) loaded: Vec<Boundary>,
 }
 
 /// A total frame that was not asked for.
@@ -51,7 +53,14 @@ pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> C
 impl Settled {
     /// A case in double precision, on all threads.
     pub(super) fn of(case: Case) -> Self {
-        Self { case, precision: Precision::F64, threads: None, json: None, chosen: None }
+        Self {
+            case,
+            precision: Precision::F64,
+            threads: None,
+            json: None,
+            chosen: None,
+            loaded: Vec::new(),
+        }
     }
 
     /// The scheme that the options leave for a solution. What they say holds; what they leave open is chosen so that the
@@ -82,7 +91,9 @@ impl Settled {
             extent: options.extent.map(Into::into),
         };
         let SchemeOptions { precision, threads, ref json, .. } = *options;
-        let mut settled = Self { case, precision, threads, json: json.clone(), chosen: None };
+        let loaded = verify::loaded_instead(exact, &case);
+        let mut settled =
+            Self { case, precision, threads, json: json.clone(), chosen: None, loaded };
         if let Scheme::Total(scheme) = scheme
             && (options.frame.is_none() || options.shape.is_none())
         {
@@ -103,7 +114,7 @@ impl Settled {
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.
     pub(super) fn choice(&self) -> String {
         let Some(Choice { scheme, reason, cfl_is_chosen }) = &self.chosen else {
-            return String::new();
+            return self.loads();
         };
         let Case { cfl, cfl_speed, per_cell, .. } = self.case;
         let degree = match scheme.degree {
@@ -141,6 +152,16 @@ impl Settled {
             text += &format!(" --cfl {cfl} --cfl-speed {cfl_speed}");
         }
         text + "\n"
+    }
+
+    /// A line about tractions in place of other conditions; empty where there are none.
+    fn loads(&self) -> String {
+        if self.loaded.is_empty() {
+            return String::new();
+        }
+        let told = self.loaded.iter().map(|own| format!("{} ({})", own.surface, own.condition));
+        let told: Vec<_> = told.collect();
+        format!("the traction of the exact motion acts on {} in place of that\n", told.join(", "))
     }
 }
 
