@@ -20,7 +20,7 @@ use crate::polygons::{Load, Polygons, cross};
 use crate::tensor::real;
 
 /// What is left of a box with less than this share of its area is a sliver.
-const SLIVER: f64 = 0.3;
+const SLIVER: f64 = 0.2;
 
 /// Places closer to a side than this, in units of the particles' distance, lie on it.
 const ON: f64 = 1e-9;
