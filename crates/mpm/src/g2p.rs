@@ -8,20 +8,20 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::corner_exchange::Exchange;
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::Block;
 use crate::kernel::buffers::{BufferPool, Buffers};
-use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::corners::velocity_at;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
 use crate::scheme::{Taken, Transfer};
-use crate::shared_corners::ids;
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::support::Support;
@@ -35,7 +35,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, nodes, F_early, support, buffers, exchange, .. } = self;
         let c = *constants;
         if let Support::Polygons(corners) = support {
-            corners.interpolate(&c, nodes, exchange);
+            exchange.interpolate(&c, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
@@ -73,15 +73,23 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let (c, transfer) = (*constants, *transfer);
         let nodes = support.seen(nodes, &self.exchange.values);
         let arrays = (particles, affine);
-        g2p(arrays, bins, c, support, buffers, transfer, |block, interpolated, first, of_block| {
-            let OfBlock { x, v, F, affine } = of_block;
-            block.g2p(&c.strides, nodes, interpolated);
-            take_velocity(&c, transfer, interpolated, v, affine);
-            for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
-                *x += interpolated.velocity * c.time_step;
-            }
-            stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
-        })
+        g2p(
+            arrays,
+            bins,
+            c,
+            (support, &self.exchange),
+            buffers,
+            transfer,
+            |block, interpolated, first, of_block| {
+                let OfBlock { x, v, F, affine } = of_block;
+                block.g2p(&c.strides, nodes, interpolated);
+                take_velocity(&c, transfer, interpolated, v, affine);
+                for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
+                    *x += interpolated.velocity * c.time_step;
+                }
+                stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
+            },
+        )
     }
 
     /// MUSL, first G2P: velocity alone.
@@ -107,7 +115,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
         if let Support::Polygons(corners) = support {
             std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
-            corners.interpolate(&c, reprojected, exchange);
+            exchange.interpolate(&c, corners, reprojected);
             std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
         }
         let reprojected = support.seen(reprojected, &exchange.reprojected);
@@ -118,7 +126,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             arrays,
             bins,
             c,
-            support,
+            (support, &*exchange),
             buffers,
             Transfer::Flip,
             |block, interpolated, first, of_block| {
@@ -145,7 +153,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
         let Self { particles, constants, nodes, support, affine, buffers, exchange, .. } = self;
         if let Support::Polygons(corners) = support {
-            corners.interpolate(constants, nodes, exchange);
+            exchange.interpolate(constants, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
@@ -166,7 +174,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let (mesh, next) = match support {
             Support::Cpdi2 { mesh, next } => (mesh, next),
             Support::Polygons(corners) => {
-                corners.interpolate(&c, nodes, exchange);
+                exchange.interpolate(&c, corners, nodes);
                 corners.follow(&c, &exchange.values);
                 return;
             }
@@ -212,7 +220,12 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         let Self { c, support, nodes, copies, buffers } = self;
         let Buffers { block, interpolated, .. } = &mut **buffers;
         let interpolated = &mut interpolated[..x.len()];
-        block.compute_weights(c, support, &ids(first)[..x.len()], copies.of_successive(x, F));
+        block.compute_weights(
+            c,
+            support,
+            &successive(first)[..x.len()],
+            copies.of_successive(x, F),
+        );
         block.g2p(&c.strides, nodes, interpolated);
         interpolated
     }
@@ -295,7 +308,7 @@ fn g2p<T: Lanes, const D: usize>(
     (particles, affine): (&mut Particles<T, D>, &mut Vec<SMatrix<T, D, D>>),
     bins: &Bins,
     c: Constants<T, D>,
-    support: &mut Support<T, D>,
+    (support, exchange): (&mut Support<T, D>, &Exchange<T, D>),
     buffers: &BufferPool<T, D>,
     transfer: Transfer,
     update: impl Fn(&mut Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
@@ -316,7 +329,7 @@ fn g2p<T: Lanes, const D: usize>(
                 }
             }
             let count = of_block.x.len();
-            block.compute_weights(&c, at_start, &ids(first)[..count], copies.kinematics());
+            block.compute_weights(&c, at_start, &successive(first)[..count], copies.kinematics());
             update(block, &mut interpolated[..count], first, &mut of_block);
             if let Support::Cpdi2 { .. } | Support::Polygons(_) = at_start {
                 // Checked below, when all corners are at their new places.
@@ -330,7 +343,10 @@ fn g2p<T: Lanes, const D: usize>(
     });
     match support {
         Support::Cpdi2 { mesh, next } => std::mem::swap(&mut mesh.x, next),
-        Support::Polygons(corners) => found.add(corners.arrive(&c, bin_of)),
+        Support::Polygons(corners) => {
+            corners.arrive();
+            found.add(exchange.check(&c, corners, bin_of));
+        }
         Support::Product(_) | Support::Cpdi { .. } => return found.all(),
     }
     let support = &*support;
@@ -360,7 +376,7 @@ fn check<T: Lanes, const D: usize>(
         bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
     }
     let mut outcome = Outcome::default();
-    if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.of_successive(x, F)) {
+    if support.are_valid(c, &successive(first)[..x.len()], &bins, copies.of_successive(x, F)) {
         return outcome;
     }
     for (k, ((x, F), bin)) in x.iter().zip(F).zip(bins).enumerate() {

@@ -56,6 +56,7 @@
 //! # Modules
 //!
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
+//! - `clip`: bodies of any shape in the plane; `polygons`: their particles; `shared_corners`, `corner_exchange`: P2G and G2P by way of corners.
 //! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
@@ -65,6 +66,7 @@
 mod body;
 mod body_force;
 mod clip;
+mod corner_exchange;
 mod domain;
 mod error;
 #[doc(hidden)]

@@ -10,6 +10,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
+use crate::corner_exchange::{Exchange, Given, Loading};
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
@@ -18,12 +19,12 @@ use crate::grid_update::{
     VelocityAndAcceleration,
 };
 use crate::kernel::buffers::{BufferPool, Buffers};
-use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
-use crate::shared_corners::{CHUNK, Exchange, Given, Loading, SharedCorners, ids};
+use crate::shared_corners::{CHUNK, SharedCorners};
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::StepTimes;
@@ -117,7 +118,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let c = *constants;
         let from = if is_first { &nodes[..] } else { &reprojected[..] };
         if let Support::Polygons(corners) = support {
-            corners.interpolate(&c, from, exchange);
+            exchange.interpolate(&c, corners, from);
         }
         let at_corners = std::mem::take(&mut exchange.values);
         let seen = support.seen(from, &at_corners);
@@ -178,10 +179,10 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
             return;
         };
         self.to_corners(corners, exchange, set);
-        corners.sum(self.c, exchange, loading);
+        exchange.sum(self.c, corners, loading);
         let exchange = &*exchange;
         update.p2g(bins, nodes, &|band, first, ids| {
-            corners.to_grid(self.c, exchange, (band, first), ids);
+            exchange.to_grid(self.c, corners, (band, first), ids);
         });
     }
 
@@ -204,7 +205,7 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
             let mut buffers = pool.take(support, is_affine);
             let mut of_affine = affine.chunks_mut(BLOCK);
             for (index, given) in given.chunks_mut(BLOCK).enumerate() {
-                let ids = ids(first + index * BLOCK);
+                let ids = successive(first + index * BLOCK);
                 let ids = &ids[..given.len()];
                 copies.pick(ids, x, F);
                 buffers.block.compute_weights(c, support, ids, copies.kinematics());

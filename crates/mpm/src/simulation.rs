@@ -7,6 +7,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::{Body, Mesh};
 use crate::body_force::BodyForce;
+use crate::corner_exchange::Exchange;
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
 use crate::geometry::Constants;
@@ -21,7 +22,6 @@ use crate::particles::Particles;
 use crate::polygons::Polygons;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
-use crate::shared_corners::Exchange;
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::{StepTimes, is_fused};
@@ -131,8 +131,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         });
         let worst = match &state.support {
             Support::Polygons(corners) => {
-                let of_corners = (0..corners.count())
-                    .filter_map(|corner| corners.invalidity(&state.constants, corner));
+                let of_corners = (0..corners.count()).filter_map(|corner| {
+                    state.exchange.invalidity(&state.constants, corners, corner)
+                });
                 worst.chain(of_corners).min()
             }
             _ => worst.min(),

@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::corner_exchange::Exchange;
 use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::health::Outcome;
@@ -11,7 +12,6 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
-use crate::shared_corners::Exchange;
 use crate::simd::Lanes;
 use crate::support::Support;
 
@@ -58,9 +58,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Sorts the particles into bins.
     pub(crate) fn sort(&mut self) {
-        let Self { constants: c, particles, support, bins, layout, .. } = self;
+        let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
         if let Support::Polygons(corners) = support {
-            bins.sort(layout, &|corner| corners.first_node(c, corner));
+            bins.sort(layout, &|corner| exchange.first_node(c, corners, corner));
             return;
         }
         let Particles { x, F, .. } = &*particles;
