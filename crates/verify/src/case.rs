@@ -135,12 +135,12 @@ impl Case {
                 Err(CaseError::setting("offset", number(offset), "from -0.5 to 0.5"))
             }
             Scheme::Updated(Updated { placement: Placement::Clipped { pose, .. }, .. })
-                if !(pose.angle.abs() <= 360.0) =>
+                if !(-360.0..=360.0).contains(&pose.angle) =>
             {
                 Err(CaseError::setting("grid-angle", number(pose.angle), "from -360 to 360"))
             }
             Scheme::Updated(Updated { placement: Placement::Clipped { pose, .. }, .. })
-                if !(pose.shift.abs() <= 1.0) =>
+                if !(-1.0..=1.0).contains(&pose.shift) =>
             {
                 Err(CaseError::setting("grid-shift", number(pose.shift), "from -1 to 1"))
             }

@@ -68,7 +68,9 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         let time_step: T = Real::nearest(time_step);
         let (mut solver, loaded) = match &case.scheme {
             Scheme::Updated(updated) => {
-                updated::set_up(exact, model, updated, case, scene, time_step)?
+                let set_up = updated::set_up(exact, model, updated, case, scene, time_step)?;
+                let solver: Box<dyn Solver<T, D>> = set_up.solver;
+                (solver, set_up.loaded)
             }
             Scheme::Total(total) => {
                 (total::set_up(exact, total, case, scene, time_step)?, Vec::new())

@@ -143,6 +143,13 @@ fn body<T: Real, const D: usize>(
     Ok(body)
 }
 
+/// A simulation at time zero.
+pub(crate) struct SetUp<T, const D: usize> {
+    pub(crate) solver: Box<dyn Solver<T, D>>,
+    /// The reference positions of the points of the boundary where a traction acts.
+    pub(crate) loaded: Vec<SVector<T, D>>,
+}
+
 /// The simulation at time zero.
 pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
@@ -151,7 +158,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
-) -> Result<(Box<dyn Solver<T, D>>, Vec<SVector<T, D>>), CaseError> {
+) -> Result<SetUp<T, D>, CaseError> {
     let (mut body, loaded) = if updated.placement.is_clipped() {
         clipped(scene, updated.placement, case.per_cell, exact.density())?
     } else {
@@ -188,7 +195,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
     let simulation = Simulation::new(scene.grid(), body, law(model.law())?, settings)?;
-    Ok((Box::new(simulation), loaded))
+    Ok(SetUp { solver: Box::new(simulation), loaded })
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

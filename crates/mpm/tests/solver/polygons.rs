@@ -58,11 +58,11 @@ fn clipped(form: Form, (angle, offset): (f64, f64)) -> (Body<f64, 2>, Vec<Edge>)
     let (sin, cos) = angle.to_radians().sin_cos();
     let turn = if angle == 0.0 { [1.0, 0.0] } else { [cos, sin] };
     let clip = Clip { sides: form.sides(), turn, offset };
-    Body::clipped(&grid(), 2, DENSITY, &clip).unwrap()
+    Body::clipped(&grid(), 2, DENSITY, &clip).expect("a body in the plane")
 }
 
 fn polygons(body: &Body<f64, 2>) -> &Polygons<f64, 2> {
-    body.polygons.as_ref().unwrap()
+    body.polygons.as_ref().expect("polygons")
 }
 
 fn each_form() -> impl Iterator<Item = (Form, (f64, f64))> {
@@ -156,7 +156,7 @@ fn loaded(body: &mut Body<f64, 2>, boundary: &[Edge]) {
         [0.5 - away, 0.5 + away]
             .map(|s| Load { corners: edge.corners, shares: [0.5 * (1.0 - s), 0.5 * s] })
     });
-    body.polygons.as_mut().unwrap().loads = points.collect();
+    body.polygons.as_mut().expect("polygons").loads = points.collect();
 }
 
 /// A stress that is the same on all of the boundary.
