@@ -130,6 +130,10 @@ fn settings(
     if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
         settings["polar_angles"] = json!(POLAR_ANGLES);
     }
+    if scheme.updated().is_some_and(|updated| updated.placement.is_clipped()) {
+        settings["grid_angle"] = json!(parts.pose.angle);
+        settings["grid_shift"] = json!(parts.pose.shift);
+    }
     terminal::detail_once(&settings);
     settings
 }

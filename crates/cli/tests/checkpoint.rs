@@ -25,7 +25,7 @@ fn result(path: &Path) -> Value {
     result
 }
 
-/// Seven schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
+/// Eight schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
 #[cfg(unix)]
 #[test]
 fn a_killed_run_goes_on_to_the_same_bits() {
@@ -34,6 +34,7 @@ fn a_killed_run_goes_on_to_the_same_bits() {
         "axis-aligned --cells 16 --precision f32 --threads 2 --integrator musl",
         "ring --cells 16 --shape ugimp --integrator usf --threads 2",
         "ring --cells 12 --shape cpdi2 --layout body-fitted --start data",
+        "ring-nu --cells 8 --layout clipped --grid-angle 20 --threads 2",
         "axis-aligned --cells 10 --transfer apic --integrator usavg",
         "axis-aligned --cells 24 --frame total --shape bspline3",
         "axis-aligned-3d --cells 4 --shape linear --integrator usl --history history.csv",

@@ -267,6 +267,43 @@ fn the_general_step_is_chosen_by_its_options_and_echoes_them() {
 }
 
 #[test]
+fn clipped_particles_are_echoed_and_tractions_in_place_of_other_conditions_told() {
+    let place = tempfile::tempdir().unwrap();
+    let call = "run skew-2d --grid-angle 30 --grid-shift 0.25 --cells 8 --json row.json --vtk frames --frames 2";
+    let called = mms(place.path(), call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    for told in [
+        "the traction of the exact motion acts on X-lower (prescribed-motion)",
+        "cpdi2 + cd (halved start), clipped layout, grid turned by 30 degrees, grid shifted by 0.25 cells",
+    ] {
+        assert!(called.stdout.contains(told), "{told}: {}", called.stdout);
+    }
+    let result = read_json(&place.path().join("row.json"));
+    assert_row(&result["result"]);
+    let settings = &result["settings"];
+    assert_eq!([&settings["frame"], &settings["layout"]], ["updated", "clipped"]);
+    assert_eq!([&settings["grid_angle"], &settings["grid_shift"]], [30.0, 0.25]);
+    // A free surface keeps its condition, and lattices that nothing is clipped from have no such keys.
+    let called = mms(place.path(), "run ring --cells 8 --layout clipped --json row.json");
+    assert!(!called.stdout.contains("traction"), "{}", called.stdout);
+    let settings = &read_json(&place.path().join("row.json"))["settings"];
+    assert_eq!([&settings["extent"], &settings["layout"]], ["quarter", "clipped"]);
+    let called = mms(place.path(), "run ring --cells 8 --json row.json");
+    assert_eq!(called.status, 0);
+    assert!(read_json(&place.path().join("row.json"))["settings"]["grid_angle"].is_null());
+}
+
+/// The lattice loses an order on round surfaces; the options that keep it are named where that is seen.
+#[test]
+fn a_study_that_shows_the_loss_of_a_lattice_names_the_way_out() {
+    let place = tempfile::tempdir().unwrap();
+    let told = |call: &str| mms(place.path(), call).stdout.contains("--layout clipped cuts it");
+    assert!(told("converge ring --cells 8,16"));
+    assert!(!told("converge ring --cells 8,16 --layout clipped"));
+    assert!(!told("converge axis-aligned --cells 8,16 --integrator usl"));
+}
+
+#[test]
 fn single_precision_is_an_option() {
     let place = tempfile::tempdir().unwrap();
     let call = "run ring --cells 8 --precision f32 --extent full --json row.json";
@@ -369,6 +406,24 @@ fn bad_input_is_met_with_what_would_be_right() {
         &format!("run ring --shape cpdi2 {fitted} --offset 0.25"),
         &["offset", "0 with particles fitted to the body", "lattice"],
     );
+    let clipped = "--layout clipped";
+    refuses(place, &format!("run ring --shape gimp {clipped}"), &["layout", "lattice", "cpdi2"]);
+    refuses(place, &format!("run sphere-shell {clipped}"), &["layout", "not in the plane"]);
+    refuses(place, &format!("{total} {clipped}"), &["--layout", "gauss or lattice"]);
+    refuses(place, &format!("{total} --grid-angle 3"), &["grid-angle", "the layout clipped"]);
+    refuses(
+        place,
+        "run axis-aligned --layout lattice --grid-shift 0.1",
+        &["grid-shift = 0.1", "0, or the layout clipped"],
+    );
+    refuses(place, "run ring --grid-angle 400", &["grid-angle", "-360 to 360"]);
+    refuses(place, "run ring --grid-shift 1.5", &["grid-shift", "-1 to 1"]);
+    refuses(
+        place,
+        "run ring --grid-angle 4 --extent quarter",
+        &["planes of symmetry on lines of the grid", "--extent full"],
+    );
+    refuses(place, &format!("run ring {clipped} --offset 0.7"), &["offset", "-0.5 to 0.5"]);
     refuses(place, "run ring --transfer xpic0", &["--transfer", "xpic1 to"]);
     refuses(place, "run ring --frame total --shape cpdi", &["--shape cpdi", "bspline3"]);
     refuses(place, &format!("{total} --grid polar"), &["polar", "cartesian for a box"]);

@@ -5,6 +5,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
+use crate::polygons::Polygons;
 use crate::tensor::real;
 
 /// Particles, and the region of the body that each represents.
@@ -17,12 +18,14 @@ pub struct Body<T, const D: usize> {
     pub half_edges: Vec<SMatrix<T, D, D>>,
     /// The corners of the particles' domains, where there are any.
     pub mesh: Option<Mesh<T, D>>,
+    /// The domains as polygons on shared corners, where they are such.
+    pub polygons: Option<Polygons<T, D>>,
 }
 
 /// Particles whose domains are boxes, all of the same half-size, without common corners.
 impl<T, const D: usize> From<Particles<T, D>> for Body<T, D> {
     fn from(particles: Particles<T, D>) -> Self {
-        Self { particles, half_edges: Vec::new(), mesh: None }
+        Self { particles, half_edges: Vec::new(), mesh: None, polygons: None }
     }
 }
 
@@ -69,6 +72,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         Self {
             half_edges: vec![half_edge; particles.len()],
             mesh: Some(mesh_of_boxes(grid, &particles)),
+            polygons: None,
             particles,
         }
     }
@@ -159,7 +163,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
             volume,
             half_size: SVector::repeat(half * width),
         };
-        Ok(Self { particles, half_edges, mesh: Some(mesh) })
+        Ok(Self { particles, half_edges, mesh: Some(mesh), polygons: None })
     }
 }
 

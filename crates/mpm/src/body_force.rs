@@ -1,6 +1,6 @@
 //! The body force that a scene applies to its particles.
 
-use nalgebra::{RealField, SVector};
+use nalgebra::{RealField, SMatrix, SVector};
 
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T: Copy, const D: usize>: Sync {
@@ -30,6 +30,10 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
             self.evaluate(p, &X[p..=p], time.t, b);
         }
     }
+
+    /// Writes the Cauchy stress at the [loaded points](crate::Polygons::loads) of a body's boundary at time `t`, in their order. All are
+    /// zero before the first call. Default: leaves them as they are.
+    fn boundary_stress(&self, _t: T, _stress: &mut [SMatrix<T, D, D>]) {}
 
     /// Whether the force is zero everywhere and always, so that a step may leave it out.
     fn is_absent(&self) -> bool {

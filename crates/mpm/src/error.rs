@@ -196,6 +196,23 @@ pub enum SetupError {
         /// The first particle of this kind.
         particle: usize,
     },
+    /// Polygons in a dimension other than two.
+    #[error("polygons are two-dimensional; this body has dimension {dimension}")]
+    PolygonDimension {
+        /// The body's dimension.
+        dimension: usize,
+    },
+    /// Weights that polygons do not have.
+    #[error(
+        "particles that are polygons have the weights of cpdi2, bspline2 or bspline3, not those of {shape}"
+    )]
+    NotOfPolygons {
+        /// The weights asked for.
+        shape: String,
+    },
+    /// Walls on a grid whose axes are not those of the body.
+    #[error("a grid that is turned against the body cannot have walls")]
+    TurnedWalls,
     /// Weights between corners that the body does not have.
     #[error("a body without shared corners cannot have the weights of CPDI2; use those of CPDI")]
     NoCorners,

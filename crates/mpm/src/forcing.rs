@@ -39,6 +39,11 @@ impl<'a, T: RealField + Copy, const D: usize> Forcing<'a, T, D> {
         }
     }
 
+    /// The time at which it acts.
+    pub(crate) fn time(&self) -> T {
+        self.time.t
+    }
+
     /// Writes the force per unit mass on the particles `ids` into `b`; leaves `b` alone where the force is zero. `x` holds the
     /// current positions of the same particles.
     pub(crate) fn evaluate(

@@ -8,13 +8,14 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::corner_exchange::Exchange;
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::Block;
 use crate::kernel::buffers::{BufferPool, Buffers};
-use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::corners::velocity_at;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
@@ -31,8 +32,12 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, F_early, support, buffers, .. } = self;
-        let (nodes, c) = (&nodes[..], *constants);
+        let Self { particles, constants, nodes, F_early, support, buffers, exchange, .. } = self;
+        let c = *constants;
+        if let Support::Polygons(corners) = support {
+            exchange.interpolate(&c, corners, nodes);
+        }
+        let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
         let (support, buffers) = (&*support, &*buffers);
         let found = SharedOutcome::default();
@@ -65,23 +70,33 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, nodes, bins, F_early, support, affine, transfer, .. } =
             self;
         let buffers = &self.buffers;
-        let (nodes, c, transfer) = (&nodes[..], *constants, *transfer);
+        let (c, transfer) = (*constants, *transfer);
+        let nodes = support.seen(nodes, &self.exchange.values);
         let arrays = (particles, affine);
-        g2p(arrays, bins, c, support, buffers, transfer, |block, interpolated, first, of_block| {
-            let OfBlock { x, v, F, affine } = of_block;
-            block.g2p(&c.strides, nodes, interpolated);
-            take_velocity(&c, transfer, interpolated, v, affine);
-            for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
-                *x += interpolated.velocity * c.time_step;
-            }
-            stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
-        })
+        g2p(
+            arrays,
+            bins,
+            c,
+            (support, &self.exchange),
+            buffers,
+            transfer,
+            |block, interpolated, first, of_block| {
+                let OfBlock { x, v, F, affine } = of_block;
+                block.g2p(&c.strides, nodes, interpolated);
+                take_velocity(&c, transfer, interpolated, v, affine);
+                for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
+                    *x += interpolated.velocity * c.time_step;
+                }
+                stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
+            },
+        )
     }
 
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
         let Self { particles, constants, nodes, support, affine, transfer, buffers, .. } = self;
-        let (nodes, c, support, transfer) = (&nodes[..], *constants, &*support, *transfer);
+        let (c, support, transfer) = (*constants, &*support, *transfer);
+        let nodes = support.seen(nodes, &self.exchange.values);
         let buffers = &*buffers;
         let Particles { x, v, F, .. } = particles;
         each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
@@ -97,16 +112,21 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
         let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
-        let buffers = &self.buffers;
-        let (nodes, c) = (&nodes[..], *constants);
-        let reprojected =
-            if c.planted.is(Fault::NoReprojection) { nodes } else { &reprojected[..] };
+        let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
+        if let Support::Polygons(corners) = support {
+            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
+            exchange.interpolate(&c, corners, reprojected);
+            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
+        }
+        let reprojected = support.seen(reprojected, &exchange.reprojected);
+        let nodes = support.seen(nodes, &exchange.values);
+        let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { reprojected };
         let arrays = (particles, &mut Vec::new());
         g2p(
             arrays,
             bins,
             c,
-            support,
+            (support, &*exchange),
             buffers,
             Transfer::Flip,
             |block, interpolated, first, of_block| {
@@ -131,7 +151,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, support, affine, buffers, .. } = self;
+        let Self { particles, constants, nodes, support, affine, buffers, exchange, .. } = self;
+        if let Support::Polygons(corners) = support {
+            exchange.interpolate(constants, corners, nodes);
+        }
+        let nodes = support.seen(nodes, &exchange.values);
         let Particles { x, F, .. } = &*particles;
         let mut grid = FromGrid::new(constants, support, nodes, buffers.take(support, true));
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
@@ -143,11 +167,19 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
     }
 
-    /// CPDI2: the corners of domains move with the grid; their new positions are stored beside the old.
+    /// CPDI2 and polygons: the corners of domains move with the grid; their new positions are stored beside the old.
     pub(crate) fn move_corners(&mut self) {
-        let Self { constants, nodes, support, .. } = self;
+        let Self { constants, nodes, support, exchange, .. } = self;
         let (nodes, c) = (&nodes[..], *constants);
-        let Support::Cpdi2 { mesh, next } = support else { return };
+        let (mesh, next) = match support {
+            Support::Cpdi2 { mesh, next } => (mesh, next),
+            Support::Polygons(corners) => {
+                exchange.interpolate(&c, corners, nodes);
+                corners.follow(&c, &exchange.values);
+                return;
+            }
+            Support::Product(_) | Support::Cpdi { .. } => return,
+        };
         each_chunk(next, CHUNK, &|chunk, next| {
             for (next, x) in next.iter_mut().zip(&mesh.x[chunk * CHUNK..]) {
                 *next = *x;
@@ -157,11 +189,6 @@ impl<T: Lanes, const D: usize> State<T, D> {
             }
         });
     }
-}
-
-/// The ids of a block of particles in order.
-fn ids(first: usize) -> [u32; BLOCK] {
-    std::array::from_fn(|k| (first + k) as u32)
 }
 
 /// G2P of successive particles, block by block.
@@ -193,7 +220,12 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         let Self { c, support, nodes, copies, buffers } = self;
         let Buffers { block, interpolated, .. } = &mut **buffers;
         let interpolated = &mut interpolated[..x.len()];
-        block.compute_weights(c, support, &ids(first)[..x.len()], copies.of_successive(x, F));
+        block.compute_weights(
+            c,
+            support,
+            &successive(first)[..x.len()],
+            copies.of_successive(x, F),
+        );
         block.g2p(&c.strides, nodes, interpolated);
         interpolated
     }
@@ -276,7 +308,7 @@ fn g2p<T: Lanes, const D: usize>(
     (particles, affine): (&mut Particles<T, D>, &mut Vec<SMatrix<T, D, D>>),
     bins: &Bins,
     c: Constants<T, D>,
-    support: &mut Support<T, D>,
+    (support, exchange): (&mut Support<T, D>, &Exchange<T, D>),
     buffers: &BufferPool<T, D>,
     transfer: Transfer,
     update: impl Fn(&mut Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
@@ -297,9 +329,9 @@ fn g2p<T: Lanes, const D: usize>(
                 }
             }
             let count = of_block.x.len();
-            block.compute_weights(&c, at_start, &ids(first)[..count], copies.kinematics());
+            block.compute_weights(&c, at_start, &successive(first)[..count], copies.kinematics());
             update(block, &mut interpolated[..count], first, &mut of_block);
-            if let Support::Cpdi2 { .. } = at_start {
+            if let Support::Cpdi2 { .. } | Support::Polygons(_) = at_start {
                 // Checked below, when all corners are at their new places.
                 return;
             }
@@ -309,8 +341,14 @@ fn g2p<T: Lanes, const D: usize>(
         buffers.give_back(own);
         found.add(outcome);
     });
-    let Support::Cpdi2 { mesh, next } = support else { return found.all() };
-    std::mem::swap(&mut mesh.x, next);
+    match support {
+        Support::Cpdi2 { mesh, next } => std::mem::swap(&mut mesh.x, next),
+        Support::Polygons(corners) => {
+            corners.arrive();
+            found.add(exchange.check(&c, corners, bin_of));
+        }
+        Support::Product(_) | Support::Cpdi { .. } => return found.all(),
+    }
     let support = &*support;
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
@@ -333,9 +371,12 @@ fn check<T: Lanes, const D: usize>(
     F: &[SMatrix<T, D, D>],
 ) -> Outcome {
     let mut bins = [0; BLOCK];
-    bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
+    // Bins of polygons are those of their corners.
+    if !matches!(support, Support::Polygons(_)) {
+        bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
+    }
     let mut outcome = Outcome::default();
-    if support.are_valid(c, &ids(first)[..x.len()], &bins, copies.of_successive(x, F)) {
+    if support.are_valid(c, &successive(first)[..x.len()], &bins, copies.of_successive(x, F)) {
         return outcome;
     }
     for (k, ((x, F), bin)) in x.iter().zip(F).zip(bins).enumerate() {

@@ -43,7 +43,8 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return Some(Invalid::NotFinite);
         }
-        if c.axis_outside(x).is_some() {
+        // The corners of polygons are looked at themselves.
+        if !matches!(self, Self::Polygons(_)) && c.axis_outside(x).is_some() {
             return Some(Invalid::LeftGrid);
         }
         if let Some(volume) = self.volume(p) {
@@ -68,6 +69,9 @@ impl<T: Lanes, const D: usize> Support<T, D> {
     ) -> Outcome {
         if let Some(invalid) = self.invalidity(c, p, x, F) {
             return Outcome { failure: Some((invalid, p)), resort: false };
+        }
+        if let Self::Polygons(_) = self {
+            return Outcome::default();
         }
         let l = self.half_size(c, p, x, F);
         let Rows { edge, width } = self.rows(c, p, x, F, &l);
@@ -101,6 +105,12 @@ impl<T: Lanes, const D: usize> Support<T, D> {
             }
             Self::Cpdi2 { mesh, .. } => {
                 dispatch(CheckCells { of_block, mesh, ids: &padded(ids), all_valid: all });
+            }
+            Self::Polygons(_) => {
+                let Kinematics { x, F } = kinematics;
+                for (k, &p) in ids.iter().enumerate() {
+                    all_valid &= self.invalidity(c, p as usize, &x[k], &F[k]).is_none();
+                }
             }
         }
         all_valid

@@ -10,16 +10,21 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
+use crate::corner_exchange::{Exchange, Given, Loading};
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
 use crate::grid_update::{
-    Acceleration, GridUpdate, NodeVectors, Reprojection, Velocity, VelocityAndAcceleration,
+    Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
+    VelocityAndAcceleration,
 };
 use crate::kernel::buffers::{BufferPool, Buffers};
-use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::node::Node;
+use crate::parallel::bins::Bins;
+use crate::parallel::chunks::each;
 use crate::particles::Particles;
+use crate::shared_corners::{CHUNK, SharedCorners};
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::StepTimes;
@@ -28,7 +33,7 @@ use crate::support::Support;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, of_time, .. } = self;
+        let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
         let (support, law, affine, transfer) =
             (&self.support, &self.law, &self.affine, self.transfer);
         let buffers = &self.buffers;
@@ -39,8 +44,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
-        update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.bin(band, first, ids, |Buffers { contributions, .. }, copies, ids| {
+        let loading = Some((body_force, forcing.time()));
+        let set =
+            |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 for (k, &p) in ids.iter().enumerate() {
@@ -48,29 +54,27 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 }
                 contributions.take_affine(ids, mass, affine);
                 law.stress(&c, &copies.F, contributions);
-            });
-        });
+            };
+        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
     }
 
     /// P2G of mass and momentum, and from them the velocities at the start of the step.
     pub(crate) fn p2g_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, nodes, support, affine, transfer, .. } =
-            self;
-        let transfer = *transfer;
+        let Self { particles, constants, layout, bins, nodes, exchange, .. } = self;
+        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
-        update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
-        });
+        p2g.to_grid(&update, (bins, exchange, None), nodes, &momenta(mass, v, affine));
     }
 
     /// P2G of forces, by the stress of the F that has followed the grid with the weights of the one before; from them
     /// accelerations and the velocities at the end of the step.
     pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, F_early, of_time, .. } = self;
+        let Self { particles, constants, layout, bins, nodes, F_early, of_time, exchange, .. } =
+            self;
         let (support, law, transfer) = (&self.support, &self.law, self.transfer);
         let buffers = &self.buffers;
         let Particles { X, x, F, mass, volume, .. } = &*particles;
@@ -79,8 +83,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
         let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
-        update.p2g(bins, nodes, &|band, first, ids| {
-            p2g.bin(band, first, ids, |Buffers { contributions, .. }, copies, ids| {
+        let loading = Some((body_force, forcing.time()));
+        let set =
+            |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 (0..ids.len()).for_each(|k| contributions.set_force(&c, k));
@@ -88,56 +93,68 @@ impl<T: Lanes, const D: usize> State<T, D> {
                     copies.pick_F(ids, F_early);
                 }
                 law.stress(&c, &copies.F, contributions);
-            });
-        });
+            };
+        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
     }
 
     /// MUSL: P2G of the updated momenta, and from them the reprojected velocities, by the masses that the nodes have.
     pub(crate) fn p2g_updated_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, nodes, reprojected, support, .. } = self;
-        let (affine, transfer) = (&self.affine, self.transfer);
+        let Self { particles, constants, layout, bins, nodes, reprojected, exchange, .. } = self;
+        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
-        update.p2g(bins, reprojected, &|band, first, ids| {
-            p2g.momenta_of_bin(band, first, ids, (mass, v, affine));
-        });
+        p2g.to_grid(&update, (bins, exchange, None), reprojected, &momenta(mass, v, affine));
     }
 
     /// XPIC: the grid's velocities go to the particles and back. `next` gets those of `reprojected`, or of `nodes` at first.
     pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
-        let Self { particles, constants, layout, bins, nodes, reprojected, next, support, .. } =
+        let Self { particles, constants, layout, bins, nodes, reprojected, next, exchange, .. } =
             self;
-        let buffers = &self.buffers;
+        let (support, buffers) = (&self.support, &self.buffers);
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;
         let from = if is_first { &nodes[..] } else { &reprojected[..] };
+        if let Support::Polygons(corners) = support {
+            exchange.interpolate(&c, corners, from);
+        }
+        let at_corners = std::mem::take(&mut exchange.values);
+        let seen = support.seen(from, &at_corners);
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
         let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
-        update.p2g(bins, next, &|band, first, ids| {
-            p2g.bin(
-                band,
-                first,
-                ids,
-                |Buffers { block, contributions, interpolated, .. }, _, ids| {
-                    let interpolated = &mut interpolated[..ids.len()];
-                    block.g2p(&c.strides, from, interpolated);
-                    contributions.without_stress();
-                    for (value, (interpolated, &p)) in
-                        contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
-                    {
-                        let m = mass[p as usize];
-                        *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
-                    }
-                },
-            );
-        });
+        let set = |Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
+                   _: &mut Copies<T, D>,
+                   ids: &[u32]| {
+            let interpolated = &mut interpolated[..ids.len()];
+            block.g2p(&c.strides, seen, interpolated);
+            contributions.without_stress();
+            for (value, (interpolated, &p)) in
+                contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
+            {
+                let m = mass[p as usize];
+                *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
+            }
+        };
+        p2g.to_grid(&update, (bins, exchange, None), next, &set);
+        exchange.values = at_corners;
     }
 }
 
-/// P2G of the particles of a bin.
+/// Sets momenta of a block, with the affine part where there is one.
+fn momenta<'a, T: Lanes, const D: usize>(
+    mass: &'a [T],
+    v: &'a [SVector<T, D>],
+    affine: &'a [SMatrix<T, D, D>],
+) -> impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync + 'a {
+    move |Buffers { contributions, .. }, _, ids| {
+        contributions.take_momenta(ids, mass, v);
+        contributions.take_affine(ids, mass, affine);
+    }
+}
+
+/// P2G of all particles.
 struct P2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     support: &'a Support<T, D>,
@@ -148,18 +165,62 @@ struct P2g<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> P2g<'_, T, D> {
-    /// Adds mass and momentum of the particles `ids`, with the affine part where there is one, to the band of nodes that starts at
-    /// node `first`.
-    fn momenta_of_bin(
+    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and for polygons
+    /// by way of their corners, with the loads on these.
+    fn to_grid<S: NodeUpdate<T, D>>(
         &self,
-        band: &mut [Node<T, D>],
-        first: usize,
-        ids: &[u32],
-        (mass, v, affine): (&[T], &[SVector<T, D>], &[SMatrix<T, D, D>]),
+        update: &GridUpdate<'_, T, S, D>,
+        (bins, exchange, loading): (&mut Bins, &mut Exchange<T, D>, Loading<'_, T, D>),
+        nodes: &mut [Node<T, D>],
+        set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
-        self.bin(band, first, ids, |Buffers { contributions, .. }, _, ids| {
-            contributions.take_momenta(ids, mass, v);
-            contributions.take_affine(ids, mass, affine);
+        let Support::Polygons(corners) = self.support else {
+            update.p2g(bins, nodes, &|band, first, ids| self.bin(band, first, ids, set));
+            return;
+        };
+        self.to_corners(corners, exchange, set);
+        exchange.sum(self.c, corners, loading);
+        let exchange = &*exchange;
+        update.p2g(bins, nodes, &|band, first, ids| {
+            exchange.to_grid(self.c, corners, (band, first), ids);
+        });
+    }
+
+    /// Keeps what `set` says of each particle, for the corners.
+    fn to_corners(
+        &self,
+        corners: &SharedCorners<T, D>,
+        Exchange { given, affine, is_affine: has_affine, .. }: &mut Exchange<T, D>,
+        set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
+    ) {
+        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
+        *has_affine = is_affine;
+        let mut of_affine = affine.chunks_mut(CHUNK);
+        let chunks = given.chunks_mut(CHUNK).enumerate();
+        let chunks: Vec<_> = chunks
+            .map(|(number, given)| (number * CHUNK, given, of_affine.next().unwrap_or_default()))
+            .collect();
+        each(chunks, &|(first, given, affine)| {
+            let mut copies = Copies::new();
+            let mut buffers = pool.take(support, is_affine);
+            let mut of_affine = affine.chunks_mut(BLOCK);
+            for (index, given) in given.chunks_mut(BLOCK).enumerate() {
+                let ids = successive(first + index * BLOCK);
+                let ids = &ids[..given.len()];
+                copies.pick(ids, x, F);
+                buffers.block.compute_weights(c, support, ids, copies.kinematics());
+                set(&mut buffers, &mut copies, ids);
+                let Buffers { contributions, .. } = &*buffers;
+                for (k, given) in given.iter_mut().enumerate() {
+                    let (value, stress_flux) =
+                        (contributions.value[k], contributions.stress_flux[k]);
+                    *given = Given { value, stress_flux };
+                }
+                for (k, affine) in of_affine.next().unwrap_or_default().iter_mut().enumerate() {
+                    *affine = (contributions.affine[k], corners.centre(ids[k] as usize));
+                }
+            }
+            pool.give_back(buffers);
         });
     }
 
@@ -170,7 +231,7 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         band: &mut [Node<T, D>],
         first: usize,
         ids: &[u32],
-        set: impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
+        set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
         let &Self { c, support, buffers: pool, is_affine, x, F } = self;
         let mut copies = Copies::new();

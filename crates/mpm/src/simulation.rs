@@ -7,6 +7,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::{Body, Mesh};
 use crate::body_force::BodyForce;
+use crate::corner_exchange::Exchange;
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
 use crate::geometry::Constants;
@@ -18,6 +19,7 @@ use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlo
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
+use crate::polygons::Polygons;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
@@ -124,9 +126,18 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         check(&grid, &body, &settings)?;
         let mut state = allocate(&grid, body, of_blocks(&law), &settings)?;
         let Particles { x, F, .. } = &state.particles;
-        let worst = (0..x.len())
-            .filter_map(|p| Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p)))
-            .min();
+        let worst = (0..x.len()).filter_map(|p| {
+            Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p))
+        });
+        let worst = match &state.support {
+            Support::Polygons(corners) => {
+                let of_corners = (0..corners.count()).filter_map(|corner| {
+                    state.exchange.invalidity(&state.constants, corners, corner)
+                });
+                worst.chain(of_corners).min()
+            }
+            _ => worst.min(),
+        };
         if let Some((invalid, particle)) = worst {
             let error = describe(&state, invalid, particle, 0, T::zero());
             return Err(SetupError::InitialState(error));
@@ -169,7 +180,15 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     pub fn mesh(&self) -> Option<&Mesh<T, D>> {
         match &self.state.support {
             Support::Cpdi2 { mesh, .. } => Some(mesh),
-            Support::Product(_) | Support::Cpdi { .. } => None,
+            Support::Product(_) | Support::Cpdi { .. } | Support::Polygons(_) => None,
+        }
+    }
+
+    /// The polygons of the particles at the current time, where their domains are such.
+    pub fn polygons(&self) -> Option<&Polygons<T, D>> {
+        match &self.state.support {
+            Support::Polygons(corners) => Some(&corners.polygons),
+            _ => None,
         }
     }
 
@@ -221,8 +240,10 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         let Particles { x, v, F, .. } = particles;
         let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
         state.push(cast_slice_mut(affine));
-        if let Support::Cpdi2 { mesh, .. } = support {
-            state.push(cast_slice_mut(&mut mesh.x));
+        match support {
+            Support::Cpdi2 { mesh, .. } => state.push(cast_slice_mut(&mut mesh.x)),
+            Support::Polygons(corners) => state.push(cast_slice_mut(corners.positions())),
+            Support::Product(_) | Support::Cpdi { .. } => {}
         }
         // The order of the last sort decides the order of sums over particles.
         state.extend(bins.state());
@@ -290,7 +311,7 @@ fn check<T: Lanes, const D: usize>(
     if settings.halve_first_acceleration && !settings.integrator.is_staggered() {
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
-    let Body { particles, half_edges, mesh } = body;
+    let Body { particles, half_edges, mesh, polygons } = body;
     let Particles { X, x, v, F, mass, volume, half_size } = particles;
     let expected = X.len();
     let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
@@ -343,6 +364,15 @@ fn check<T: Lanes, const D: usize>(
             }
             _ => {}
         }
+    }
+    if let Some(polygons) = polygons {
+        if !matches!(settings.shape, Shape::Cpdi2 | Shape::Bspline2 | Shape::Bspline3) {
+            return Err(SetupError::NotOfPolygons { shape: settings.shape.to_string() });
+        }
+        if polygons.turn.is_some() && grid.walls.iter().flatten().any(|is_wall| *is_wall) {
+            return Err(SetupError::TurnedWalls);
+        }
+        return polygons.check(expected);
     }
     match mesh {
         _ if settings.shape != Shape::Cpdi2 => Ok(()),
@@ -401,7 +431,11 @@ fn allocate<T: Lanes, const D: usize>(
         Ok::<_, SetupError>(nodes)
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
-    let bins = Bins::new(&layout, count);
+    let points = match &support {
+        Support::Polygons(corners) => corners.count(),
+        _ => count,
+    };
+    let bins = Bins::new(&layout, points);
     let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
     let Particles { mass, volume, .. } = &particles;
     let (m, V) = (mass[0], volume[0]);
@@ -417,6 +451,7 @@ fn allocate<T: Lanes, const D: usize>(
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
         buffers: BufferPool::new(),
+        exchange: Exchange::new(&support, transfer.is_affine(), integrator.reprojects()),
         of_time: Vec::new(),
         affine: Vec::new(),
         particles,

@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::corner_exchange::Exchange;
 use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::health::Outcome;
@@ -40,6 +41,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) filtered: Vec<SVector<T, D>>,
     /// Buffers for blocks of particles.
     pub(crate) buffers: BufferPool<T, D>,
+    /// What passes between polygons and grid.
+    pub(crate) exchange: Exchange<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
 }
@@ -55,7 +58,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Sorts the particles into bins.
     pub(crate) fn sort(&mut self) {
-        let Self { constants: c, particles, support, bins, layout, .. } = self;
+        let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
+        if let Support::Polygons(corners) = support {
+            bins.sort(layout, &|corner| exchange.first_node(c, corners, corner));
+            return;
+        }
         let Particles { x, F, .. } = &*particles;
         bins.sort(layout, &|p| support.first_node(c, p, &x[p], &F[p]));
     }

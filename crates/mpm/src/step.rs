@@ -40,6 +40,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         times: StepTimes<T>,
     ) -> Outcome {
+        if let Support::Polygons(corners) = &mut self.support {
+            corners.measure();
+        }
         if !self.bins.is_sorted() {
             self.sort();
         }

@@ -7,9 +7,11 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::body::{Body, Mesh};
 use crate::domain::{HalfEdges, REACHED, volume_of_cell};
 use crate::geometry::Constants;
+use crate::node::Node;
 use crate::scheme::Shape;
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, first_layer, node_below};
-use crate::simd::One;
+use crate::shared_corners::SharedCorners;
+use crate::simd::{Lanes, One};
 use crate::tensor::{product, real};
 
 /// The shape function of a simulation.
@@ -26,17 +28,25 @@ pub(crate) enum Support<T, const D: usize> {
         /// Buffer for the positions of the corners at the end of a step.
         next: Vec<SVector<T, D>>,
     },
+    /// Polygons on shared corners.
+    Polygons(Box<SharedCorners<T, D>>),
 }
 
-impl<T: RealField + Copy, const D: usize> Support<T, D> {
+impl<T: Lanes, const D: usize> Support<T, D> {
     /// The support of a body's particles on a grid of this spacing, and the particles.
     pub(crate) fn new(
         shape: Shape,
         body: Body<T, D>,
         spacing: T,
     ) -> (Self, crate::Particles<T, D>) {
-        let Body { particles, half_edges, mesh } = body;
+        let Body { particles, half_edges, mesh, polygons } = body;
         let cells = particles.half_size / spacing;
+        if let Some(polygons) = polygons
+            && let Some(at_corner) = ProductShape::new(at_corners(shape), cells)
+        {
+            let corners = Box::new(SharedCorners::new(polygons, at_corner));
+            return (Self::Polygons(corners), particles);
+        }
         if let Some(product) = ProductShape::new(shape, cells) {
             return (Self::Product(product), particles);
         }
@@ -71,6 +81,8 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
                 }
                 l * c.inverse_spacing
             }
+            // Corners reach nodes, each its own.
+            Self::Polygons(_) => SVector::zeros(),
         }
     }
 
@@ -108,6 +120,7 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
                     corners.iter().map(|&corner| c.in_cells(&mesh.x[corner as usize])[D - 1]),
                 )
             }
+            Self::Polygons(_) => Rows { edge: c.in_cells(x)[D - 1], width: REACHED },
         }
     }
 
@@ -125,18 +138,36 @@ impl<T: RealField + Copy, const D: usize> Support<T, D> {
             + row * c.strides[D - 1]
     }
 
-    /// For CPDI2 the volume of a particle's domain.
+    /// For domains between shared corners the volume of a particle's domain.
     pub(crate) fn volume(&self, p: usize) -> Option<T> {
-        let Self::Cpdi2 { mesh, .. } = self else { return None };
+        let mesh = match self {
+            Self::Cpdi2 { mesh, .. } => mesh,
+            Self::Polygons(corners) => return Some(corners.volume(p)),
+            Self::Product(_) | Self::Cpdi { .. } => return None,
+        };
         let corners = mesh.corners[p];
         let x = array::from_fn(|k| array::from_fn(|a| One(mesh.x[corners[k] as usize][a])));
         Some(volume_of_cell::<_, D>(&x).0)
+    }
+
+    /// The nodes that particles take values from: for polygons their corners, with the grid's values there.
+    pub(crate) fn seen<'a>(
+        &self,
+        nodes: &'a [Node<T, D>],
+        corners: &'a [Node<T, D>],
+    ) -> &'a [Node<T, D>] {
+        if let Self::Polygons(_) = self { corners } else { nodes }
     }
 
     /// The first axis along which a half-size, in cells, exceeds the limit.
     pub(crate) fn axis_too_large(&self, l: &SVector<T, D>) -> Option<usize> {
         (0..D).find(|&a| l[a] > real(HALF_SIZE_LIMIT))
     }
+}
+
+/// The shape function by which the corners of polygons reach nodes.
+pub(crate) fn at_corners(shape: Shape) -> Shape {
+    if shape == Shape::Cpdi2 { Shape::Linear } else { shape }
 }
 
 /// The rows of nodes that a particle reaches.

@@ -128,10 +128,29 @@ impl Case {
             }
         }
         match self.scheme {
-            Scheme::Updated(Updated { placement: Placement::Lattice { offset }, .. })
-                if !(-0.5..=0.5).contains(&offset) =>
-            {
+            Scheme::Updated(Updated {
+                placement: Placement::Lattice { offset } | Placement::Clipped { offset, .. },
+                ..
+            }) if !(-0.5..=0.5).contains(&offset) => {
                 Err(CaseError::setting("offset", number(offset), "from -0.5 to 0.5"))
+            }
+            Scheme::Updated(Updated { placement: Placement::Clipped { pose, .. }, .. })
+                if !(-360.0..=360.0).contains(&pose.angle) =>
+            {
+                Err(CaseError::setting("grid-angle", number(pose.angle), "from -360 to 360"))
+            }
+            Scheme::Updated(Updated { placement: Placement::Clipped { pose, .. }, .. })
+                if !(-1.0..=1.0).contains(&pose.shift) =>
+            {
+                Err(CaseError::setting("grid-shift", number(pose.shift), "from -1 to 1"))
+            }
+            Scheme::Updated(Updated {
+                shape,
+                placement: clipped @ Placement::Clipped { .. },
+                ..
+            }) if !matches!(shape, Shape::Cpdi2 | Shape::Bspline2 | Shape::Bspline3) => {
+                let instead = "lattice with this shape, or the shape cpdi2, bspline2 or bspline3";
+                Err(CaseError::setting("layout", clipped.name(), instead))
             }
             Scheme::Updated(Updated {
                 shape: Shape::Ugimp | Shape::Gimp,

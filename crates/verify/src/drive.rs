@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{AtTime, BodyForce, Solver, StepError};
 use mmsmith_runtime::{BodyForceAtPoints, Real, Solution};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use crate::case::Case;
 use crate::error::CaseError;
@@ -66,13 +66,17 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         f64: Precision<D>,
     {
         let time_step: T = Real::nearest(time_step);
-        let mut solver = match &case.scheme {
+        let (mut solver, loaded) = match &case.scheme {
             Scheme::Updated(updated) => {
-                updated::set_up(exact, model, updated, case, scene, time_step)?
+                let set_up = updated::set_up(exact, model, updated, case, scene, time_step)?;
+                let solver: Box<dyn Solver<T, D>> = set_up.solver;
+                (solver, set_up.loaded)
             }
-            Scheme::Total(total) => total::set_up(exact, total, case, scene, time_step)?,
+            Scheme::Total(total) => {
+                (total::set_up(exact, total, case, scene, time_step)?, Vec::new())
+            }
         };
-        let body_force = ExactBodyForce::new(model, &solver.observe().0.X);
+        let body_force = ExactBodyForce::new(model, &solver.observe().0.X, loaded);
         Ok(Self { solver, body_force, dt: time_step.to_f64() })
     }
 }
@@ -116,12 +120,14 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
     model: &'a dyn Solution<T, D>,
+    /// Reference positions of points of the boundary with the exact stress, in the updated frame.
+    loaded: Vec<SVector<T, D>>,
     planted: Planted,
 }
 
 impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
-    fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>]) -> Self {
-        Self { kept: model.body_force_at(X), model, planted: Planted::here() }
+    fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>], loaded: Vec<SVector<T, D>>) -> Self {
+        Self { kept: model.body_force_at(X), model, loaded, planted: Planted::here() }
     }
 }
 
@@ -136,6 +142,14 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
 
     fn of_time(&self, t: T, values: &mut Vec<T>) {
         self.kept.of_time(t, values);
+    }
+
+    fn boundary_stress(&self, t: T, stress: &mut [SMatrix<T, D, D>]) {
+        for (stress, X) in stress.iter_mut().zip(&self.loaded) {
+            let F = self.model.deformation_gradient(X, t);
+            *stress =
+                self.model.first_piola_kirchhoff(X, t) * F.transpose() / self.model.jacobian(X, t);
+        }
     }
 
     fn evaluate_of(

@@ -71,8 +71,8 @@ pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
 pub use run::{Outputs, Progress, Row, Status, run};
-pub use scene::needs_total_frame;
-pub use scheme::{Parts, Placement, Scheme, Start, Stepping, Total, Updated};
+pub use scene::{loaded_instead, needs_total_frame};
+pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{
     AgainstError, Agreement, DifferenceRow, Differences, Input, Points, Quantity, Remark,
     Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, against,

@@ -1,6 +1,6 @@
 //! From a solution to a grid with walls and particles.
 
-use mmsmith_mpm::Grid;
+use mmsmith_mpm::{Grid, Side};
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 
@@ -8,6 +8,7 @@ use crate::case::{Case, Extent};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points;
+use crate::scheme::Placement;
 
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
@@ -17,6 +18,39 @@ const MARGIN_CELLS: f64 = 3.0;
 pub fn needs_total_frame(exact: &AnySolution<f64>) -> Option<Boundary> {
     let needs = |boundary: &&Boundary| is_given(boundary.condition);
     in_dimension!(exact, |s| s.boundaries().iter().find(needs).copied(), else None)
+}
+
+/// The conditions of `exact` in whose place clipped particles have the traction of its motion: sides that move as it says, and with a grid
+/// on whose lines they do not lie sliding ones.
+#[must_use]
+pub fn loaded_instead(exact: &AnySolution<f64>, case: &Case) -> Vec<Boundary> {
+    let Some(placement) = case.scheme.updated().map(|updated| updated.placement) else {
+        return Vec::new();
+    };
+    let AnySolution::Two(exact) = exact else { return Vec::new() };
+    if !placement.is_clipped() {
+        return Vec::new();
+    }
+    let is_loaded = |boundary: &&Boundary| match boundary.condition {
+        Condition::PrescribedMotion => true,
+        Condition::Sliding | Condition::Symmetry => match exact.domain() {
+            Domain::Box { lower, upper } => {
+                let spacing = exact.cell_length() / case.cells as f64;
+                !(placement.pose().is_usual() && are_multiples(&(upper - lower), spacing))
+            }
+            _ => false,
+        },
+        Condition::TractionFree | Condition::PrescribedTraction => false,
+    };
+    exact.boundaries().iter().filter(is_loaded).copied().collect()
+}
+
+/// Whether all sides of a box are whole multiples of the spacing.
+fn are_multiples<const D: usize>(sides: &SVector<f64, D>, spacing: f64) -> bool {
+    sides.iter().all(|side| {
+        let count = side / spacing;
+        count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0)
+    })
 }
 
 /// Whether the values of motion or traction come from the solution.
@@ -33,8 +67,20 @@ pub(crate) struct Scene<const D: usize> {
     /// What holds on the two sides along each axis of a box, or on the inner and the outer rim of an annulus, first.
     pub(crate) sides: [[Condition; 2]; D],
     pub(crate) domain: Domain<f64, D>,
+    /// Cosine and sine of the angle of the grid's axes against those of the body; the grid is given in its own.
+    pub(crate) turn: [f64; 2],
+    /// The boundary of the part that is modelled, where particles are clipped with it.
+    pub(crate) boundary: Vec<BoundaryPart>,
     /// The largest extent of the body.
     pub(crate) size: f64,
+}
+
+/// A part of the boundary in the plane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoundaryPart {
+    pub(crate) side: Side,
+    /// Whether the traction of the solution acts on it.
+    pub(crate) is_loaded: bool,
 }
 
 impl<const D: usize> Scene<D> {
@@ -48,7 +94,9 @@ impl<const D: usize> Scene<D> {
         let spacing = solution.cell_length() / case.cells as f64;
         let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
         let size = points::size(&domain).ok_or_else(unknown)?;
-        let quarter = quarter(solution, case.extent)?;
+        let placement = case.scheme.updated().map(|updated| updated.placement);
+        let clipped = placement.filter(|placement| placement.is_clipped());
+        let quarter = quarter(solution, case.extent, clipped)?;
         let surfaces: Vec<Surface> = match domain {
             Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],
             _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
@@ -62,7 +110,7 @@ impl<const D: usize> Scene<D> {
         let mut sides = [[Condition::TractionFree; 2]; D];
         for &Boundary { surface, condition } in solution.boundaries() {
             let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
-            if is_given(condition) && case.scheme.updated().is_some() {
+            if is_given(condition) && case.scheme.updated().is_some() && clipped.is_none() {
                 let instead = instead(&domain);
                 return Err(SceneError::Unmodelled { surface, condition, instead });
             }
@@ -86,6 +134,9 @@ impl<const D: usize> Scene<D> {
             let on = |rim: Surface| solution.boundaries().iter().find(|b| b.surface == rim);
             let rim = |rim| on(rim).map_or(Condition::TractionFree, |b| b.condition);
             sides[0] = [rim(Surface::Inner), rim(Surface::Outer)];
+        }
+        if let Some(clipped) = clipped {
+            return Self::clipped(solution, case, end, (clipped, quarter), sides);
         }
         let (lower, cells) = match &domain {
             Domain::Box { lower, upper } => {
@@ -119,7 +170,7 @@ impl<const D: usize> Scene<D> {
                 (*lower, cells)
             }
             Domain::Annulus { outer, .. } => {
-                let furthest = outer + largest_displacement(solution, end);
+                let furthest = outer + largest_displacement(solution, &[Surface::Outer], end);
                 let half = (furthest / spacing).ceil() + MARGIN_CELLS;
                 // The origin stays a grid line, so that both extents have the same lattice of particles.
                 if quarter {
@@ -130,7 +181,109 @@ impl<const D: usize> Scene<D> {
             }
             _ => return Err(unknown()),
         };
-        Ok(Self { lower, spacing, cells, walls, sides, domain, size })
+        let (turn, boundary) = ([1.0, 0.0], Vec::new());
+        Ok(Self { lower, spacing, cells, walls, sides, domain, turn, boundary, size })
+    }
+
+    /// As [`new`](Self::new) for particles that are clipped with the boundary: sides need not lie on lines of the grid.
+    ///
+    /// Walls are where a sliding side lies on one. What else is not free of traction has the traction of the solution.
+    fn clipped(
+        solution: &dyn Solution<f64, D>,
+        case: &Case,
+        end: f64,
+        (placement, quarter): (Placement, bool),
+        sides: [[Condition; 2]; D],
+    ) -> Result<Self, SceneError> {
+        let domain = solution.domain();
+        let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
+        let size = points::size(&domain).ok_or_else(unknown)?;
+        let spacing = solution.cell_length() / case.cells as f64;
+        let pose = placement.pose();
+        // Whole quarters have no rounding.
+        let (sin, cos) = pose.angle.to_radians().sin_cos();
+        let turn = match pose.angle.rem_euclid(360.0) {
+            0.0 => [1.0, 0.0],
+            90.0 => [0.0, 1.0],
+            180.0 => [-1.0, 0.0],
+            270.0 => [0.0, -1.0],
+            _ => [cos, sin],
+        };
+        let surfaces: Vec<Surface> = match domain {
+            Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],
+            _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
+        };
+        let reach =
+            (largest_displacement(solution, &surfaces, end) / spacing).ceil() + MARGIN_CELLS;
+        let (mut walls, mut boundary) = ([[false; 2]; D], Vec::new());
+        let mut add = |side, is_loaded| boundary.push(BoundaryPart { side, is_loaded });
+        let straight = |axis: usize, sign: f64, distance: f64| {
+            let normal = std::array::from_fn(|a| if a == axis { sign } else { 0.0 });
+            Side::Straight { normal, distance }
+        };
+        let is_wall = |c: Condition| matches!(c, Condition::Sliding | Condition::Symmetry);
+        let (lower, cells): (SVector<f64, D>, [usize; D]) = match &domain {
+            Domain::Annulus { inner, outer } => {
+                let (inner, outer) = (*inner, *outer);
+                add(Side::Inner { radius: inner }, is_given(sides[0][0]));
+                add(Side::Outer { radius: outer }, is_given(sides[0][1]));
+                let half = (outer / spacing).ceil() + reach;
+                if quarter {
+                    for axis in 0..D {
+                        walls[axis][0] = true;
+                        add(straight(axis, -1.0, 0.0), false);
+                    }
+                    (SVector::zeros(), [half as usize; D])
+                } else {
+                    let first = half + pose.shift.abs().ceil();
+                    (SVector::repeat((pose.shift - first) * spacing), [2 * first as usize; D])
+                }
+            }
+            Domain::Box { lower, upper } => {
+                let fits = pose.is_usual() && are_multiples(&(upper - lower), spacing);
+                for axis in 0..D {
+                    walls[axis] = sides[axis].map(|side| fits && is_wall(side));
+                    let is_loaded = |end: usize| {
+                        !walls[axis][end] && sides[axis][end] != Condition::TractionFree
+                    };
+                    let (low, high) =
+                        (straight(axis, -1.0, -lower[axis]), straight(axis, 1.0, upper[axis]));
+                    add(low, is_loaded(0));
+                    add(high, is_loaded(1));
+                }
+                // Along the axes of the grid.
+                let [cos, sin] = turn;
+                let turned = |X: SVector<f64, D>| -> SVector<f64, D> {
+                    SVector::from_fn(|a, _| match (D, a) {
+                        (2, 0) => cos * X[0] + sin * X[D - 1],
+                        (2, _) => cos * X[D - 1] - sin * X[0],
+                        _ => X[a],
+                    })
+                };
+                let base: SVector<f64, D> = turned(*lower) + SVector::repeat(pose.shift * spacing);
+                let corners =
+                    (0..1_usize << D).map(|index| {
+                        turned(SVector::from_fn(|a, _| {
+                            if index >> a & 1 == 1 { upper[a] } else { lower[a] }
+                        }))
+                    });
+                let corners: Vec<_> = corners.collect();
+                let (mut first, mut cells) = (SVector::zeros(), [0; D]);
+                for a in 0..D {
+                    let lines = corners.iter().map(|corner| (corner[a] - base[a]) / spacing);
+                    let low = lines.clone().fold(f64::INFINITY, f64::min);
+                    let high = lines.fold(f64::NEG_INFINITY, f64::max);
+                    let margin = walls[a].map(|is_wall| if is_wall { 0.0 } else { reach });
+                    let low = (low + 1e-9).floor() - margin[0];
+                    let high = (high - 1e-9).ceil() + margin[1];
+                    first[a] = base[a] + low * spacing;
+                    cells[a] = (high - low) as usize;
+                }
+                (first, cells)
+            }
+            _ => return Err(unknown()),
+        };
+        Ok(Self { lower, spacing, cells, walls, sides, domain, turn, boundary, size })
     }
 
     /// The largest coordinate that a particle at rest may have, and at least the size of the body: what positions are rounded
@@ -174,6 +327,9 @@ impl<const D: usize> Scene<D> {
                 let full_ball = if D == 3 { 4.0 / 3.0 * pi } else { pi };
                 let content = part * full_ball * (outer.powi(D as i32) - inner.powi(D as i32));
                 content / self.spacing.powi(D as i32)
+            }
+            Domain::Box { lower, upper } if !self.boundary.is_empty() => {
+                (upper - lower).iter().map(|side| side / self.spacing).product()
             }
             _ => cells,
         };
@@ -244,8 +400,11 @@ fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
 fn quarter<const D: usize>(
     solution: &dyn Solution<f64, D>,
     extent: Option<Extent>,
+    clipped: Option<Placement>,
 ) -> Result<bool, SceneError> {
     let is_annulus = matches!(solution.domain(), Domain::Annulus { .. });
+    // The planes are then no lines of the grid.
+    let moved = clipped.is_some_and(|placement| !placement.pose().is_usual());
     let planes = |axis| {
         solution.boundaries().iter().any(|boundary| {
             boundary.surface == Surface::Lower(axis) && boundary.condition == Condition::Symmetry
@@ -256,6 +415,10 @@ fn quarter<const D: usize>(
             "the extent can be chosen for an annulus only, and this is a box",
         )),
         Some(Extent::Full) => Ok(false),
+        Some(Extent::Quarter) if moved => Err(SceneError::Extent(
+            "a quarter needs planes of symmetry on lines of the grid: take --extent full, or leave out --grid-angle and --grid-shift",
+        )),
+        None if moved && is_annulus => Ok(false),
         Some(Extent::Quarter) if !(0..D).all(planes) => {
             Err(SceneError::Extent("the solution declares no planes of symmetry to cut a quarter"))
         }
@@ -264,13 +427,18 @@ fn quarter<const D: usize>(
     }
 }
 
-/// The largest displacement on the outer rim at sampled places and times until `end`.
-fn largest_displacement<const D: usize>(solution: &dyn Solution<f64, D>, end: f64) -> f64 {
+/// The largest displacement on some surfaces at sampled places and times until `end`.
+fn largest_displacement<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    surfaces: &[Surface],
+    end: f64,
+) -> f64 {
     // Periodic motion repeats, so one period on a fine raster of times sees it all.
     let span = end.min(solution.period());
     let mut largest = 0.0_f64;
-    for place in 0..16 {
-        let Some((X, _)) = points::surface(&solution.domain(), Surface::Outer, place) else {
+    let places = (0..16).flat_map(|place| surfaces.iter().map(move |surface| (place, *surface)));
+    for (place, surface) in places {
+        let Some((X, _)) = points::surface(&solution.domain(), surface, place) else {
             return largest;
         };
         for moment in 0..=128 {

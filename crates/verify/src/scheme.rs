@@ -64,6 +64,30 @@ pub enum Placement {
     },
     /// For rings: at the centroids of polar cells, whose corners lie on the rims.
     BodyFitted,
+    /// In the plane: at the centroids of the boxes of a lattice, clipped with the boundary of the body.
+    Clipped {
+        /// As of a lattice.
+        offset: f64,
+        /// How the background grid, and the lattice with it, lies against the body.
+        pose: GridPose,
+    },
+}
+
+/// How the background grid lies against the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GridPose {
+    /// The angle of its axes against those of the body, in degrees, counter-clockwise.
+    pub angle: f64,
+    /// The shift of its lines along each of its axes, in cells.
+    pub shift: f64,
+}
+
+impl GridPose {
+    /// Whether its lines are where they are usually.
+    #[must_use]
+    pub fn is_usual(self) -> bool {
+        self == Self::default()
+    }
 }
 
 /// A scheme of the total Lagrangian formulation.
@@ -98,6 +122,8 @@ pub struct Parts {
     pub layout: &'static str,
     /// The shift of the particles' lattice, in units of their distance.
     pub offset: f64,
+    /// How the grid lies against the body.
+    pub pose: GridPose,
     /// The mass matrix.
     pub mass: &'static str,
     /// The order in time of the composition of leapfrog.
@@ -177,15 +203,30 @@ impl Placement {
         match self {
             Self::Lattice { .. } => "lattice",
             Self::BodyFitted => "body-fitted",
+            Self::Clipped { .. } => "clipped",
         }
     }
 
     /// The shift of the lattice; that of what is no lattice is zero.
     pub(crate) fn offset(self) -> f64 {
         match self {
-            Self::Lattice { offset } => offset,
+            Self::Lattice { offset } | Self::Clipped { offset, .. } => offset,
             Self::BodyFitted => 0.0,
         }
+    }
+
+    /// How the grid lies against the body.
+    pub(crate) fn pose(self) -> GridPose {
+        match self {
+            Self::Clipped { pose, .. } => pose,
+            Self::Lattice { .. } | Self::BodyFitted => GridPose::default(),
+        }
+    }
+
+    /// Whether the particles are clipped with the boundary of the body.
+    #[must_use]
+    pub fn is_clipped(self) -> bool {
+        matches!(self, Self::Clipped { .. })
     }
 }
 
@@ -229,6 +270,7 @@ impl Scheme {
                 transfer: transfer.to_string(),
                 layout: placement.name(),
                 offset: placement.offset(),
+                pose: placement.pose(),
                 mass: "lumped",
                 composition: Composition::Order2.order(),
                 grid: grid_name(Coordinates::Cartesian),
@@ -244,6 +286,7 @@ impl Scheme {
                     Layout::Gauss => "gauss",
                 },
                 offset: 0.0,
+                pose: GridPose::default(),
                 mass: match mass {
                     MassMatrix::Lumped => "lumped",
                     MassMatrix::Consistent => "consistent",

@@ -1159,9 +1159,10 @@ impl Change {
             (SettingName::Transfer, Scheme::Updated(from), Scheme::Updated(to)) => {
                 (from.transfer == Transfer::Flip).then_some(Self::Transfer(from.shape, to.transfer))
             }
-            (SettingName::Layout, Scheme::Updated(from), _) => (from.placement
-                != Placement::BodyFitted)
-                .then(|| Self::Layout(basis(&a.case.scheme))),
+            (SettingName::Layout, Scheme::Updated(from), _) => {
+                matches!(from.placement, Placement::Lattice { .. })
+                    .then(|| Self::Layout(basis(&a.case.scheme)))
+            }
             (SettingName::Layout, Scheme::Total(from), _) => {
                 (from.layout == Layout::Lattice).then(|| Self::Layout(basis(&a.case.scheme)))
             }

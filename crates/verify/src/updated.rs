@@ -1,6 +1,8 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
-use mmsmith_mpm::{Annulus, Body, Particles, Settings, Shape, Simulation, Solver};
+use mmsmith_mpm::{
+    Annulus, Body, Clip, Edge, Load, Particles, Settings, Shape, Side, Simulation, Solver,
+};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
@@ -15,6 +17,10 @@ pub(crate) fn admit<const D: usize>(scene: &Scene<D>, updated: &Updated) -> Resu
     let instead = match (updated.placement, &scene.domain) {
         (Placement::Lattice { .. }, _) => return Ok(()),
         (Placement::BodyFitted, Domain::Annulus { .. }) if D == 2 => return Ok(()),
+        (Placement::Clipped { .. }, Domain::Annulus { .. } | Domain::Box { .. }) if D == 2 => {
+            return Ok(());
+        }
+        (Placement::Clipped { .. }, _) => "lattice for a body that is not in the plane",
         (Placement::BodyFitted, Domain::Annulus { .. }) => "lattice for a shell",
         (Placement::BodyFitted, _) => "lattice for a box, which that fits",
     };
@@ -36,12 +42,72 @@ pub(crate) fn bytes_expected<const D: usize>(
         Shape::Cpdi2 => 3 * D + D * D + size_of::<[u32; 8]>() / scalar,
         _ => 0,
     };
+    // Corners and what they pass on, and four or more shares of a particle.
+    let of_polygons = 3 * D + 3 * 8 + D * D + 4 * (D + 5);
+    let of_shape = if updated.placement.is_clipped() { of_polygons } else { of_shape };
     let of_transfer = if updated.transfer.is_affine() { D * D } else { 0 };
     let of_node = if updated.transfer.is_filtered() { D + 8 } else { 0 };
     let nodes: f64 = scene.cells.iter().map(|&cells| cells as f64 + 9.0).product();
     let particles = scene.particles_expected(per_cell);
     scene.bytes_expected(per_cell, scalar, exact)
         + scalar as f64 * (particles * (of_shape + of_transfer) as f64 + nodes * of_node as f64)
+}
+
+/// A body that a lattice clipped with its boundary makes, at rest, and the reference positions where a traction acts on it.
+fn clipped<T: Real, const D: usize>(
+    scene: &Scene<D>,
+    placement: Placement,
+    per_cell: usize,
+    density: f64,
+) -> Result<(Body<T, D>, Vec<SVector<T, D>>), CaseError> {
+    let clip = Clip {
+        sides: scene.boundary.iter().map(|part| part.side).collect(),
+        turn: scene.turn,
+        offset: placement.offset(),
+    };
+    let (mut body, edges) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
+    let mut points = Vec::new();
+    if let Some(polygons) = &mut body.polygons {
+        let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
+        for (a, walls) in scene.walls.iter().enumerate() {
+            for (is_wall, wall) in walls.iter().zip([grid.lower[a], grid.upper()[a]]) {
+                for X in polygons.X.iter_mut().filter(|_| *is_wall) {
+                    if (X[a] - wall).abs() <= near {
+                        X[a] = wall;
+                    }
+                }
+            }
+        }
+        for Edge { side, corners } in edges {
+            let part = &scene.boundary[side];
+            if !part.is_loaded {
+                continue;
+            }
+            let ends = corners.map(|corner| polygons.X[corner as usize].map(Real::to_f64));
+            for (X, shares) in gauss_points(part.side, ends) {
+                polygons.loads.push(Load { corners, shares: shares.map(Real::nearest) });
+                points.push(X.map(Real::nearest));
+            }
+        }
+        polygons.x.clone_from(&polygons.X);
+    }
+    Ok((body, points))
+}
+
+/// Two Gauss points of a part of a side between two ends, with the shares that they give to either.
+fn gauss_points<const D: usize>(
+    side: Side,
+    [a, b]: [SVector<f64, D>; 2],
+) -> [(SVector<f64, D>, [f64; 2]); 2] {
+    let away = 0.5 / 3.0_f64.sqrt();
+    [0.5 - away, 0.5 + away].map(|s| {
+        let on_chord = a + (b - a) * s;
+        let X = match side {
+            Side::Straight { .. } => on_chord,
+            Side::Outer { radius } | Side::Inner { radius } => on_chord.normalize() * radius,
+        };
+        (X, [0.5 * (1.0 - s), 0.5 * s])
+    })
 }
 
 /// The body of a case at rest in the reference configuration.
@@ -77,6 +143,13 @@ fn body<T: Real, const D: usize>(
     Ok(body)
 }
 
+/// A simulation at time zero.
+pub(crate) struct SetUp<T, const D: usize> {
+    pub(crate) solver: Box<dyn Solver<T, D>>,
+    /// The reference positions of the points of the boundary where a traction acts.
+    pub(crate) loaded: Vec<SVector<T, D>>,
+}
+
 /// The simulation at time zero.
 pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     exact: &dyn Solution<f64, D>,
@@ -85,19 +158,30 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     time_step: T,
-) -> Result<Box<dyn Solver<T, D>>, CaseError> {
-    let mut body = body::<T, D>(scene, updated, case.per_cell, exact.density())?;
+) -> Result<SetUp<T, D>, CaseError> {
+    let (mut body, loaded) = if updated.placement.is_clipped() {
+        clipped(scene, updated.placement, case.per_cell, exact.density())?
+    } else {
+        (body::<T, D>(scene, updated, case.per_cell, exact.density())?, Vec::new())
+    };
     if body.particles.is_empty() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
-    if let Some(mesh) = &mut body.mesh {
-        for (x, X) in mesh.x.iter_mut().zip(&mesh.X) {
+    let corners = match (&mut body.mesh, &mut body.polygons) {
+        (Some(mesh), _) => Some((&mesh.X, &mut mesh.x)),
+        (None, Some(polygons)) => Some((&polygons.X, &mut polygons.x)),
+        (None, None) => None,
+    };
+    if let Some((X, x)) = corners {
+        let grid = scene.grid::<T>();
+        for (x, X) in x.iter_mut().zip(X) {
             let place = X.map(Real::to_f64);
             *x = (place + exact.displacement(&place, 0.0)).map(Real::nearest);
             // On a plane of symmetry there is no motion across it, not even by rounding.
-            for (a, [lower, _]) in scene.walls.iter().enumerate() {
-                if *lower && place[a] == scene.lower[a] {
+            for (a, walls) in scene.walls.iter().enumerate() {
+                let ends = [grid.lower[a], grid.upper()[a]];
+                if walls.iter().zip(ends).any(|(is_wall, wall)| *is_wall && X[a] == wall) {
                     x[a] = X[a];
                 }
             }
@@ -110,7 +194,8 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         time_step,
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
-    Ok(Box::new(Simulation::new(scene.grid(), body, law(model.law())?, settings)?))
+    let simulation = Simulation::new(scene.grid(), body, law(model.law())?, settings)?;
+    Ok(SetUp { solver: Box::new(simulation), loaded })
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -204,7 +204,7 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
                 (Placement::Lattice { .. }, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => {
                     in_dimension!(exact, |s| stays_aligned(s), else false)
                 }
-                (Placement::BodyFitted, Shape::Cpdi2) => true,
+                (Placement::BodyFitted | Placement::Clipped { .. }, Shape::Cpdi2) => true,
                 _ => false,
             };
             let order = contiguous.then_some(2.0);

@@ -74,10 +74,45 @@ fn a_quarter_of_the_ring_moves_as_the_whole_does() {
     assert!((quarter / full - 1.0).abs() < 1e-9, "{quarter:e} {full:e}");
 }
 
+/// Errors in units of the amplitude on the finest grid, L_inf and L2 of u; both fall with order 2, wherever the grid lies.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn clipped_lattices_are_of_second_order_with_free_and_loaded_surfaces() {
+    for (call, linf, l2) in [
+        ("ring --layout clipped --cells 32,64,128", 1.78e-4, 1.46e-4),
+        ("ring --layout clipped --precision f32 --cells 16,32,64", 6.9e-4, 5.9e-4),
+        ("ring --layout clipped --offset 0.37 --set A=0.05 --cells 16,32,64", 6.7e-4, 5.1e-4),
+        (
+            "ring --layout clipped --ppc 3 --set Ri=0.53 --set Ro=0.97 --cells 16,32,64",
+            6.4e-4,
+            5.0e-4,
+        ),
+        ("ring --grid-angle 17 --grid-shift 0.31 --cells 16,32,64", 6.9e-4, 5.9e-4),
+        ("ring-nu --layout clipped --cells 16,32,64", 8.8e-4, 7.3e-4),
+        ("skew-2d --layout clipped --cells 16,32,64", 4.7e-3, 1.55e-3),
+        ("skew-2d --grid-angle 30 --grid-shift 0.37 --cells 16,32,64", 4.5e-3, 1.55e-3),
+        ("axis-aligned --grid-angle 30 --grid-shift 0.2 --cells 16,32,64", 4.4e-3, 1.73e-3),
+    ] {
+        let study = converge(call);
+        let amplitude = at(&study, &["settings", "parameters", "A"]);
+        for (norm, bound, least) in [("linf", linf, 1.85), ("l2", l2, 1.95)] {
+            let finest = column(&study, &["errors", "u", norm])[2] / amplitude;
+            assert!(finest < bound, "{call}: {norm} {finest:e}");
+            assert!(finest > 0.8 * bound, "{call}: {norm} {finest:e}");
+            let fit = at(&study, &["orders", "u", norm, "fit"]);
+            assert!((least..2.2).contains(&fit), "{call}: {norm} {fit}");
+        }
+    }
+}
+
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn results_are_the_same_bits_for_any_number_of_threads() {
-    for scheme in ["--shape cpdi2 --layout body-fitted", "--shape bspline3 --transfer apic"] {
+    for scheme in [
+        "--shape cpdi2 --layout body-fitted",
+        "--layout clipped --grid-angle 20",
+        "--shape bspline3 --transfer apic",
+    ] {
         let errors = |threads: &str| {
             let call = format!("run ring --cells 16 {scheme} --threads {threads}");
             json(&call.split(' ').collect::<Vec<_>>())["result"]["errors"].clone()

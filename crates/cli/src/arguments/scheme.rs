@@ -29,7 +29,7 @@ pub(crate) struct SchemeOptions {
     /// said 4, and 6 for splines of degree 4 and 5
     #[arg(long, value_enum)]
     pub(crate) composition: Option<Composition>,
-    /// Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted ones in the updated one
+    /// Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted and clipped ones in the updated one
     /// only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held between sliding walls
     #[arg(long, value_enum)]
     pub(crate) layout: Option<Layout>,
@@ -66,6 +66,12 @@ pub(crate) struct SchemeOptions {
     /// Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) offset: f64,
+    /// Angle of the background grid against the body in degrees, counter-clockwise; particles are then clipped with its boundary
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) grid_angle: f64,
+    /// Shift of the background grid against the body along each axis, in cells from -1 to 1; particles are then clipped with its boundary
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) grid_shift: f64,
     /// Precision of the solver; errors are always measured in f64
     #[arg(long, value_enum, default_value_t = Precision::F64)]
     pub(crate) precision: Precision,
@@ -177,6 +183,8 @@ pub(crate) enum Layout {
     Lattice,
     /// Polar cells of equal angle that end at the rims (rings, updated Lagrangian)
     BodyFitted,
+    /// A lattice clipped with the boundary of the body: polygons on shared corners (bodies in the plane, updated Lagrangian)
+    Clipped,
     /// Gauss-Legendre points (total Lagrangian)
     Gauss,
 }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
-    self as verify, Case, CaseError, CflSpeed, Coordinates, Integrator, Parts, Placement, Scheme,
-    Shape, Stepping, Total, Transfer, Updated,
+    self as verify, Case, CaseError, CflSpeed, Coordinates, GridPose, Integrator, Parts, Placement,
+    Scheme, Shape, Stepping, Total, Transfer, Updated,
 };
 
 use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Weights};
@@ -31,6 +31,8 @@ pub(super) struct Settled {
     pub(super) json: Option<PathBuf>,
     /// What was chosen because the usual scheme would not do, and why.
     pub(super) chosen: Option<Choice>,
+    /// Conditions in whose place the traction of the exact motion acts.
+    pub(super) loaded: Vec<Boundary>,
 }
 
 /// A total frame that was not asked for.
@@ -51,7 +53,14 @@ pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> C
 impl Settled {
     /// A case in double precision, on all threads.
     pub(super) fn of(case: Case) -> Self {
-        Self { case, precision: Precision::F64, threads: None, json: None, chosen: None }
+        Self {
+            case,
+            precision: Precision::F64,
+            threads: None,
+            json: None,
+            chosen: None,
+            loaded: Vec::new(),
+        }
     }
 
     /// The scheme that the options leave for a solution. What they say holds; what they leave open is chosen so that the
@@ -82,7 +91,9 @@ impl Settled {
             extent: options.extent.map(Into::into),
         };
         let SchemeOptions { precision, threads, ref json, .. } = *options;
-        let mut settled = Self { case, precision, threads, json: json.clone(), chosen: None };
+        let loaded = verify::loaded_instead(exact, &case);
+        let mut settled =
+            Self { case, precision, threads, json: json.clone(), chosen: None, loaded };
         if let Scheme::Total(scheme) = scheme
             && (options.frame.is_none() || options.shape.is_none())
         {
@@ -103,7 +114,7 @@ impl Settled {
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.
     pub(super) fn choice(&self) -> String {
         let Some(Choice { scheme, reason, cfl_is_chosen }) = &self.chosen else {
-            return String::new();
+            return self.loads();
         };
         let Case { cfl, cfl_speed, per_cell, .. } = self.case;
         let degree = match scheme.degree {
@@ -142,6 +153,16 @@ impl Settled {
         }
         text + "\n"
     }
+
+    /// A line about tractions in place of other conditions; empty where there are none.
+    fn loads(&self) -> String {
+        if self.loaded.is_empty() {
+            return String::new();
+        }
+        let told = self.loaded.iter().map(|own| format!("{} ({})", own.surface, own.condition));
+        let told: Vec<_> = told.collect();
+        format!("the traction of the exact motion acts on {} in place of that\n", told.join(", "))
+    }
 }
 
 /// Whether the options say something that only the updated frame has.
@@ -149,8 +170,9 @@ fn says_updated(options: &SchemeOptions) -> bool {
     options.shape.is_some_and(|shape| shape.degree().is_none())
         || options.integrator != Integrator::Cd
         || options.transfer != Transfer::Flip
-        || options.layout == Some(Layout::BodyFitted)
+        || matches!(options.layout, Some(Layout::BodyFitted | Layout::Clipped))
         || options.offset != 0.0
+        || is_moved(options)
         || options.precision == Precision::F32
 }
 
@@ -175,9 +197,12 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
             "{option}: the updated Lagrangian formulation has none; use it with --formulation total-lagrangian"
         );
     }
-    let fitted = options.layout == Some(Layout::BodyFitted);
+    let layout = match options.layout {
+        None if is_moved(options) => Layout::Clipped,
+        layout => layout.unwrap_or(Layout::Lattice),
+    };
     // The boxes of GIMP lie along the axes.
-    let usual = Weights::Of(if fitted { Shape::Cpdi2 } else { Shape::Gimp });
+    let usual = Weights::Of(if layout == Layout::Lattice { Shape::Gimp } else { Shape::Cpdi2 });
     let shape = match options.shape.unwrap_or(usual) {
         Weights::Of(shape) => shape,
         high @ Weights::Spline(_) => bail!(
@@ -186,15 +211,41 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
             high.name()
         ),
     };
-    let placement = match (fitted, options.offset) {
-        (false, offset) => Placement::Lattice { offset },
-        (true, 0.0) => Placement::BodyFitted,
-        (true, offset) => {
+    let (pose, offset) = (pose(options), options.offset);
+    if layout != Layout::Clipped {
+        refuse_pose(options)?;
+    }
+    let placement = match layout {
+        Layout::Clipped => Placement::Clipped { offset, pose },
+        Layout::Lattice | Layout::Gauss => Placement::Lattice { offset },
+        Layout::BodyFitted if offset == 0.0 => Placement::BodyFitted,
+        Layout::BodyFitted => {
             let instead = "0 with particles fitted to the body, or the layout lattice";
             return Err(CaseError::setting("offset", format!("{offset:?}"), instead).into());
         }
     };
     Ok(Updated { shape, stepping: stepping(options), transfer: options.transfer, placement })
+}
+
+fn pose(options: &SchemeOptions) -> GridPose {
+    GridPose { angle: options.grid_angle, shift: options.grid_shift }
+}
+
+/// Whether the grid is asked to lie elsewhere than usually.
+fn is_moved(options: &SchemeOptions) -> bool {
+    !pose(options).is_usual()
+}
+
+/// Refuses a grid that is moved against a body whose particles lie along the lines of the usual one.
+fn refuse_pose(options: &SchemeOptions) -> Result<()> {
+    for (setting, value) in [("grid-angle", options.grid_angle), ("grid-shift", options.grid_shift)]
+    {
+        if value != 0.0 {
+            let instead = "0, or the layout clipped in the updated Lagrangian formulation";
+            return Err(CaseError::setting(setting, format!("{value:?}"), instead).into());
+        }
+    }
+    Ok(())
 }
 
 fn stepping(options: &SchemeOptions) -> Stepping {
@@ -220,6 +271,9 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
         None => Total::layout_for(exact),
         Some(Layout::Gauss) => verify::Layout::Gauss,
         Some(Layout::Lattice) => verify::Layout::Lattice,
+        Some(Layout::Clipped) => bail!(
+            "--layout clipped: the total Lagrangian formulation has grids that fit the body; use --layout gauss or lattice with it"
+        ),
         Some(Layout::BodyFitted) => bail!(
             "--layout body-fitted: the total Lagrangian formulation fits a ring by --grid polar; use --layout gauss or lattice with it"
         ),
@@ -233,6 +287,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
         let instead = "0 in the total Lagrangian formulation";
         return Err(CaseError::setting("offset", value, instead).into());
     }
+    refuse_pose(options)?;
     let usual = Total::of_degree(degree);
     Ok(Total {
         mass: options.mass.map_or(usual.mass, Into::into),
@@ -245,7 +300,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
 
 /// What weights and integrator leave unsaid, in words; of the updated frame what is not the usual.
 pub(super) fn words(scheme: &Scheme) -> String {
-    let Parts { composition, mass, layout, grid, start, .. } = scheme.parts();
+    let Parts { composition, mass, layout, grid, start, pose, .. } = scheme.parts();
     match scheme {
         Scheme::Updated(updated) => {
             let mut text = match updated.stepping {
@@ -255,8 +310,14 @@ pub(super) fn words(scheme: &Scheme) -> String {
             if updated.transfer != Transfer::Flip {
                 text += &format!(", transfer {}", updated.transfer);
             }
-            if updated.placement == Placement::BodyFitted {
+            if !matches!(updated.placement, Placement::Lattice { .. }) {
                 text += &format!(", {layout} layout");
+            }
+            if pose.angle != 0.0 {
+                text += &format!(", grid turned by {} degrees", pose.angle);
+            }
+            if pose.shift != 0.0 {
+                text += &format!(", grid shifted by {} cells", pose.shift);
             }
             text
         }

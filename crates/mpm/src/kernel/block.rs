@@ -6,6 +6,7 @@ use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::corners::CornerWeights;
+use crate::kernel::polygons::PolygonWeights;
 use crate::kernel::product::ProductWeights;
 use crate::material::LibraryLaw;
 use crate::node::Node;
@@ -44,6 +45,8 @@ pub(crate) enum Block<T, const D: usize> {
     Product(ProductWeights<T, D>),
     /// Means over domains with corners, for CPDI and CPDI2.
     Corners(CornerWeights<T, D>),
+    /// Means over polygons on shared corners.
+    Polygons(PolygonWeights<T, D>),
 }
 
 impl<T: Lanes, const D: usize> Block<T, D> {
@@ -53,6 +56,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             Support::Cpdi { .. } | Support::Cpdi2 { .. } => {
                 Self::Corners(CornerWeights::new(is_affine))
             }
+            Support::Polygons(_) => Self::Polygons(PolygonWeights::new(is_affine)),
         }
     }
 
@@ -74,6 +78,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Corners(weights), Support::Cpdi2 { mesh, .. }) => {
                 weights.corners.of_mesh(c, mesh, ids);
             }
+            (Self::Polygons(weights), Support::Polygons(corners)) => weights.take(c, corners, ids),
             _ => debug_assert!(false, "a block for another shape function"),
         }
     }
@@ -97,6 +102,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
         match self {
             Self::Product(weights) => weights.p2g(strides, band, first, contributions, count),
             Self::Corners(weights) => weights.p2g(strides, band, first, contributions, count),
+            Self::Polygons(_) => debug_assert!(false, "polygons give to corners"),
         }
     }
 
@@ -111,11 +117,13 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     ) {
         match self {
             Self::Product(weights) => weights.g2p_with(strides, nodes, count, receiver),
-            Self::Corners(_) => debug_assert!(false, "single passes are for products"),
+            Self::Corners(_) | Self::Polygons(_) => {
+                debug_assert!(false, "single passes are for products");
+            }
         }
     }
 
-    /// G2P of the first particles, as many as `receiver` has places.
+    /// G2P of the first particles, as many as `receiver` has places; for polygons `nodes` are the corners, with the grid's values there.
     pub(crate) fn g2p(
         &mut self,
         strides: &[usize; D],
@@ -125,6 +133,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
         match self {
             Self::Product(weights) => weights.g2p(strides, nodes, receiver),
             Self::Corners(weights) => weights.g2p(strides, nodes, receiver),
+            Self::Polygons(weights) => weights.g2p(nodes, receiver),
         }
     }
 }

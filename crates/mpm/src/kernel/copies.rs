@@ -16,6 +16,11 @@ pub(crate) struct Kinematics<'a, T, const D: usize> {
     pub(crate) F: &'a [SMatrix<T, D, D>; BLOCK],
 }
 
+/// The ids of a block of particles in order.
+pub(crate) fn successive(first: usize) -> [u32; BLOCK] {
+    std::array::from_fn(|k| (first + k) as u32)
+}
+
 /// Copies of up to `BLOCK` particles from scattered places in memory.
 pub(crate) struct Copies<T, const D: usize> {
     /// Positions.

@@ -4,6 +4,7 @@ mod boundary;
 mod failures;
 mod mechanics;
 mod order;
+mod polygons;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod registers;

@@ -101,7 +101,7 @@ fn a_wall_is_a_mirror() {
                         mesh.corners.push(corners);
                     }
                 }
-                Body { half_edges: Vec::new(), mesh: Some(mesh), particles: p }
+                Body { half_edges: Vec::new(), mesh: Some(mesh), particles: p, polygons: None }
             };
             let wall = Grid {
                 lower: vector![0.0, 0.0],

@@ -1,8 +1,8 @@
 //! Every scheme: the same results as those of a plain implementation, what it has to keep, and how its runs and set-ups fail.
 
 use mmsmith_mpm::{
-    Annulus, Body, BodyForce, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Scalar,
-    Settings, SetupError, Shape, Simulation, StepError, Transfer,
+    Annulus, Body, BodyForce, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Polygons,
+    Scalar, Settings, SetupError, Shape, Simulation, StepError, Transfer,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
@@ -102,6 +102,15 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
             X: vectors(&mesh.X),
             x: vectors(&mesh.x),
             corners: mesh.corners.clone(),
+        }),
+        polygons: body.polygons.as_ref().map(|own| Polygons {
+            X: vectors(&own.X),
+            x: vectors(&own.x),
+            corners: own.corners.clone(),
+            ends: own.ends.clone(),
+            of_particles: own.of_particles.clone(),
+            loads: Vec::new(),
+            turn: own.turn.map(|turn| turn.cast()),
         }),
     }
 }

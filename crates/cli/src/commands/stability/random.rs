@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Case, CflSpeed, Criteria, Observed, is_stable};
+use mmsmith_verify::{Case, CflSpeed, Criteria, GridPose, Observed, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
@@ -157,6 +157,10 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         options.error_multiple,
         options.energy_rate,
     );
+    if !parts.pose.is_usual() {
+        let GridPose { angle, shift } = parts.pose;
+        text += &format!(" --grid-angle {angle:?} --grid-shift {shift:?}");
+    }
     if scheme.total().is_some() {
         text += &format!(
             " --formulation total-lagrangian --mass {} --composition {} --grid {}",

@@ -65,6 +65,8 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
         "cells" => draft.cells = count()?,
         "ppc" => scheme.ppc = Some(count()?),
         "offset" => scheme.offset = number()?,
+        "grid-angle" => scheme.grid_angle = number()?,
+        "grid-shift" => scheme.grid_shift = number()?,
         "periods" => scheme.periods = number()?,
         "precision" => scheme.precision = word::<Precision>(text)?,
         "shape" => scheme.shape = Some(text.parse().map_err(Error::msg)?),

@@ -19,10 +19,8 @@ pub(super) fn kind(setting: &Setting) -> String {
     let Parts { shape, layout, .. } = parts(setting);
     match setting.case.scheme {
         Scheme::Total(_) => format!("{shape}, total Lagrangian"),
-        Scheme::Updated(Updated { placement: Placement::BodyFitted, .. }) => {
-            format!("{shape}, {layout}")
-        }
-        Scheme::Updated(_) => shape,
+        Scheme::Updated(Updated { placement: Placement::Lattice { .. }, .. }) => shape,
+        Scheme::Updated(_) => format!("{shape}, {layout}"),
     }
 }
 
@@ -60,7 +58,7 @@ pub(super) fn scheme(setting: &Setting) -> String {
 /// Whether the particles lie as they do where nothing is said.
 fn is_lattice(scheme: &Scheme) -> bool {
     match scheme {
-        Scheme::Updated(updated) => updated.placement != Placement::BodyFitted,
+        Scheme::Updated(updated) => matches!(updated.placement, Placement::Lattice { .. }),
         Scheme::Total(total) => total.layout == Layout::Lattice,
     }
 }
