@@ -36,6 +36,8 @@ class Exact:
         constants = numpy.empty(5)
         self.library.constants(pointer(constants))
         self.rho0, self.period, self.speed, self.E, self.nu = map(float, constants)
+        self.name = name
+        self.parameters = {"A": amplitude, "E": self.E, "nu": self.nu, "rho0": self.rho0}
 
     def start(self, X):
         """u, v and a of shape (n, 2), F of shape (n, 2, 2), at time zero."""
@@ -62,16 +64,27 @@ def pointer(array):
 
 
 class Recording:
-    """A .pvd list that grows with its frames."""
+    """A .pvd list that grows with its frames, which tell the solution and its parameters."""
 
-    def __init__(self, folder, name):
+    def __init__(self, folder, name, solution, parameters):
         self.folder, self.name, self.listed = folder, name, []
+        letters = " ".join(str(letter) for letter in solution.encode())
+        array = '<DataArray type="{}" Name="{}" NumberOfTuples="{}" format="ascii">{}</DataArray>'
+        self.provenance = array.format("UInt8", "solution", len(solution), letters)
+        for parameter, value in parameters.items():
+            self.provenance += array.format("Float64", f"parameter_{parameter}", 1, repr(float(value)))
 
     def write(self, t, points, arrays):
         file = f"{self.name}-{len(self.listed):04}.vtu"
         cells = [("vertex", numpy.arange(len(points))[:, None])]
         mesh = meshio.Mesh(padded(points), cells, point_data=arrays)
         mesh.write(self.folder / file, file_format="vtu", binary=True, compression="zlib")
+        # meshio has no place for numbers of a whole file.
+        text = (self.folder / file).read_text(encoding="ascii")
+        grid = "<UnstructuredGrid>"
+        assert text.count(grid) == 1
+        text = text.replace(grid, f"{grid}<FieldData>{self.provenance}</FieldData>")
+        (self.folder / file).write_text(text, encoding="ascii")
         self.listed.append(f'    <DataSet timestep="{t!r}" part="0" file="{file}"/>\n')
         text = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         text += "  <Collection>\n" + "".join(self.listed) + "  </Collection>\n</VTKFile>\n"

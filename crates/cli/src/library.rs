@@ -18,7 +18,7 @@ use mmsmith_prove::admissible_value;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
 use mmsmith_spec::{Parameter, Spec, nearest};
 use mmsmith_stage::Staged;
-use mmsmith_verify::{body_of, has_body};
+use mmsmith_verify::{Provenance, body_of, has_body};
 
 use crate::input;
 use crate::number;
@@ -350,6 +350,11 @@ impl Selection {
     /// Parameter values by name.
     pub(crate) fn parameters(&self) -> &BTreeMap<String, f64> {
         &self.parameters
+    }
+
+    /// Name and parameters, for files of its particles.
+    pub(crate) fn provenance(&self) -> Provenance {
+        Provenance { solution: self.name().to_owned(), parameters: self.parameters.clone() }
     }
 
     /// The values of all parameters in words: `A = 0.1, E = 10000`.

@@ -312,6 +312,18 @@ fn one_frame_for_a_whole_run_and_another_amplitude_are_told() {
     for part in ["% with A near 0.05", "in place of 0.1", "--set A=0.05"] {
         assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
     }
+    // The files tell it themselves.
+    for (call, told) in [
+        ("axis-aligned f3 --cells 8", Some("its own are --set A=0.05")),
+        ("axis-aligned f3 --cells 8 --set A=0.05", None),
+        ("skew-2d f3 --cells 8", Some("it is of axis-aligned, and is compared with skew-2d")),
+    ] {
+        let called = mms(place, &format!("score {call}"));
+        match told {
+            Some(told) => assert!(called.stdout.contains(told), "{call}: {}", called.stdout),
+            None => assert!(!called.stdout.contains("the file tells"), "{call}: {}", called.stdout),
+        }
+    }
     // No value of a parameter explains these displacements.
     let text =
         "t,X,Y,ux,uy\n0.004,0.2,0.3,0.1,-0.2\n0.004,0.7,0.6,-0.3,0.1\n0.004,0.4,0.9,0.2,0.2\n";

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{Real, Solution};
-use mmsmith_vtk::{Array, Error, Frame, Series, Values};
+use mmsmith_vtk::{Array, Error, Frame, Provenance, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use crate::inverse::inverse;
 use crate::precision::Precision;
 
 /// Where and how often particle files are written.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FrameOutput {
     /// The folder.
     pub folder: PathBuf,
@@ -19,6 +19,8 @@ pub struct FrameOutput {
     pub name: String,
     /// How many frames, spread evenly over the steps; the first and the last state are always among them.
     pub count: u64,
+    /// The solution that is run, for whoever reads the files later.
+    pub provenance: Option<Provenance>,
 }
 
 /// The particles at one moment of a run, kept in memory.
@@ -49,6 +51,7 @@ impl Snapshot {
 /// no time of the scheme yet.
 pub(crate) struct FrameWriter {
     series: Series,
+    provenance: Option<Provenance>,
     count: u64,
     steps: u64,
     /// How far velocities lag behind positions.
@@ -62,7 +65,8 @@ impl FrameWriter {
         let series = Series::create(&output.folder, &output.name)?;
         // More frames than states there are would repeat some.
         let count = output.count.clamp(2, steps + 1);
-        Ok(Self { series, count, steps, velocity_lag, next: 0 })
+        let provenance = output.provenance.clone();
+        Ok(Self { series, provenance, count, steps, velocity_lag, next: 0 })
     }
 
     /// Goes on after `step` of a run with steps of `dt`, whose earlier frames are on the disk.
@@ -88,7 +92,8 @@ impl FrameWriter {
         match frame(state, exact, step, time) {
             Some(frame) => {
                 let velocity_time = (step > 0).then_some(time - self.velocity_lag);
-                self.series.write(&Frame { velocity_time, ..frame }).map(|_| ())
+                let provenance = self.provenance.clone();
+                self.series.write(&Frame { velocity_time, provenance, ..frame }).map(|_| ())
             }
             None => Ok(()),
         }
@@ -156,6 +161,7 @@ fn frame<T: Precision<D>, const D: usize>(
         time,
         step,
         velocity_time: None,
+        provenance: None,
         points,
         arrays: vec![
             array("displacement", Values::Vector(displacement)),

@@ -67,6 +67,7 @@ pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};
+pub use mmsmith_vtk::Provenance;
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};

@@ -1,5 +1,6 @@
 //! A frame from a `.vtu` file that this crate wrote.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -7,14 +8,16 @@ use vtkio::IOBuffer;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use vtkio::xml::{Data, DataArray, ScalarType};
 
-use crate::encode::{CYCLE, ENCODING, HEADER, TIME, VELOCITY_TIME};
-use crate::{Array, Error, Frame, Values};
+use crate::encode::{
+    CYCLE, ENCODING, HEADER, PARAMETER, PARAMETER_END, SOLUTION, TIME, VELOCITY_TIME,
+};
+use crate::{Array, Error, Frame, Provenance, Values};
 
 /// What introduces an array in the file.
 const ARRAY: &str = "<DataArray";
 
 /// The arrays of every file that are not quantities over the particles: time, step, points and three for the cells. The
-/// time of the velocities may be one more.
+/// time of the velocities may be one more, and the solution as many more as it has parameters, and one.
 const FIXED_ARRAYS: usize = 6;
 
 /// Reads a `.vtu` file that [`to_bytes`](crate::to_bytes) or [`Series`](crate::Series) wrote; the frame equals the
@@ -60,7 +63,9 @@ fn decode(text: &str) -> Result<Frame, String> {
             _ => return Err("VelocityTime is not f64".into()),
         },
     };
-    let fixed_arrays = FIXED_ARRAYS + usize::from(velocity_time.is_some());
+    let provenance = provenance(text)?;
+    let of_provenance = provenance.as_ref().map_or(0, |provenance| 1 + provenance.parameters.len());
+    let fixed_arrays = FIXED_ARRAYS + usize::from(velocity_time.is_some()) + of_provenance;
 
     let vtk = Vtk::parse_xml(text.as_bytes()).map_err(|cause| cause.to_string())?;
     let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
@@ -79,7 +84,7 @@ fn decode(text: &str) -> Result<Frame, String> {
         let (expected, found) = (array_count.saturating_sub(fixed_arrays), arrays.len());
         return Err(format!("{found} of {expected} arrays over the particles can be read"));
     }
-    Ok(Frame { time, step, velocity_time, points: rows(&points), arrays })
+    Ok(Frame { time, step, velocity_time, provenance, points: rows(&points), arrays })
 }
 
 /// Makes sure that every array holds base64 for at least the eight bytes of its length, without which vtkio would
@@ -106,7 +111,28 @@ fn check_array_texts(text: &str) -> Result<usize, String> {
     Ok(count)
 }
 
-/// The single number behind `tag`.
+/// The solution and its parameters, where the file tells them.
+fn provenance(text: &str) -> Result<Option<Provenance>, String> {
+    let Some((_, after)) = text.split_once(SOLUTION) else { return Ok(None) };
+    let (count, _) = after.split_once('"').ok_or("the tag of the solution has no end")?;
+    let tag = format!(r#"{SOLUTION}{count}" format="binary">"#);
+    let IOBuffer::U8(name) = decode_number(text, &tag, ScalarType::UInt8)? else {
+        return Err("solution is not u8".into());
+    };
+    let solution = String::from_utf8(name).map_err(|_| "the solution's name is no text")?;
+    let mut parameters = BTreeMap::new();
+    for part in after.split(PARAMETER).skip(1) {
+        let (name, _) = part.split_once('"').ok_or("the tag of a parameter has no end")?;
+        let tag = format!("{PARAMETER}{name}{PARAMETER_END}");
+        let IOBuffer::F64(value) = decode_number(text, &tag, ScalarType::Float64)? else {
+            return Err(format!("parameter_{name} is not f64"));
+        };
+        parameters.insert(name.to_owned(), value[0]);
+    }
+    Ok(Some(Provenance { solution, parameters }))
+}
+
+/// The numbers behind `tag`.
 fn decode_number(text: &str, tag: &str, scalar_type: ScalarType) -> Result<IOBuffer, String> {
     let (_, after) = text.split_once(tag).ok_or_else(|| format!("{tag} is missing"))?;
     let (content, _) = after.split_once('<').ok_or_else(|| format!("{tag} has no end"))?;

@@ -7,7 +7,7 @@ use vtkio::model::{
 };
 use vtkio::xml::{Compressor, Data, DataArray, EncodingInfo, ScalarType, VTKFile};
 
-use crate::{Error, Frame, Values};
+use crate::{Error, Frame, Provenance, Values};
 
 /// How every file begins: of the variants of the format, the one that no reader loses anything of.
 pub(crate) const HEADER: &str = r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#;
@@ -26,6 +26,15 @@ pub(crate) const CYCLE: &str =
 /// The tag that is followed by the time of the velocities, in frames that tell it.
 pub(crate) const VELOCITY_TIME: &str =
     r#"<DataArray type="Float64" Name="VelocityTime" NumberOfTuples="1" format="binary">"#;
+
+/// The tag of a parameter of the solution begins so; its name follows.
+pub(crate) const PARAMETER: &str = r#"<DataArray type="Float64" Name="parameter_"#;
+
+/// How the tag of a parameter ends.
+pub(crate) const PARAMETER_END: &str = r#"" NumberOfTuples="1" format="binary">"#;
+
+/// The tag of the solution's name begins so; how many bytes it has follows.
+pub(crate) const SOLUTION: &str = r#"<DataArray type="UInt8" Name="solution" NumberOfTuples=""#;
 
 /// How numbers become text.
 pub(crate) const ENCODING: EncodingInfo = EncodingInfo {
@@ -119,11 +128,24 @@ fn insert_field_data(mut xml: String, frame: &Frame) -> Result<String, Error> {
             format!("{VELOCITY_TIME}{number}</DataArray>")
         }
     };
+    let provenance = frame.provenance.as_ref().map_or(Ok(String::new()), encode_provenance)?;
     let field_data = format!(
-        "<FieldData>{TIME}{time}</DataArray>{CYCLE}{cycle}</DataArray>{velocity_time}</FieldData>"
+        "<FieldData>{TIME}{time}</DataArray>{CYCLE}{cycle}</DataArray>{velocity_time}{provenance}</FieldData>"
     );
     xml.insert_str(mark + GRID.len(), &field_data);
     Ok(xml)
+}
+
+fn encode_provenance(provenance: &Provenance) -> Result<String, Error> {
+    let name = provenance.solution.as_bytes();
+    let count = name.len();
+    let letters = encode_number("solution", IOBuffer::U8(name.to_vec()))?;
+    let mut arrays = format!(r#"{SOLUTION}{count}" format="binary">{letters}</DataArray>"#);
+    for (name, value) in &provenance.parameters {
+        let number = encode_number(name, IOBuffer::F64(vec![*value]))?;
+        arrays += &format!("{PARAMETER}{name}{PARAMETER_END}{number}</DataArray>");
+    }
+    Ok(arrays)
 }
 
 fn encode_number(name: &str, number: IOBuffer) -> Result<String, Error> {

@@ -33,6 +33,20 @@ pub enum Error {
         /// The name.
         name: String,
     },
+    /// The name of the solution has other characters.
+    #[error("solution name {name:?}: use letters, digits, underscores and hyphens, at least one")]
+    SolutionName {
+        /// The name.
+        name: String,
+    },
+    /// A parameter of the solution is infinite or not a number.
+    #[error("parameter {name} of the solution is {value}; it must be finite")]
+    Parameter {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
     /// Two arrays have one name; readers would keep only one of them.
     #[error("two arrays of the frame are named `{name}`")]
     RepeatedName {

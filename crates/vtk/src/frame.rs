@@ -1,6 +1,6 @@
 //! One instant of a particle simulation, and the checks that it can become a file.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use crate::Error;
 
@@ -53,6 +53,16 @@ pub struct Array {
     pub values: Values,
 }
 
+/// The manufactured solution whose forces moved the particles. `solution` in the file, as the bytes of its name, and
+/// `parameter_A` for the parameter `A`: numbers alone, since meshio stops at files with texts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance {
+    /// Its name; letters, digits, underscores and hyphens.
+    pub solution: String,
+    /// Its parameters by name; letters, digits and underscores.
+    pub parameters: BTreeMap<String, f64>,
+}
+
 /// One instant of a particle simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -63,6 +73,8 @@ pub struct Frame {
     /// The time to which the velocities belong, where it is known; `VelocityTime` in the file. Schemes that stagger
     /// positions and velocities hold them for different times.
     pub velocity_time: Option<f64>,
+    /// The solution that it is compared with, where there is one.
+    pub provenance: Option<Provenance>,
     /// The particles' positions, Cartesian; at least one.
     pub points: Vec<[f64; 3]>,
     /// The quantities over the particles, in the order in which the file holds them.
@@ -76,7 +88,8 @@ impl Frame {
     ///
     /// Where there is no particle, or more than `u32::MAX`; where an array's length differs from the number of
     /// particles; where a name is repeated or holds anything but `[A-Za-z0-9_]`; where a time, a position or a value
-    /// is infinite or not a number; and where the step exceeds `i64::MAX`.
+    /// is infinite or not a number; where the step exceeds `i64::MAX`; and where the solution has a name of other characters, or
+    /// a parameter that is infinite or not a number.
     pub fn check(&self) -> Result<(), Error> {
         let particles = self.points.len();
         if particles == 0 {
@@ -91,11 +104,14 @@ impl Frame {
             }
         }
         self.cycle()?;
+        if let Some(provenance) = &self.provenance {
+            provenance.check()?;
+        }
         check_finite("points", self.points.as_flattened(), 3)?;
 
         let mut names = HashSet::new();
         for Array { name, values } in &self.arrays {
-            if name.is_empty() || !name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_') {
+            if !is_name(name) {
                 return Err(Error::ArrayName { name: name.clone() });
             }
             if !names.insert(name) {
@@ -115,6 +131,28 @@ impl Frame {
     pub(crate) fn cycle(&self) -> Result<i64, Error> {
         i64::try_from(self.step).map_err(|_| Error::Step { step: self.step })
     }
+}
+
+impl Provenance {
+    fn check(&self) -> Result<(), Error> {
+        if !is_name(&self.solution.replace('-', "_")) {
+            return Err(Error::SolutionName { name: self.solution.clone() });
+        }
+        for (name, value) in &self.parameters {
+            if !is_name(name) {
+                return Err(Error::ArrayName { name: name.clone() });
+            }
+            if !value.is_finite() {
+                return Err(Error::Parameter { name: name.clone(), value: *value });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether every reader keeps an array of this name.
+fn is_name(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
 }
 
 fn check_finite(array: &str, floats: &[f64], components: usize) -> Result<(), Error> {

@@ -20,6 +20,7 @@
 //!     time: 0.25,
 //!     step: 10,
 //!     velocity_time: None,
+//!     provenance: None,
 //!     points: vec![[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]],
 //!     arrays: vec![Array { name: "volume".into(), values: Values::Scalar(vec![0.1, 0.2]) }],
 //! })?;
@@ -39,5 +40,5 @@ mod whole_file;
 pub use decode::read;
 pub use encode::to_bytes;
 pub use error::Error;
-pub use frame::{Array, Frame, Values};
+pub use frame::{Array, Frame, Provenance, Values};
 pub use series::Series;

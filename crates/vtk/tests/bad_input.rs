@@ -3,10 +3,17 @@
 use std::fs;
 use std::path::Path;
 
-use mmsmith_vtk::{Array, Error, Frame, Series, Values, read, to_bytes};
+use mmsmith_vtk::{Array, Error, Frame, Provenance, Series, Values, read, to_bytes};
 
 fn frame(arrays: Vec<Array>) -> Frame {
-    Frame { time: 0.5, step: 3, velocity_time: None, points: vec![[0.0; 3], [1.0; 3]], arrays }
+    Frame {
+        time: 0.5,
+        step: 3,
+        velocity_time: None,
+        provenance: None,
+        points: vec![[0.0; 3], [1.0; 3]],
+        arrays,
+    }
 }
 
 fn array(name: &str, values: Values) -> Array {
@@ -48,6 +55,25 @@ fn a_repeated_name() {
         array("volume", Values::Id(vec![0; 2])),
     ]);
     assert_eq!(refused(&twice), "two arrays of the frame are named `volume`");
+}
+
+#[test]
+fn a_solution_that_no_file_can_tell() {
+    let of = |solution: &str, parameter: &str, value| Frame {
+        provenance: Some(Provenance {
+            solution: solution.into(),
+            parameters: [(parameter.to_owned(), value)].into(),
+        }),
+        ..frame(vec![])
+    };
+    assert!(
+        refused(&of("my ring", "A", 1.0)).starts_with("solution name \"my ring\": use letters")
+    );
+    assert!(refused(&of("ring", "A.1", 1.0)).starts_with("array name \"A.1\": use letters"));
+    assert_eq!(
+        refused(&of("ring", "A", f64::NAN)),
+        "parameter A of the solution is NaN; it must be finite"
+    );
 }
 
 #[test]

@@ -112,6 +112,7 @@ fn own_frames_are_read_with_the_same_bits() {
         time: 0.1 + 0.2,
         step: 3,
         velocity_time: Some(0.25),
+        provenance: None,
         points: vectors.clone(),
         arrays: vec![
             Array { name: "u".into(), values: Values::Vector(vectors.clone()) },

@@ -16,6 +16,7 @@ fn frame(time: f64, particles: usize) -> Frame {
         time,
         step: 1,
         velocity_time: None,
+        provenance: None,
         points: vec![[time; 3]; particles],
         arrays: vec![Array {
             name: "stress".into(),

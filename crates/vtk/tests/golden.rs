@@ -14,6 +14,7 @@ fn two_particles() -> Frame {
         time: 0.1 + 0.2,
         step: 12,
         velocity_time: None,
+        provenance: None,
         points: vec![[0.25, -0.0, 0.0], [0.75, 5e-324, f64::MAX]],
         arrays: vec![
             array(

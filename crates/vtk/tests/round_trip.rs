@@ -3,7 +3,7 @@
 mod awkward;
 
 use awkward::frames;
-use mmsmith_vtk::{Array, Frame, Series, Values, read, to_bytes};
+use mmsmith_vtk::{Array, Frame, Provenance, Series, Values, read, to_bytes};
 use vtkio::IOBuffer;
 use vtkio::model::{Attribute, DataSet, Piece, VertexNumbers, Vtk};
 
@@ -43,11 +43,37 @@ fn a_frame_without_arrays_reads_back() {
         time: 0.0,
         step: 0,
         velocity_time: Some(-0.125),
+        provenance: None,
         points: vec![[1.0, 2.0, 3.0]],
         arrays: vec![],
     };
     let path = Series::create(folder.path(), "bare").unwrap().write(&frame).unwrap();
     assert_eq!(read(&path).unwrap(), frame);
+}
+
+fn of_solution() -> Provenance {
+    let parameters = [("A", 0.1), ("parameter_A", -0.0), ("Cycle", 5e-324), ("lambda", 1e308)];
+    Provenance {
+        solution: "skew-2d".into(),
+        parameters: parameters.map(|(name, value)| (name.to_owned(), value)).into(),
+    }
+}
+
+#[test]
+fn other_programs_read_the_solution_and_its_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = Frame {
+        time: 0.0,
+        step: 0,
+        velocity_time: None,
+        provenance: Some(of_solution()),
+        points: vec![[1.0, 2.0, 3.0]],
+        arrays: vec![],
+    };
+    Series::create(folder.path(), "told").unwrap().write(&frame).unwrap();
+    let files = mmsmith_vtk::foreign::frames(folder.path()).unwrap();
+    let snapshot = mmsmith_vtk::foreign::Snapshot::open(&files[0]).unwrap();
+    assert_eq!(snapshot.provenance(), Some(of_solution()));
 }
 
 /// An array may bear a name that means something elsewhere in the file.
@@ -63,6 +89,7 @@ fn names_of_the_format_are_harmless() {
         time: 1.5,
         step: 7,
         velocity_time: Some(1.25),
+        provenance: Some(of_solution()),
         points: vec![[1.0, 2.0, 3.0]],
         arrays: names.iter().enumerate().map(array).collect(),
     };

@@ -175,7 +175,7 @@ def run(name, cells, folder, scheme="usl", amplitude=0.001, cfl=0.4, frames=11, 
     dt = end / steps
     solver = Solver(exact, cells, scheme, dt)
     b = exact.body_force(solver.X)
-    recording = Recording(folder, "particles")
+    recording = Recording(folder, "particles", exact.name, exact.parameters)
     seconds = 0.0
     for step in range(steps + 1):
         if step % between == 0:

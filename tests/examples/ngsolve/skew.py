@@ -30,8 +30,8 @@ def generated(mms, folder):
 
 def run(exact, cells, folder):
     folder.mkdir(parents=True, exist_ok=True)
-    constants = SimpleNamespace(**{name: exact.par[list(exact.DEFAULTS).index(name)] for name in ("E", "nu", "rho0")})
-    solver = Solver(constants, cells, degree=1)
+    parameters = dict(zip(exact.DEFAULTS, exact.par))
+    solver = Solver(SimpleNamespace(**parameters), cells, degree=1)
     nodes = numpy.array([vertex.point for vertex in solver.space.mesh.vertices])
     walls = numpy.array([not free for free in solver.space.components[0].FreeDofs()])
 
@@ -44,7 +44,7 @@ def run(exact, cells, folder):
     dt = exact.period() / steps
     prescribe(solver.u, exact.u(nodes, 0.0))
     prescribe(solver.v, exact.v(nodes, 0.0))
-    recording = Recording(folder, "quadrature")
+    recording = Recording(folder, "quadrature", "skew-2d", parameters)
     for step in range(steps + 1):
         t = step * dt
         # The old time of the step: that of the displacements that the stresses belong to.

@@ -93,7 +93,7 @@ def run(cells, folder, degree=2, amplitude=0.2, cfl=0.1, frames=11):
     solver = Solver(exact, cells, degree)
     b = exact.body_force(solver.X)
     solver.project(exact.start(solver.X)[1])
-    recording = Recording(folder, "quadrature")
+    recording = Recording(folder, "quadrature", exact.name, exact.parameters)
     started = time.process_time()
     for step in range(steps + 1):
         a = solver.acceleration(b(step * dt))

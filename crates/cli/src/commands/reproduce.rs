@@ -319,8 +319,12 @@ fn measure_problem(
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 
     let base = usual(Shape::Gimp, CD, GRID);
-    let frames =
-        FrameOutput { folder: folder.join("particles"), name: problem.to_owned(), count: FRAMES };
+    let frames = FrameOutput {
+        folder: folder.join("particles"),
+        name: problem.to_owned(),
+        count: FRAMES,
+        provenance: Some(selection.provenance()),
+    };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
@@ -328,7 +332,7 @@ fn measure_problem(
     let silent = &mut |_| ();
     let mut outputs = Outputs::new(silent);
     let exact_start = simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
-    pictures::write_contrast(&model, problem, folder)?;
+    pictures::write_contrast(&selection, &model, problem, folder)?;
     let results = Results { problem, space, time, small_step, differences, exact_start };
     for (kind, svg) in [("space", space_plot(&results)), ("time", time_plot(&results))] {
         Output::prepare(&folder.join(format!("{kind}.svg")))?.write_text(&svg)?;

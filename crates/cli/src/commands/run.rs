@@ -56,6 +56,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
         folder: folder.clone(),
         name: selection.name().to_owned(),
         count: options.frames,
+        provenance: Some(selection.provenance()),
     });
     let settings = || settings(&selection, settled, extent, cells, case.cfl);
     // Nothing is left in the folder of a run that cannot begin.

@@ -36,6 +36,7 @@ pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
         time: options.time,
         velocity_lag: options.velocity_lag,
         periods: options.periods,
+        provenance: Some(selection.provenance()),
     };
     with_threads(options.threads, || {
         let exact = selection.build()?;

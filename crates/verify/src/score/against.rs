@@ -84,8 +84,12 @@ pub fn against(
     options: &ScoreOptions,
 ) -> Result<Agreement, AgainstError> {
     let steps = plan(exact, Arithmetic::Double, case)?.steps;
-    let frames =
-        FrameOutput { folder: folder.to_owned(), name: "beside".into(), count: row.frames as u64 };
+    let frames = FrameOutput {
+        folder: folder.to_owned(),
+        name: "beside".into(),
+        count: row.frames as u64,
+        provenance: None,
+    };
     let progress = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(progress) };
     let between = row.frames.saturating_sub(1) as u64;

@@ -30,6 +30,7 @@ use findings::Remarks;
 use frame::{FrameReader, Identities};
 use mmsmith_measure::norms::PerNorm;
 use mmsmith_runtime::{AnySolution, Solution};
+use mmsmith_vtk::Provenance;
 use mmsmith_vtk::foreign::{FrameFile, Snapshot, frames};
 use nalgebra::SVector;
 use reference::{Scheme, scheme};
@@ -65,6 +66,8 @@ pub struct ScoreOptions {
     pub velocity_lag: f64,
     /// The number of the solution's periods that frames may lie in, from time zero.
     pub periods: f64,
+    /// The solution that the recordings are compared with; that a file tells another one is a remark.
+    pub provenance: Option<Provenance>,
 }
 
 impl Default for ScoreOptions {
@@ -75,6 +78,7 @@ impl Default for ScoreOptions {
             time: None,
             velocity_lag: 0.0,
             periods: 1.0,
+            provenance: None,
         }
     }
 }
@@ -351,6 +355,11 @@ fn recording<const D: usize>(
             remarks.note("transposed", false, what);
         }
     }
+    if let (Some(asked), Some(told)) = (&options.provenance, first.provenance())
+        && let Some(what) = other_provenance(asked, &told)
+    {
+        remarks.note("other-provenance", false, what);
+    }
     if let Some(of_density) = errors.get(&Quantity::Density)
         && density_from_rest.linf < 1e-6 * of_density.linf
     {
@@ -415,6 +424,22 @@ fn recording<const D: usize>(
         exact_displacement: displacement.l2,
         findings,
     })
+}
+
+/// In words, how the solution of a file differs from the one that it is compared with; a parameter that the file does not tell
+/// differs in nothing.
+fn other_provenance(asked: &Provenance, told: &Provenance) -> Option<String> {
+    if told.solution != asked.solution {
+        let (told, asked) = (&told.solution, &asked.solution);
+        return Some(format!("the file tells that it is of {told}, and is compared with {asked}"));
+    }
+    let other = |(name, value): (&String, &f64)| {
+        let told = told.parameters.get(name).filter(|told| *told != value)?;
+        Some(format!(" --set {name}={told:?}"))
+    };
+    let others: String = asked.parameters.iter().filter_map(other).collect();
+    let what = "the file tells other parameters than those that it is compared with; its own are";
+    (!others.is_empty()).then(|| format!("{what}{others}"))
 }
 
 fn open(file: &FrameFile) -> Result<Snapshot, ScoreError> {

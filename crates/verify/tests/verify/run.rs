@@ -183,7 +183,12 @@ fn an_extent_is_for_rings_only() {
 #[test]
 fn frames_hold_what_the_row_measured() {
     let folder = tempfile::tempdir().unwrap();
-    let output = FrameOutput { folder: folder.path().to_owned(), name: "box".into(), count: 5 };
+    let output = FrameOutput {
+        folder: folder.path().to_owned(),
+        name: "box".into(),
+        count: 5,
+        provenance: None,
+    };
     let mut snapshot = Snapshot { share: 0.75, frame: None };
     let case = Case { cells: 8, ..Case::default() };
     let mut outputs = Outputs {

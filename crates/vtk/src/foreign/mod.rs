@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
+use crate::Provenance;
 use contents::{Contents, Entry};
 use numbers::{Kind, Number};
 use table::Table;
@@ -435,6 +436,23 @@ impl Snapshot {
         let Data::File { bytes, contents } = &self.data else { return None };
         let entry = contents.fields.iter().find(|entry| entry.name == name)?;
         contents.numbers::<f64>(bytes, entry).ok()?.first().copied()
+    }
+
+    /// The solution and the parameters that the file tells: its field `solution`, and those whose names begin with `parameter_`.
+    /// `None` where it tells no solution; a parameter without a number is left out.
+    #[must_use]
+    pub fn provenance(&self) -> Option<Provenance> {
+        let Data::File { bytes, contents } = &self.data else { return None };
+        let of = |name: &str| contents.fields.iter().find(|entry| entry.name == name);
+        let letters = contents.numbers::<i64>(bytes, of("solution")?).ok()?;
+        let letters: Option<Vec<u8>> =
+            letters.into_iter().map(|letter| letter.try_into().ok()).collect();
+        let parameters = contents.fields.iter().filter_map(|entry| {
+            let name = entry.name.strip_prefix("parameter_")?;
+            Some((name.to_owned(), self.field(&entry.name)?))
+        });
+        let solution = String::from_utf8(letters?).ok()?;
+        Some(Provenance { solution, parameters: parameters.collect() })
     }
 
     fn numbers<N: Number>(&self, name: &str) -> Result<Option<Vec<N>>, ReadError> {

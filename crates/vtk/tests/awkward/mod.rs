@@ -50,6 +50,7 @@ fn frame(time: f64, step: u64, particles: usize) -> Frame {
         time,
         step,
         velocity_time: None,
+        provenance: None,
         points: (0..particles).map(row3).collect(),
         arrays: vec![
             array("displacement", Values::Vector((0..particles).map(|p| row3(p + 5)).collect())),

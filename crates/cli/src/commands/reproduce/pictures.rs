@@ -11,6 +11,7 @@ use crate::arguments::Stress;
 use crate::commands::Model;
 use crate::commands::picture::{Units, draw, range};
 use crate::commands::scheme::usual;
+use crate::library::Selection;
 use crate::number;
 use crate::svg::extremes;
 
@@ -20,13 +21,24 @@ const MOMENT: u64 = 5 * (FRAMES - 1) / 8;
 const CONTRAST: &str = "particles-ugimp";
 
 /// Writes the particles of ugimp+cd at the moment of the picture, as a contrast to the right answer.
-pub(super) fn write_contrast(model: &Model, problem: &str, folder: &Path) -> Result<()> {
+pub(super) fn write_contrast(
+    selection: &Selection,
+    model: &Model,
+    problem: &str,
+    folder: &Path,
+) -> Result<()> {
     if problem != PROBLEMS[0] {
         return Ok(());
     }
     let periods = MOMENT as f64 / (FRAMES - 1) as f64;
     let case = Case { periods, ..usual(Shape::Ugimp, CD, GRID) };
-    let frames = FrameOutput { folder: folder.join(CONTRAST), name: problem.to_owned(), count: 2 };
+    let provenance = Some(selection.provenance());
+    let frames = FrameOutput {
+        folder: folder.join(CONTRAST),
+        name: problem.to_owned(),
+        count: 2,
+        provenance,
+    };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?;
