@@ -36,7 +36,7 @@ pub(crate) struct Document {
     pub(crate) with_rotation: Option<Spanned<RotationTable>>,
     #[serde(default)]
     pub(crate) cross_check: List<Spanned<CrossCheckTable>>,
-    pub(crate) time: Spanned<TimeTable>,
+    pub(crate) time: Option<Spanned<TimeTable>>,
 }
 
 /// The most parameters; each costs every evaluation of every field.
@@ -51,6 +51,21 @@ fn no_text() -> Spanned<String> {
 }
 
 impl Document {
+    /// The time of the motion's period, where it is written.
+    pub(crate) fn period(&self) -> Option<&Text> {
+        self.time.as_ref()?.get_ref().period.as_ref()
+    }
+
+    /// The speed of waves, where it is written.
+    pub(crate) fn wave_speed(&self) -> Option<&Text> {
+        self.time.as_ref()?.get_ref().wave_speed.as_ref()
+    }
+
+    /// What belongs into the table of times is to be written here: that table, or the law where there is none.
+    pub(crate) fn time_span(&self) -> Range<usize> {
+        self.time.as_ref().map_or_else(|| self.material.span(), Spanned::span)
+    }
+
     /// Refuses more entries than can be worked through soon.
     pub(crate) fn check_sizes(&self, source: &Source<'_>) -> Result<(), Diagnostic> {
         let solve = self.solve.as_ref().map(Spanned::get_ref);
@@ -185,7 +200,7 @@ pub(crate) struct CrossCheckTable {
     expecting = "a table, as in [time] and below it period = '2/c'"
 )]
 pub(crate) struct TimeTable {
-    pub(crate) period: Text,
+    pub(crate) period: Option<Text>,
     pub(crate) wave_speed: Option<Text>,
 }
 

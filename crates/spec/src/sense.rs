@@ -17,12 +17,11 @@ pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Resu
     let values = at_defaults(spec, &constants);
     let (values, measures) = values.split_at(constants.len() - measures.len());
     let place = |text: Option<&Text>, table: Range<usize>| text.map_or(table, |t| t.span.clone());
-    let (material, domain, time) =
-        (document.material.get_ref(), document.domain.get_ref(), document.time.get_ref());
+    let (material, domain) = (document.material.get_ref(), document.domain.get_ref());
     let places = [
         ("density", place(material.density.as_ref(), document.material.span())),
-        ("period", time.period.span.clone()),
-        ("wave-speed", place(time.wave_speed.as_ref(), document.time.span())),
+        ("period", place(document.period(), document.time_span())),
+        ("wave-speed", place(document.wave_speed(), document.time_span())),
         ("cell-length", place(domain.cell_length.as_ref(), document.domain.span())),
     ];
     for ((key, span), &value) in places.into_iter().zip(values) {

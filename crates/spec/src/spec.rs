@@ -577,11 +577,17 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|table| CrossCheck::read(&mut self.scope, table))
             .collect::<Result<Vec<_>, _>>()?;
-        let time = document.time.get_ref();
-        let period = self.scope.constant(&time.period, "period")?;
-        let wave_speed = match &time.wave_speed {
+        let wave_speed = match document.wave_speed() {
             Some(text) => self.scope.constant(text, "wave-speed")?,
-            None => self.bar_speed(&material, density, document.time.span())?,
+            None => self.bar_speed(&material, density, document.time_span())?,
+        };
+        let period = match document.period() {
+            Some(text) => self.scope.constant(text, "period")?,
+            None => {
+                let graph = &mut self.scope.graph;
+                let way = graph.add(cell_length, cell_length);
+                graph.div(way, wave_speed)
+            }
         };
         let mut spec = Spec {
             source: self.scope.source.text.to_owned(),
@@ -609,8 +615,23 @@ impl<'a> Reader<'a> {
         if let Some(table) = solve {
             spec.solve(&self.scope, table)?;
         }
+        if document.period().is_none() {
+            self.check_static(document, &spec)?;
+        }
         spec.form_from_amplitude();
         Ok(spec)
+    }
+
+    /// Refuses a motion in time that does not tell its period.
+    fn check_static(&self, document: &Document, spec: &Spec) -> Result<(), Diagnostic> {
+        let angle = spec.rotation.as_ref().map(|rotation| rotation.angle);
+        let motion: Vec<_> = spec.displacement.iter().copied().chain(angle).collect();
+        if !spec.graph.symbols_in(&motion).contains(&self.scope.time) {
+            return Ok(());
+        }
+        let message = "the motion does not tell its period, to which --periods refers";
+        let help = "[time] and below it period = '2/c', say; a displacement without t needs none";
+        Err(self.scope.source.error(message, document.time_span(), Some(help.into())))
     }
 
     fn parameters(&mut self, document: &Document) -> Result<Vec<Parameter>, Diagnostic> {
