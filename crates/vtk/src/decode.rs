@@ -115,8 +115,9 @@ fn check_array_texts(text: &str) -> Result<usize, String> {
 fn provenance(text: &str) -> Result<Option<Provenance>, String> {
     let Some((_, after)) = text.split_once(SOLUTION) else { return Ok(None) };
     let (count, _) = after.split_once('"').ok_or("the tag of the solution has no end")?;
+    let letters = count.parse().map_err(|_| format!("the solution has {count:?} letters"))?;
     let tag = format!(r#"{SOLUTION}{count}" format="binary">"#);
-    let IOBuffer::U8(name) = decode_number(text, &tag, ScalarType::UInt8)? else {
+    let IOBuffer::U8(name) = decode_numbers(text, &tag, ScalarType::UInt8, letters)? else {
         return Err("solution is not u8".into());
     };
     let solution = String::from_utf8(name).map_err(|_| "the solution's name is no text")?;
@@ -132,12 +133,22 @@ fn provenance(text: &str) -> Result<Option<Provenance>, String> {
     Ok(Some(Provenance { solution, parameters }))
 }
 
-/// The numbers behind `tag`.
+/// The single number behind `tag`.
 fn decode_number(text: &str, tag: &str, scalar_type: ScalarType) -> Result<IOBuffer, String> {
+    decode_numbers(text, tag, scalar_type, 1)
+}
+
+/// The numbers behind `tag`.
+fn decode_numbers(
+    text: &str,
+    tag: &str,
+    scalar_type: ScalarType,
+    count: usize,
+) -> Result<IOBuffer, String> {
     let (_, after) = text.split_once(tag).ok_or_else(|| format!("{tag} is missing"))?;
     let (content, _) = after.split_once('<').ok_or_else(|| format!("{tag} has no end"))?;
     DataArray { scalar_type, data: vec![Data::Data(content.to_owned())], ..DataArray::default() }
-        .into_io_buffer(1, None, ENCODING)
+        .into_io_buffer(count, None, ENCODING)
         .map_err(|cause| format!("{tag}: {cause}"))
 }
 
