@@ -134,11 +134,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         let Some((loading, time)) = loading.filter(|_| !stresses.is_empty()) else { return };
         loading.boundary_stress(time, stresses);
         for (load, stress) in corners.polygons.loads.iter().zip(&*stresses) {
-            let [from, to] = load.corners.map(|corner| corners.polygons.x[corner as usize]);
-            let edge = to - from;
-            let mut normal = SVector::zeros();
-            (normal[0], normal[D - 1]) = (edge[D - 1], -edge[0]);
-            let force = stress * normal;
+            let force = stress * load.normal(&corners.polygons.x);
             for (&corner, &share) in load.corners.iter().zip(&load.shares) {
                 let Node { values } = &mut sums[corner as usize];
                 (0..D).for_each(|i| values[D + i] += force[i] * share);

@@ -196,8 +196,8 @@ pub enum SetupError {
         /// The first particle of this kind.
         particle: usize,
     },
-    /// Polygons in a dimension other than two.
-    #[error("polygons are two-dimensional; this body has dimension {dimension}")]
+    /// Polygons or polyhedra on a line.
+    #[error("polygons and polyhedra have two or three dimensions; this body has {dimension}")]
     PolygonDimension {
         /// The body's dimension.
         dimension: usize,

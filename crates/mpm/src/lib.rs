@@ -56,7 +56,7 @@
 //! # Modules
 //!
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
-//! - `clip`: bodies of any shape in the plane; `polygons`: their particles; `shared_corners`, `corner_exchange`: P2G and G2P by way of corners.
+//! - `clip`: bodies of any shape; `polygons`: their particles, in space polyhedra; `shared_corners`, `corner_exchange`: P2G and G2P by way of corners.
 //! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
@@ -102,13 +102,13 @@ mod xpic;
 
 pub use body::{Annulus, Body, Mesh};
 pub use body_force::{AtTime, BodyForce, NoBodyForce};
-pub use clip::{Clip, Edge, Side};
+pub use clip::{Clip, Facet, Side};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
 pub use particles::Particles;
-pub use polygons::{Load, Polygons};
+pub use polygons::{Faces, Load, Polygons};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;
 pub use simulation::{Simulated, Simulation};

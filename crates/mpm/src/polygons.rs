@@ -1,4 +1,5 @@
-//! Polygons on shared corners: domains of particles that fill a body of any shape, whose corners the grid moves.
+//! Polygons on shared corners: domains of particles that fill a body of any shape, whose corners the grid moves. In space they are
+//! polyhedra, with faces in place of edges: see [`polyhedra`].
 //!
 //! A particle is a list of polygons. Each is divided into the triangles between its edges and the mean of its corners. Where a function
 //! is replaced by its interpolation between the corners, with the mean of their values at the mean of the corners, its mean over a
@@ -15,41 +16,74 @@
 //! normals in both: in `sum_p V_p grad N` it cancels, and the integral of `N n` over the boundary remains. That is the condition under
 //! which a constant stress gives no force inside (Chen, Wu, Yoon & You, IJNME 50 (2001) 435-466).
 
+mod polyhedra;
+
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
 use crate::tensor::real;
 
-/// Particles' domains as polygons on shared corners; the body has two dimensions.
+/// Particles' domains on shared corners: polygons in the plane, polyhedra in space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygons<T, const D: usize> {
     /// Reference positions of the corners.
     pub X: Vec<SVector<T, D>>,
     /// Current positions of the corners.
     pub x: Vec<SVector<T, D>>,
-    /// The corners of all polygons, polygon after polygon, each counter-clockwise.
+    /// The corners of all polygons, polygon after polygon, each counter-clockwise; of all polyhedra, in any order.
     pub corners: Vec<u32>,
-    /// For each polygon where its corners end in `corners`.
+    /// For each polygon or polyhedron where its corners end in `corners`.
     pub ends: Vec<u32>,
-    /// For each particle where its polygons end in `ends`.
+    /// For each particle where its polygons or polyhedra end in `ends`.
     pub of_particles: Vec<u32>,
+    /// The faces of polyhedra; none in the plane.
+    pub faces: Faces,
     /// Points of the boundary where a traction acts, see [`BodyForce::boundary_stress`](crate::BodyForce::boundary_stress).
-    pub loads: Vec<Load<T>>,
+    pub loads: Vec<Load<T, D>>,
     /// From the axes of the body to those of the grid, which is given in the latter; none where they are the same.
     pub turn: Option<SMatrix<T, D, D>>,
 }
 
-/// A point of the boundary with a given Cauchy stress, whose traction follows the edge: the force is that stress times the edge's
-/// current normal and length.
+/// The faces of polyhedra.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Faces {
+    /// The corners of all faces, face after face, counter-clockwise as seen from outside: places among the polyhedron's own corners.
+    pub corners: Vec<u32>,
+    /// For each face where its corners end in `corners`.
+    pub ends: Vec<u32>,
+    /// For each polyhedron where its faces end in `ends`.
+    pub of_polyhedra: Vec<u32>,
+}
+
+/// A point of the boundary with a given Cauchy stress, whose traction follows the edge or the triangle: the force is that stress times
+/// its current normal and length or area.
 ///
 /// The dead load `P N` of the reference configuration has the same value as long as the motion is the exact one. Under pressure of the
 /// order of the shear modulus it makes short waves of the surface grow, however fine the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load<T> {
-    /// The ends of the edge on which it lies, with the body on the left of the way from the first to the second.
-    pub corners: [u32; 2],
-    /// The share of the edge with which it acts on each end.
-    pub shares: [T; 2],
+pub struct Load<T, const D: usize> {
+    /// The ends of the edge on which it lies, with the body on the left of the way from the first to the second; or the corners of the
+    /// triangle, counter-clockwise as seen from outside.
+    pub corners: [u32; D],
+    /// The share of the edge or triangle with which it acts on each of these corners.
+    pub shares: [T; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Load<T, D> {
+    /// The normal of its edge or triangle, as long as that is long or large, between corners at `x`.
+    pub(crate) fn normal(&self, x: &[SVector<T, D>]) -> SVector<T, D> {
+        let at = self.corners.map(|corner| x[corner as usize]);
+        let mut normal = SVector::zeros();
+        match at[..] {
+            [from, to] => {
+                let edge = to - from;
+                (normal[0], normal[D - 1]) = (edge[D - 1], -edge[0]);
+                normal
+            }
+            [a, b, c] => (b - a).cross(&(c - a)) * real::<T>(0.5),
+            _ => normal,
+        }
+    }
 }
 
 /// The shares `w` of a mean and `g` of a mean gradient, per length, that a corner of one of a particle's polygons has.
@@ -63,21 +97,35 @@ pub(crate) struct Share<T, const D: usize> {
 impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
     /// Whether indices are in range, and every corner belongs to a particle.
     pub(crate) fn check(&self, particles: usize) -> Result<(), SetupError> {
-        if D != 2 {
+        if !(2..=3).contains(&D) {
             return Err(SetupError::PolygonDimension { dimension: D });
         }
-        let Self { X, x, corners, ends, of_particles, loads, .. } = self;
+        let Self { X, x, corners, ends, of_particles, faces, loads, .. } = self;
         let is_rising = |ends: &[u32], last: usize| {
             ends.is_sorted() && ends.last().map_or(0, |end| *end as usize) == last
         };
+        // None where the ends of the parts do not fit.
+        let parts = |ends: &[u32], parts: usize| parts * usize::from(is_rising(ends, parts));
+        let polyhedra = if D == 3 { ends.len() } else { 0 };
         for (array, found, expected) in [
             ("x of the corners", x.len(), X.len()),
             ("of_particles", of_particles.len(), particles),
-            ("ends", ends.len() * usize::from(is_rising(of_particles, ends.len())), ends.len()),
-            ("corners", corners.len() * usize::from(is_rising(ends, corners.len())), corners.len()),
+            ("ends", parts(of_particles, ends.len()), ends.len()),
+            ("corners", parts(ends, corners.len()), corners.len()),
+            ("of_polyhedra", faces.of_polyhedra.len(), polyhedra),
+            ("ends of faces", parts(&faces.of_polyhedra, faces.ends.len()), faces.ends.len()),
+            ("corners of faces", parts(&faces.ends, faces.corners.len()), faces.corners.len()),
         ] {
             if found != expected {
                 return Err(SetupError::LengthMismatch { array, found, expected });
+            }
+        }
+        for polyhedron in 0..polyhedra {
+            let count = ends[polyhedron] as usize - start(ends, polyhedron);
+            let places = faces.of(polyhedron).flatten();
+            if let Some(&corner) = places.into_iter().find(|place| **place as usize >= count) {
+                let corner = corner as usize;
+                return Err(SetupError::NoSuchCorner { corner, corners: count });
             }
         }
         let mut idle = vec![true; X.len()];
@@ -98,12 +146,16 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         start(&self.ends, polygons.start)..start(&self.ends, polygons.end)
     }
 
+    /// The numbers of a particle's polygons or polyhedra.
     fn polygons(&self, p: usize) -> std::ops::Range<usize> {
         start(&self.of_particles, p)..self.of_particles[p] as usize
     }
 
     /// Writes the shares of means over a particle in the reference configuration, as many as it has [places](Self::places).
     pub(crate) fn means(&self, p: usize, shares: &mut [Share<T, D>]) {
+        if D == 3 {
+            return polyhedra::means(self, p, shares);
+        }
         let (X, first) = (&self.X, self.places(p).start);
         // Twice the area.
         let mut whole = T::zero();
@@ -136,8 +188,11 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         shares.iter_mut().for_each(|share| share.w *= third);
     }
 
-    /// Writes the shares of mean gradients over a particle at the present positions, and returns its area.
+    /// Writes the shares of mean gradients over a particle at the present positions, and returns its area or volume.
     pub(crate) fn slopes(&self, p: usize, shares: &mut [Share<T, D>]) -> T {
+        if D == 3 {
+            return polyhedra::slopes(self, p, shares);
+        }
         let (x, first) = (&self.x, self.places(p).start);
         // Twice the area.
         let mut whole = T::zero();
@@ -164,6 +219,14 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
             share.g[D - 1] *= inverse;
         }
         whole * real(0.5)
+    }
+}
+
+impl Faces {
+    /// The faces of a polyhedron.
+    fn of(&self, polyhedron: usize) -> impl Iterator<Item = &[u32]> {
+        let faces = start(&self.of_polyhedra, polyhedron)..self.of_polyhedra[polyhedron] as usize;
+        faces.map(|face| &self.corners[start(&self.ends, face)..self.ends[face] as usize])
     }
 }
 

@@ -27,10 +27,17 @@ pub fn loaded_instead(exact: &AnySolution<f64>, case: &Case) -> Vec<Boundary> {
     let Some(placement) = case.scheme.updated().map(|updated| updated.placement) else {
         return Vec::new();
     };
-    let AnySolution::Two(exact) = exact else { return Vec::new() };
     if !placement.is_clipped() {
         return Vec::new();
     }
+    in_dimension!(exact, |s| loaded_of(s, placement, case), else Vec::new())
+}
+
+fn loaded_of<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    placement: Placement,
+    case: &Case,
+) -> Vec<Boundary> {
     let is_loaded = |boundary: &&Boundary| match boundary.condition {
         Condition::PrescribedMotion => true,
         Condition::Sliding | Condition::Symmetry => match exact.domain() {
@@ -70,15 +77,15 @@ pub(crate) struct Scene<const D: usize> {
     /// Cosine and sine of the angle of the grid's axes against those of the body; the grid is given in its own.
     pub(crate) turn: [f64; 2],
     /// The boundary of the part that is modelled, where particles are clipped with it.
-    pub(crate) boundary: Vec<BoundaryPart>,
+    pub(crate) boundary: Vec<BoundaryPart<D>>,
     /// The largest extent of the body.
     pub(crate) size: f64,
 }
 
-/// A part of the boundary in the plane.
+/// A part of the boundary.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BoundaryPart {
-    pub(crate) side: Side,
+pub(crate) struct BoundaryPart<const D: usize> {
+    pub(crate) side: Side<D>,
     /// Whether the traction of the solution acts on it.
     pub(crate) is_loaded: bool,
 }
@@ -254,9 +261,9 @@ impl<const D: usize> Scene<D> {
                 // Along the axes of the grid.
                 let [cos, sin] = turn;
                 let turned = |X: SVector<f64, D>| -> SVector<f64, D> {
-                    SVector::from_fn(|a, _| match (D, a) {
-                        (2, 0) => cos * X[0] + sin * X[D - 1],
-                        (2, _) => cos * X[D - 1] - sin * X[0],
+                    SVector::from_fn(|a, _| match a {
+                        0 => cos * X[0] + sin * X[1 % D],
+                        1 => cos * X[1] - sin * X[0],
                         _ => X[a],
                     })
                 };

@@ -64,7 +64,7 @@ pub enum Placement {
     },
     /// For rings: at the centroids of polar cells, whose corners lie on the rims.
     BodyFitted,
-    /// In the plane: at the centroids of the boxes of a lattice, clipped with the boundary of the body.
+    /// In the plane and in space: at the centroids of the boxes of a lattice, clipped with the boundary of the body.
     Clipped {
         /// As of a lattice.
         offset: f64,

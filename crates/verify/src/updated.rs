@@ -1,7 +1,7 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
 use mmsmith_mpm::{
-    Annulus, Body, Clip, Edge, Load, Particles, Settings, Shape, Side, Simulation, Solver,
+    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Side, Simulation, Solver,
 };
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
@@ -17,10 +17,10 @@ pub(crate) fn admit<const D: usize>(scene: &Scene<D>, updated: &Updated) -> Resu
     let instead = match (updated.placement, &scene.domain) {
         (Placement::Lattice { .. }, _) => return Ok(()),
         (Placement::BodyFitted, Domain::Annulus { .. }) if D == 2 => return Ok(()),
-        (Placement::Clipped { .. }, Domain::Annulus { .. } | Domain::Box { .. }) if D == 2 => {
+        (Placement::Clipped { .. }, Domain::Annulus { .. } | Domain::Box { .. }) if D > 1 => {
             return Ok(());
         }
-        (Placement::Clipped { .. }, _) => "lattice for a body that is not in the plane",
+        (Placement::Clipped { .. }, _) => "lattice for a body on a line",
         (Placement::BodyFitted, Domain::Annulus { .. }) => "lattice for a shell",
         (Placement::BodyFitted, _) => "lattice for a box, which that fits",
     };
@@ -42,8 +42,9 @@ pub(crate) fn bytes_expected<const D: usize>(
         Shape::Cpdi2 => 3 * D + D * D + size_of::<[u32; 8]>() / scalar,
         _ => 0,
     };
-    // Corners and what they pass on, and four or more shares of a particle.
-    let of_polygons = 3 * D + 3 * 8 + D * D + 4 * (D + 5);
+    // Corners and what they pass on, four or eight or more shares of a particle, and the corners and ends of six or more faces.
+    let (shares, of_faces) = if D == 3 { (8, 6 * 5) } else { (4, 0) };
+    let of_polygons = 3 * D + 3 * 8 + D * D + shares * (D + 5) + of_faces;
     let of_shape = if updated.placement.is_clipped() { of_polygons } else { of_shape };
     let of_transfer = if updated.transfer.is_affine() { D * D } else { 0 };
     let of_node = if updated.transfer.is_filtered() { D + 8 } else { 0 };
@@ -65,7 +66,7 @@ fn clipped<T: Real, const D: usize>(
         turn: scene.turn,
         offset: placement.offset(),
     };
-    let (mut body, edges) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
+    let (mut body, facets) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
     let mut points = Vec::new();
     if let Some(polygons) = &mut body.polygons {
         let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
@@ -78,13 +79,13 @@ fn clipped<T: Real, const D: usize>(
                 }
             }
         }
-        for Edge { side, corners } in edges {
+        for Facet { side, corners } in facets {
             let part = &scene.boundary[side];
             if !part.is_loaded {
                 continue;
             }
             let ends = corners.map(|corner| polygons.X[corner as usize].map(Real::to_f64));
-            for (X, shares) in gauss_points(part.side, ends) {
+            for (X, shares) in load_points(part.side, ends) {
                 polygons.loads.push(Load { corners, shares: shares.map(Real::nearest) });
                 points.push(X.map(Real::nearest));
             }
@@ -94,20 +95,29 @@ fn clipped<T: Real, const D: usize>(
     Ok((body, points))
 }
 
-/// Two Gauss points of a part of a side between two ends, with the shares that they give to either.
-fn gauss_points<const D: usize>(
-    side: Side,
-    [a, b]: [SVector<f64, D>; 2],
-) -> [(SVector<f64, D>, [f64; 2]); 2] {
+/// The points of an edge or a triangle between corners of a side at which loads act, with the shares that they give to each corner: two
+/// Gauss points, or the middles of three edges.
+fn load_points<const D: usize>(
+    side: Side<D>,
+    corners: [SVector<f64, D>; D],
+) -> Vec<(SVector<f64, D>, [f64; D])> {
     let away = 0.5 / 3.0_f64.sqrt();
-    [0.5 - away, 0.5 + away].map(|s| {
-        let on_chord = a + (b - a) * s;
+    let weights: Vec<[f64; D]> = match D {
+        2 => [0.5 - away, 0.5 + away]
+            .map(|s| std::array::from_fn(|k| if k == 0 { 1.0 - s } else { s }))
+            .into(),
+        _ => (0..D).map(|k| std::array::from_fn(|n| if n == k { 0.0 } else { 0.5 })).collect(),
+    };
+    let count = weights.len() as f64;
+    let of_point = |weights: [f64; D]| {
+        let flat: SVector<f64, D> = corners.iter().zip(weights).map(|(X, weight)| X * weight).sum();
         let X = match side {
-            Side::Straight { .. } => on_chord,
-            Side::Outer { radius } | Side::Inner { radius } => on_chord.normalize() * radius,
+            Side::Straight { .. } => flat,
+            Side::Outer { radius } | Side::Inner { radius } => flat.normalize() * radius,
         };
-        (X, [0.5 * (1.0 - s), 0.5 * s])
-    })
+        (X, weights.map(|weight| weight / count))
+    };
+    weights.into_iter().map(of_point).collect()
 }
 
 /// The body of a case at rest in the reference configuration.

@@ -183,7 +183,7 @@ pub(crate) enum Layout {
     Lattice,
     /// Polar cells of equal angle that end at the rims (rings, updated Lagrangian)
     BodyFitted,
-    /// A lattice clipped with the boundary of the body: polygons on shared corners (bodies in the plane, updated Lagrangian)
+    /// A lattice clipped with the boundary of the body: polygons or polyhedra on shared corners (updated Lagrangian, not on a line)
     Clipped,
     /// Gauss-Legendre points (total Lagrangian)
     Gauss,

@@ -1,10 +1,13 @@
-//! Polygons on shared corners: clipped lattices, the patch test, momentum, threads, and states that are continued.
+//! Polygons and polyhedra on shared corners: clipped lattices, the patch test, momentum, threads, and states that are continued.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use mmsmith_mpm::{
-    Body, BodyForce, Clip, Edge, Grid, Integrator, Load, Material, NoBodyForce, Polygons, Scalar,
+    Body, BodyForce, Clip, Facet, Grid, Integrator, Load, Material, NoBodyForce, Polygons, Scalar,
     Settings, SetupError, Shape, Side, Simulation, Transfer,
 };
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
+use nalgebra::{SMatrix, SVector, Vector2, vector};
 
 use crate::schemes::{noise, single};
 
@@ -13,36 +16,49 @@ const MATERIAL: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
 
 /// A body in the middle of a grid without walls.
 #[derive(Clone, Copy, Debug)]
-enum Form {
-    Ring { inner: f64, outer: f64 },
-    Rectangle { lower: [f64; 2], upper: [f64; 2] },
+enum Form<const D: usize> {
+    /// A ring or a spherical shell.
+    Shell {
+        inner: f64,
+        outer: f64,
+    },
+    Box {
+        lower: [f64; D],
+        upper: [f64; D],
+    },
 }
 
-impl Form {
-    const ALL: [Self; 3] = [
-        Self::Ring { inner: 0.37, outer: 0.91 },
-        Self::Ring { inner: 0.5, outer: 1.0 },
-        Self::Rectangle { lower: [-0.61, -0.38], upper: [0.72, 0.55] },
-    ];
+impl<const D: usize> Form<D> {
+    fn all() -> [Self; 3] {
+        let ends = [[-0.61, 0.72], [-0.38, 0.55], [-0.43, 0.29]];
+        let [lower, upper] = [0, 1].map(|end| std::array::from_fn(|a| ends[a][end]));
+        [
+            Self::Shell { inner: 0.37, outer: 0.91 },
+            Self::Shell { inner: 0.5, outer: 1.0 },
+            Self::Box { lower, upper },
+        ]
+    }
 
-    fn sides(self) -> Vec<Side> {
+    fn sides(self) -> Vec<Side<D>> {
         match self {
-            Self::Ring { inner, outer } => {
+            Self::Shell { inner, outer } => {
                 vec![Side::Inner { radius: inner }, Side::Outer { radius: outer }]
             }
-            Self::Rectangle { lower: [a, b], upper: [c, d] } => vec![
-                Side::Straight { normal: [-1.0, 0.0], distance: -a },
-                Side::Straight { normal: [1.0, 0.0], distance: c },
-                Side::Straight { normal: [0.0, -1.0], distance: -b },
-                Side::Straight { normal: [0.0, 1.0], distance: d },
-            ],
+            Self::Box { lower, upper } => {
+                let side = |axis, sign: f64, distance| {
+                    let normal = std::array::from_fn(|a| if a == axis { sign } else { 0.0 });
+                    Side::Straight { normal, distance }
+                };
+                (0..D).flat_map(|a| [side(a, -1.0, -lower[a]), side(a, 1.0, upper[a])]).collect()
+            }
         }
     }
 
-    fn area(self) -> f64 {
-        match self {
-            Self::Ring { inner, outer } => std::f64::consts::PI * (outer * outer - inner * inner),
-            Self::Rectangle { lower: [a, b], upper: [c, d] } => (c - a) * (d - b),
+    fn content(self) -> f64 {
+        match (self, D) {
+            (Self::Shell { inner, outer }, 2) => PI * (outer * outer - inner * inner),
+            (Self::Shell { inner, outer }, _) => 4.0 / 3.0 * PI * (outer.powi(3) - inner.powi(3)),
+            (Self::Box { lower, upper }, _) => (0..D).map(|a| upper[a] - lower[a]).product(),
         }
     }
 }
@@ -50,124 +66,162 @@ impl Form {
 /// How the lattice lies: angle in degrees, offset in units of the particles' distance.
 const LATTICES: [(f64, f64); 4] = [(0.0, 0.0), (0.0, 0.37), (30.0, 0.0), (-73.0, -0.21)];
 
-fn grid() -> Grid<f64, 2> {
-    Grid { lower: vector![-2.0, -2.0], spacing: 0.125, cells: [32; 2], walls: [[false; 2]; 2] }
+/// Cells half as wide in the plane.
+fn grid<const D: usize>() -> Grid<f64, D> {
+    let cells = if D == 2 { 32 } else { 16 };
+    let (lower, spacing) = (SVector::repeat(-2.0), 4.0 / cells as f64);
+    Grid { lower, spacing, cells: [cells; D], walls: [[false; 2]; D] }
 }
 
-fn clipped(form: Form, (angle, offset): (f64, f64)) -> (Body<f64, 2>, Vec<Edge>) {
+fn clipped<const D: usize>(
+    form: Form<D>,
+    (angle, offset): (f64, f64),
+) -> (Body<f64, D>, Vec<Facet<D>>) {
     let (sin, cos) = angle.to_radians().sin_cos();
     let turn = if angle == 0.0 { [1.0, 0.0] } else { [cos, sin] };
     let clip = Clip { sides: form.sides(), turn, offset };
-    Body::clipped(&grid(), 2, DENSITY, &clip).expect("a body in the plane")
+    Body::clipped(&grid(), 2, DENSITY, &clip).expect("a body of more than one dimension")
 }
 
-fn polygons(body: &Body<f64, 2>) -> &Polygons<f64, 2> {
+fn polygons<const D: usize>(body: &Body<f64, D>) -> &Polygons<f64, D> {
     body.polygons.as_ref().expect("polygons")
 }
 
-fn each_form() -> impl Iterator<Item = (Form, (f64, f64))> {
-    Form::ALL.into_iter().flat_map(|form| LATTICES.map(|lattice| (form, lattice)))
+fn each_form<const D: usize>() -> impl Iterator<Item = (Form<D>, (f64, f64))> {
+    Form::all().into_iter().flat_map(|form| LATTICES.map(|lattice| (form, lattice)))
 }
 
-/// The polygons of each particle, as lists of corners.
-fn of_particles(own: &Polygons<f64, 2>) -> Vec<Vec<&[u32]>> {
-    let (mut polygon, mut corner) = (0, 0);
-    let lists = own.of_particles.iter().map(|&end| {
-        let ends = &own.ends[polygon..end as usize];
-        polygon = end as usize;
-        let lists = ends.iter().map(|&end| {
-            let list = &own.corners[corner..end as usize];
-            corner = end as usize;
-            list
-        });
-        lists.collect()
-    });
-    lists.collect()
+/// The parts of lists that end at `ends`.
+fn parts<'a, P>(list: &'a [P], ends: &'a [u32]) -> impl Iterator<Item = &'a [P]> {
+    ends.iter()
+        .scan(0, |from, &end| Some(&list[std::mem::replace(from, end as usize)..end as usize]))
 }
 
-fn area(x: &[Vector2<f64>], corners: &[u32]) -> f64 {
-    let at = |k: usize| x[corners[k % corners.len()] as usize];
-    (0..corners.len()).map(|k| 0.5 * at(k).perp(&at(k + 1))).sum()
+/// The edges or faces of each particle's parts, as lists of corners.
+fn facets<const D: usize>(own: &Polygons<f64, D>) -> Vec<Vec<Vec<u32>>> {
+    let corners: Vec<&[u32]> = parts(&own.corners, &own.ends).collect();
+    let of_part: Vec<Vec<Vec<u32>>> = if D == 2 {
+        let edges = |corners: &[u32]| {
+            let next = corners.iter().cycle().skip(1);
+            corners.iter().zip(next).map(|(a, b)| vec![*a, *b]).collect()
+        };
+        corners.into_iter().map(edges).collect()
+    } else {
+        let faces: Vec<&[u32]> = parts(&own.faces.corners, &own.faces.ends).collect();
+        let of_polyhedron = |(corners, faces): (&[u32], &[&[u32]])| {
+            let of_face = |face: &&[u32]| face.iter().map(|k| corners[*k as usize]).collect();
+            faces.iter().map(of_face).collect()
+        };
+        corners.into_iter().zip(parts(&faces, &own.faces.of_polyhedra)).map(of_polyhedron).collect()
+    };
+    parts(&of_part, &own.of_particles).map(<[_]>::concat).collect()
+}
+
+/// D times the content of what facets enclose.
+fn enclosed<const D: usize>(x: &[SVector<f64, D>], facets: &[Vec<u32>]) -> f64 {
+    let about = x[facets[0][0] as usize];
+    let of_facet = |facet: &Vec<u32>| -> f64 {
+        let at = |k: usize| x[facet[k] as usize] - about;
+        match D {
+            2 => at(0)[0] * at(1)[D - 1] - at(0)[D - 1] * at(1)[0],
+            _ => (1..facet.len() - 1).map(|k| at(0).dot(&at(k).cross(&at(k + 1))) / 2.0).sum(),
+        }
+    };
+    facets.iter().map(of_facet).sum()
+}
+
+fn masses_and_slivers<const D: usize>() {
+    for (form, lattice) in each_form::<D>() {
+        let (body, _) = clipped(form, lattice);
+        let (what, p) = (format!("{form:?} {lattice:?}"), &body.particles);
+        let mass: f64 = p.mass.iter().sum();
+        assert!((mass / (DENSITY * form.content()) - 1.0).abs() < 1e-13, "{what}: {mass}");
+        let of_box = (grid::<D>().spacing / 2.0).powi(D as i32);
+        let share = |volume: &f64| volume / of_box;
+        assert!(p.volume.iter().all(|V| (0.2..2.0).contains(&share(V))), "{what}");
+        let own = polygons(&body);
+        for (k, facets) in facets(own).iter().enumerate() {
+            let whole = enclosed(&own.X, facets) / D as f64;
+            assert!((whole - p.volume[k]).abs() < 1e-14 * of_box.max(1e-1), "{what}");
+        }
+        // The centre of mass of a box is exact; that of a shell has chords for arcs.
+        let centre: SVector<f64, D> = p.X.iter().zip(&p.volume).map(|(X, V)| X * *V).sum();
+        let (exact, bound): (SVector<f64, D>, _) = match form {
+            Form::Box { lower, upper } => {
+                (SVector::from_fn(|a, _| 0.5 * (lower[a] + upper[a])), 1e-14)
+            }
+            Form::Shell { .. } => (SVector::zeros(), 1e-3),
+        };
+        assert!((centre / form.content() - exact).norm() < bound, "{what}");
+    }
 }
 
 #[test]
 fn clipped_lattices_have_the_mass_of_the_body_and_no_slivers() {
-    for (form, lattice) in each_form() {
-        let (body, _) = clipped(form, lattice);
-        let (what, p) = (format!("{form:?} {lattice:?}"), &body.particles);
-        let mass: f64 = p.mass.iter().sum();
-        assert!((mass / (DENSITY * form.area()) - 1.0).abs() < 1e-13, "{what}");
-        let of_box = 0.0625 * 0.0625;
-        let share = |volume: &f64| volume / of_box;
-        assert!(p.volume.iter().all(|V| (0.2..1.6).contains(&share(V))), "{what}");
-        // Areas and centroids are those of the polygons.
-        let own = polygons(&body);
-        for (k, lists) in of_particles(own).iter().enumerate() {
-            let whole: f64 = lists.iter().map(|list| area(&own.X, list)).sum();
-            assert!((whole - p.volume[k]).abs() < 1e-15, "{what}");
-            assert!(lists.iter().all(|list| area(&own.X, list) > 0.0), "{what}");
-        }
-        // The centre of mass of a rectangle is exact; that of a ring has chords for arcs.
-        let centre: Vector2<f64> = p.X.iter().zip(&p.volume).map(|(X, V)| X * *V).sum();
-        let (exact, bound) = match form {
-            Form::Rectangle { lower: [a, b], upper: [c, d] } => {
-                (vector![a + c, b + d] * 0.5, 1e-14)
-            }
-            Form::Ring { .. } => (Vector2::zeros(), 1e-4),
-        };
-        assert!((centre / form.area() - exact).norm() < bound, "{what}");
-    }
+    masses_and_slivers::<2>();
+    masses_and_slivers::<3>();
 }
 
-/// Every edge lies between two particles, which have it in opposite directions, or on one side of the body.
-#[test]
-fn neighbours_share_their_edges_and_the_rest_is_the_boundary() {
-    for (form, lattice) in each_form() {
+/// Every facet lies between two particles, which have it in opposite directions, or on one side of the body.
+fn shared_facets<const D: usize>() {
+    // From the lowest corner on, which tells the direction of a face; an edge has it as it is.
+    let from_lowest = |facet: &[u32]| {
+        let lowest = (0..facet.len()).min_by_key(|k| facet[*k]).unwrap();
+        let mut facet = facet.to_vec();
+        if D == 3 {
+            facet.rotate_left(lowest);
+        }
+        facet
+    };
+    for (form, lattice) in each_form::<D>() {
         let (body, boundary) = clipped(form, lattice);
         let (what, own) = (format!("{form:?} {lattice:?}"), polygons(&body));
-        let mut edges = std::collections::BTreeMap::new();
-        for list in of_particles(own).concat() {
-            for k in 0..list.len() {
-                let edge = [list[k], list[(k + 1) % list.len()]];
-                assert!(edges.insert(edge, false).is_none(), "{what}: {edge:?} twice");
-            }
+        let mut known = BTreeMap::new();
+        for facet in facets(own).concat() {
+            let facet = from_lowest(&facet);
+            assert!(known.insert(facet.clone(), false).is_none(), "{what}: {facet:?} twice");
         }
-        for Edge { side, corners } in &boundary {
-            let seen = edges.insert(*corners, true);
+        for Facet { side, corners } in &boundary {
+            let seen = known.insert(from_lowest(corners), true);
             assert_eq!(seen, Some(false), "{what}");
             for X in corners.map(|corner| own.X[corner as usize]) {
                 let away = match form.sides()[*side] {
-                    Side::Straight { normal: [a, b], distance } => a * X[0] + b * X[1] - distance,
+                    Side::Straight { normal, distance } => SVector::from(normal).dot(&X) - distance,
                     Side::Inner { radius } | Side::Outer { radius } => X.norm() - radius,
                 };
                 assert!(away.abs() < 1e-9, "{what}: {away:e}");
             }
         }
-        for (&[a, b], on_boundary) in &edges {
-            assert_eq!(edges.contains_key(&[b, a]), !on_boundary, "{what}: {a} {b}");
+        for (facet, on_boundary) in &known {
+            let mut back = facet.clone();
+            back.reverse();
+            assert_eq!(known.contains_key(&from_lowest(&back)), !on_boundary, "{what}: {facet:?}");
         }
     }
 }
 
-/// Loads on all of the boundary, two points to an edge.
-fn loaded(body: &mut Body<f64, 2>, boundary: &[Edge]) {
-    let away = 0.5 / 3.0_f64.sqrt();
-    let points = boundary.iter().flat_map(|edge| {
-        [0.5 - away, 0.5 + away]
-            .map(|s| Load { corners: edge.corners, shares: [0.5 * (1.0 - s), 0.5 * s] })
-    });
-    body.polygons.as_mut().expect("polygons").loads = points.collect();
+#[test]
+fn neighbours_share_their_facets_and_the_rest_is_the_boundary() {
+    shared_facets::<2>();
+    shared_facets::<3>();
+}
+
+/// Loads on all of the boundary, at the middle of each facet.
+fn loaded<const D: usize>(body: &mut Body<f64, D>, boundary: &[Facet<D>]) {
+    let shares = [1.0 / D as f64; D];
+    let loads = boundary.iter().map(|facet| Load { corners: facet.corners, shares });
+    body.polygons.as_mut().expect("polygons").loads = loads.collect();
 }
 
 /// A stress that is the same on all of the boundary.
-struct Constant(Matrix2<f64>);
+struct Constant<const D: usize>(SMatrix<f64, D, D>);
 
-impl BodyForce<f64, 2> for Constant {
-    fn evaluate(&self, _: usize, _: &[Vector2<f64>], _: f64, b: &mut [Vector2<f64>]) {
-        b.fill(Vector2::zeros());
+impl<const D: usize> BodyForce<f64, D> for Constant<D> {
+    fn evaluate(&self, _: usize, _: &[SVector<f64, D>], _: f64, b: &mut [SVector<f64, D>]) {
+        b.fill(SVector::zeros());
     }
 
-    fn boundary_stress(&self, _: f64, stress: &mut [Matrix2<f64>]) {
+    fn boundary_stress(&self, _: f64, stress: &mut [SMatrix<f64, D, D>]) {
         stress.fill(self.0);
     }
 }
@@ -185,15 +239,23 @@ fn settings(shape: Shape, integrator: Integrator, transfer: Transfer) -> Setting
 }
 
 /// A body deformed by the same F everywhere, whose stress balances the loads on its boundary, stays as it is.
-#[test]
-fn a_constant_stress_gives_no_force_to_rounding() {
-    let F: Matrix2<f64> = Matrix2::new(1.17, 0.21, -0.08, 0.86);
-    let (J, mu, lambda) = (F.determinant(), 40.0, 60.0_f64);
-    let tau =
-        (F * F.transpose() - Matrix2::identity()) * mu + Matrix2::identity() * (lambda * J.ln());
-    for (form, lattice) in each_form() {
+fn patch_test<const D: usize>(integrators: &[Integrator])
+where
+    f64: Scalar<D>,
+{
+    let F = SMatrix::<f64, D, D>::from_row_iterator(
+        [1.17, 0.21, 0.05, -0.08, 0.86, -0.12, 0.11, 0.03, 1.06]
+            .into_iter()
+            .enumerate()
+            .filter(|(k, _)| k / 3 < D && k % 3 < D)
+            .map(|(_, entry)| entry),
+    );
+    let (J, mu, lambda) = (det(&F), 40.0, 60.0_f64);
+    let one = SMatrix::identity();
+    let tau = (F * F.transpose() - one) * mu + one * (lambda * J.ln());
+    for (form, lattice) in each_form::<D>() {
         for shape in SHAPES {
-            for integrator in Integrator::ALL {
+            for &integrator in integrators {
                 let (mut body, boundary) = clipped(form, lattice);
                 loaded(&mut body, &boundary);
                 let own = body.polygons.as_mut().unwrap();
@@ -205,7 +267,7 @@ fn a_constant_stress_gives_no_force_to_rounding() {
                 let mut run = Simulation::new(grid(), body, MATERIAL, settings).unwrap();
                 run.step(&Constant(tau / J)).unwrap();
                 // In units of the acceleration that the stress gives to a cell.
-                let unit = tau.norm() / (DENSITY * 0.125) * settings.time_step;
+                let unit = tau.norm() / (DENSITY * grid::<D>().spacing) * settings.time_step;
                 let fastest = run.particles().v.iter().map(|v| v.norm() / unit).fold(0.0, f64::max);
                 assert!(fastest < 1e-13, "{form:?} {lattice:?} {settings:?}: {fastest:e}");
             }
@@ -213,11 +275,25 @@ fn a_constant_stress_gives_no_force_to_rounding() {
     }
 }
 
-fn moving(form: Form, lattice: (f64, f64)) -> Body<f64, 2> {
+fn det<const D: usize>(F: &SMatrix<f64, D, D>) -> f64 {
+    let entry = |i: usize, j: usize| F[(i, j)];
+    match D {
+        2 => entry(0, 0) * entry(1, 1) - entry(0, 1) * entry(1, 0),
+        _ => SVector::<f64, D>::from(F.column(0)).dot(&F.column(1).cross(&F.column(2))),
+    }
+}
+
+#[test]
+fn a_constant_stress_gives_no_force_to_rounding() {
+    patch_test::<2>(&Integrator::ALL);
+    patch_test::<3>(&[Integrator::Cd, Integrator::Usf]);
+}
+
+fn moving<const D: usize>(form: Form<D>, lattice: (f64, f64)) -> Body<f64, D> {
     let (mut body, _) = clipped(form, lattice);
     let p = &mut body.particles;
     for k in 0..p.len() {
-        p.v[k] = Vector2::from_fn(|a, _| 0.1 + 0.2 * noise(7 * k + a));
+        p.v[k] = SVector::from_fn(|a, _| 0.1 + 0.2 * noise(7 * k + a));
         p.F[k] += SMatrix::from_fn(|i, j| 0.02 * noise(11 * k + 3 * i + j));
     }
     body
@@ -227,15 +303,17 @@ fn transfers() -> [Transfer; 4] {
     [Transfer::Flip, Transfer::Pic, Transfer::Apic, Transfer::Xpic(3)]
 }
 
-#[test]
-fn free_bodies_keep_their_momentum_with_every_scheme() {
-    for shape in SHAPES {
+fn momentum_is_kept<const D: usize>(shapes: &[Shape])
+where
+    f64: Scalar<D>,
+{
+    for &shape in shapes {
         for integrator in Integrator::ALL {
             for transfer in transfers() {
                 let settings = settings(shape, integrator, transfer);
-                let body = moving(Form::ALL[0], LATTICES[3]);
+                let body = moving(Form::<D>::all()[0], LATTICES[3]);
                 let mut run = Simulation::new(grid(), body, MATERIAL, settings).unwrap();
-                let momentum = |run: &Simulation<f64, 2>| -> Vector2<f64> {
+                let momentum = |run: &Simulation<f64, D>| -> SVector<f64, D> {
                     let p = run.particles();
                     p.v.iter().zip(&p.mass).map(|(v, m)| v * *m).sum()
                 };
@@ -249,10 +327,19 @@ fn free_bodies_keep_their_momentum_with_every_scheme() {
 }
 
 #[test]
-fn polygons_have_the_same_bits_on_any_number_of_threads_and_go_on_from_a_state() {
-    fn check<T: Scalar<2>>(
-        body: &Body<T, 2>,
-        grid: &Grid<T, 2>,
+fn free_bodies_keep_their_momentum_with_every_scheme() {
+    momentum_is_kept::<2>(&SHAPES);
+    momentum_is_kept::<3>(&SHAPES[..2]);
+}
+
+fn same_bits<const D: usize>()
+where
+    f64: Scalar<D>,
+    f32: Scalar<D>,
+{
+    fn check<T: Scalar<D>, const D: usize>(
+        body: &Body<T, D>,
+        grid: &Grid<T, D>,
         settings: Settings<T>,
         number: fn(f64) -> T,
     ) {
@@ -281,13 +368,14 @@ fn polygons_have_the_same_bits_on_any_number_of_threads_and_go_on_from_a_state()
     for (transfer, integrator) in transfers().into_iter().zip(Integrator::ALL) {
         for shape in SHAPES {
             let settings = settings(shape, integrator, transfer);
-            let body = moving(Form::ALL[2], LATTICES[2]);
-            check(&body, &grid(), settings, |x| x);
+            let body = moving(Form::<D>::all()[2], LATTICES[2]);
+            let grid = grid::<D>();
+            check(&body, &grid, settings, |x| x);
             let in_single = Grid {
-                lower: grid().lower.cast(),
-                spacing: 0.125,
-                cells: grid().cells,
-                walls: grid().walls,
+                lower: grid.lower.cast(),
+                spacing: grid.spacing as f32,
+                cells: grid.cells,
+                walls: grid.walls,
             };
             let Settings { shape, integrator, transfer, halve_first_acceleration, .. } = settings;
             let settings = Settings {
@@ -303,9 +391,15 @@ fn polygons_have_the_same_bits_on_any_number_of_threads_and_go_on_from_a_state()
 }
 
 #[test]
+fn polygons_have_the_same_bits_on_any_number_of_threads_and_go_on_from_a_state() {
+    same_bits::<2>();
+    same_bits::<3>();
+}
+
+#[test]
 fn bodies_that_cannot_be_are_refused() {
     let set_up = |change: &dyn Fn(&mut Polygons<f64, 2>, &mut Grid<f64, 2>), shape| {
-        let (mut body, mut grid) = (moving(Form::ALL[1], LATTICES[2]), grid());
+        let (mut body, mut grid) = (moving(Form::<2>::all()[1], LATTICES[2]), grid());
         change(body.polygons.as_mut().unwrap(), &mut grid);
         let settings = settings(shape, Integrator::Cd, Transfer::Flip);
         Simulation::new(grid, body, MATERIAL, settings).err()
@@ -328,9 +422,14 @@ fn bodies_that_cannot_be_are_refused() {
     assert!(matches!(set_up(&short, Shape::Cpdi2), Some(SetupError::LengthMismatch { .. })));
     let away = |own: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| own.x[0] = vector![9.0, 0.0];
     assert!(matches!(set_up(&away, Shape::Cpdi2), Some(SetupError::InitialState(_))));
-    let grid =
-        Grid { lower: SVector::zeros(), spacing: 0.5, cells: [2; 3], walls: [[false; 2]; 3] };
-    let clip = Clip { sides: Form::ALL[0].sides(), turn: [1.0, 0.0], offset: 0.0 };
-    let found = Body::<f64, 3>::clipped(&grid, 2, DENSITY, &clip).err();
-    assert_eq!(found, Some(SetupError::PolygonDimension { dimension: 3 }));
+    let grid = Grid { lower: vector![0.0], spacing: 0.5, cells: [2], walls: [[false; 2]] };
+    let sides = vec![Side::Straight { normal: [1.0], distance: 0.7 }];
+    let clip = Clip { sides, turn: [1.0, 0.0], offset: 0.0 };
+    let found = Body::<f64, 1>::clipped(&grid, 2, DENSITY, &clip).err();
+    assert_eq!(found, Some(SetupError::PolygonDimension { dimension: 1 }));
+    let mut body = moving(Form::<3>::all()[2], LATTICES[0]);
+    body.polygons.as_mut().unwrap().faces.corners[5] = 77;
+    let settings = settings(Shape::Cpdi2, Integrator::Cd, Transfer::Flip);
+    let found = Simulation::new(self::grid(), body, MATERIAL, settings).err();
+    assert_eq!(found, Some(SetupError::NoSuchCorner { corner: 77, corners: 8 }));
 }

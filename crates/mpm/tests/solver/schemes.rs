@@ -109,6 +109,7 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
             corners: own.corners.clone(),
             ends: own.ends.clone(),
             of_particles: own.of_particles.clone(),
+            faces: own.faces.clone(),
             loads: Vec::new(),
             turn: own.turn.map(|turn| turn.cast()),
         }),
