@@ -85,10 +85,12 @@ impl<const D: usize> Side<D> {
                 let rest = (a.norm() - radius) * (a.norm() + radius);
                 let root = (half * half - square * rest).max(0.0).sqrt();
                 let far = if half > 0.0 { -half - root } else { root - half };
+                // One of the two lies between the ends, wherever the straight line through the distances is zero.
+                let beside = |s: f64| (s - s.clamp(0.0, 1.0)).abs();
                 [far / square, rest / far]
                     .into_iter()
                     .filter(|s| s.is_finite())
-                    .min_by(|s, t| (s - straight).abs().total_cmp(&(t - straight).abs()))
+                    .min_by(|s, t| beside(*s).total_cmp(&beside(*t)))
                     .unwrap_or(straight)
             }
         };
@@ -246,6 +248,30 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
             2 => Ok(plane::body(grid, per_cell.max(1), density, clip)),
             3 => Ok(space::body(grid, per_cell.max(1), density, clip)),
             _ => Err(SetupError::PolygonDimension { dimension: D }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::vector;
+
+    /// Also where the segment first goes on in the direction from which it comes back.
+    #[test]
+    fn a_crossing_lies_on_its_circle() {
+        for side in [Side::<2>::Outer { radius: 1.0 }, Side::Inner { radius: 1.0 }] {
+            for k in 0..400 {
+                let angle = 0.9 + 1e-2 * f64::from(k);
+                let away = [1e-9, 1e-4, 0.3][k as usize % 3];
+                let a = vector![0.6, 0.8] * (1.0 - away);
+                let b = a + vector![angle.cos(), angle.sin()] * 1.7;
+                let (da, db) = (side.distance(&a), side.distance(&b));
+                if da * db < 0.0 {
+                    let X = side.crossing((a, da), (b, db));
+                    assert!(side.distance(&X).abs() < 1e-14, "{side:?} {angle} {away}: {X}");
+                }
+            }
         }
     }
 }
