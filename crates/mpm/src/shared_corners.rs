@@ -157,12 +157,19 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     pub(crate) fn follow(&mut self, c: &Constants<T, D>, values: &[Node<T, D>]) {
         let Self { polygons, next, .. } = self;
         let x = &polygons.x[..];
+        // What wide splines leave of the velocity across a wall, which is zero but for rounding, would take a corner off the grid.
+        let is_on_wall = |x: &SVector<T, D>, a: usize| {
+            let (lower, upper) = c.range(a);
+            polygons.turn.is_none() && (x[a] == lower || x[a] == upper)
+        };
         each_chunk(next, CHUNK, &|chunk, next| {
             let first = chunk * CHUNK;
             for ((next, x), value) in next.iter_mut().zip(&x[first..]).zip(&values[first..]) {
                 *next = *x;
                 if !c.planted.is(Fault::CornersStay) {
-                    (0..D).for_each(|a| next[a] += value.values[a] * c.time_step);
+                    for a in (0..D).filter(|a| !is_on_wall(x, *a)) {
+                        next[a] += value.values[a] * c.time_step;
+                    }
                 }
             }
         });

@@ -1,5 +1,7 @@
 //! Polygons and polyhedra on shared corners: clipped lattices, the patch test, momentum, threads, and states that are continued.
 
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -394,6 +396,32 @@ where
 fn polygons_have_the_same_bits_on_any_number_of_threads_and_go_on_from_a_state() {
     same_bits::<2>();
     same_bits::<3>();
+}
+
+#[test]
+fn corners_on_walls_stay_on_them() {
+    for shape in SHAPES {
+        for integrator in Integrator::ALL {
+            let cells = [24; 2];
+            let grid =
+                Grid { lower: SVector::zeros(), spacing: 0.125, cells, walls: [[true, false]; 2] };
+            let form = Form::<2>::all()[1];
+            let planes = [[-1.0, 0.0], [0.0, -1.0]];
+            let planes = planes.map(|normal| Side::Straight { normal, distance: 0.0 });
+            let sides = form.sides().into_iter().chain(planes).collect();
+            let clip = Clip { sides, turn: [1.0, 0.0], offset: 0.0 };
+            let (mut body, _) = Body::clipped(&grid, 2, DENSITY, &clip).unwrap();
+            let p = &mut body.particles;
+            (0..p.len()).for_each(|k| p.v[k] = SVector::from_fn(|a, _| noise(7 * k + a)));
+            let on_walls =
+                |own: &Polygons<f64, 2>| own.x.iter().map(|x| x.map(|x| x == 0.0)).collect();
+            let before: Vec<_> = on_walls(polygons(&body));
+            let settings = settings(shape, integrator, Transfer::Flip);
+            let mut run = Simulation::new(grid, body, MATERIAL, settings).unwrap();
+            (0..30).for_each(|_| run.step(&NoBodyForce).unwrap());
+            assert_eq!(on_walls(run.polygons().unwrap()), before, "{settings:?}");
+        }
+    }
 }
 
 #[test]
