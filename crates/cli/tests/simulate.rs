@@ -408,7 +408,7 @@ fn bad_input_is_met_with_what_would_be_right() {
     );
     let clipped = "--layout clipped";
     refuses(place, &format!("run ring --shape gimp {clipped}"), &["layout", "lattice", "cpdi2"]);
-    refuses(place, &format!("run sphere-shell {clipped}"), &["layout", "not in the plane"]);
+    refuses(place, &format!("run axis-aligned-1d {clipped}"), &["layout", "a body on a line"]);
     refuses(place, &format!("{total} {clipped}"), &["--layout", "gauss or lattice"]);
     refuses(place, &format!("{total} --grid-angle 3"), &["grid-angle", "the layout clipped"]);
     refuses(
