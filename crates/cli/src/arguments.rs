@@ -16,6 +16,7 @@ macro_rules! choices {
     };
 }
 
+mod batch;
 mod certify;
 mod check;
 mod converge;
@@ -43,6 +44,7 @@ use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::terminal::{Color, Verbosity};
 
+pub(crate) use batch::{BatchOptions, BatchSystem};
 pub(crate) use certify::CertifyOptions;
 pub(crate) use check::CheckOptions;
 pub(crate) use converge::ConvergeOptions;
@@ -58,6 +60,7 @@ pub(crate) use scheme::{
     Composition, Frame, Grid, HighDegree, Layout, Mass, Precision, SchemeOptions, Start, Weights,
 };
 pub(crate) use score::ScoreOptions;
+pub(crate) use shared::KeepOptions;
 pub(crate) use stability::StabilityOptions;
 pub(crate) use texts::{CompletionsOptions, ManOptions};
 pub(crate) use tradeoff::{Against, TradeoffOptions};
@@ -141,6 +144,8 @@ pub(crate) enum Command {
     Stability(StabilityOptions),
     /// Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each setting buys
     Tradeoff(TradeoffOptions),
+    /// Write the script that runs a study in shards, or a run, on a cluster
+    Batch(BatchOptions),
     /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
     Score(ScoreOptions),
     /// Repeat the original study on both of its problems, with a report, tables, data and particle files

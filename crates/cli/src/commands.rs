@@ -1,5 +1,6 @@
 //! The commands, each in its own module.
 
+mod batch;
 mod certify;
 mod check;
 mod converge;
@@ -20,6 +21,7 @@ mod texts;
 mod thorough;
 mod tradeoff;
 
+pub(crate) use batch::batch;
 pub(crate) use certify::certify;
 pub(crate) use check::check;
 pub(crate) use converge::converge;

@@ -1,30 +1,41 @@
 //! Studies that survive: finished cases in a folder, from which a study goes on.
 
-use std::path::PathBuf;
+use std::fmt;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
-use mmsmith_ledger::{Claim, Ledger};
+use anyhow::{Context, Result, bail};
+use mmsmith_ledger::{Claim, Ledger, LedgerError, Shard, ShardName};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
+use crate::arguments::KeepOptions;
 use crate::json::prepare_folder;
 use crate::library::{Origin, locate};
-use crate::terminal;
+use crate::{machine, terminal};
 
 /// How long to wait for cases that other processes are at work on, before they are looked at again.
 const WAIT: Duration = Duration::from_millis(50);
+/// A case whose threads waited for a core for a larger share of its time did not have its cores to itself.
+const MOST_WAITING: f64 = 0.02;
 
 /// Where the cases of a study are kept, if anywhere.
 pub(crate) struct Keep(Option<Place>);
 
 struct Place {
-    ledger: Ledger,
+    store: Store,
     /// What every result depends on beside its settings.
     common: Value,
+}
+
+enum Store {
+    /// A folder whose processes claim cases from one another.
+    Ledger(Ledger),
+    /// A folder whose processes have their cases from the start.
+    Shard { shard: Shard, name: ShardName },
 }
 
 /// Whether cases run one after the other, each with all threads, or many at once, each with one.
@@ -34,39 +45,110 @@ pub(crate) enum Order {
     AtOnce,
 }
 
+/// The results of a study.
+pub(crate) enum Found<T> {
+    /// Of all cases, in their order.
+    All(Vec<T>),
+    /// A shard has its own, and no table.
+    Part(Part),
+}
+
+/// A shard's part of a study, finished.
+pub(crate) struct Part {
+    name: ShardName,
+    /// Cases of this shard, cases whose results this shard knows, and all.
+    own: usize,
+    known: usize,
+    all: usize,
+}
+
+impl Part {
+    /// Both parts of one study.
+    pub(crate) fn and(self, other: &Self) -> Self {
+        Self {
+            own: self.own + other.own,
+            known: self.known + other.known,
+            all: self.all + other.all,
+            ..self
+        }
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, own, known, all } = self;
+        write!(
+            f,
+            "shard {name}: its {own} of {all} cases are finished; {known} of all are in the folder\n\
+             once all shards have ended, the same command without --shard prints the table\n"
+        )
+    }
+}
+
 impl Keep {
     /// Keeps the cases of a study of `solution` in the folder of `--out`, if one was given.
     ///
-    /// Cases are known again by the build that computed them as well: another one may compute another result.
-    pub(crate) fn open(folder: Option<&PathBuf>, solution: &str) -> Result<Self> {
-        let Some(folder) = folder else { return Ok(Self(None)) };
-        let ledger = Ledger::open(folder).context("--out")?;
+    /// Cases are known again by the build that computed them as well: another one may compute another result. `outputs` are the
+    /// options that name files for the whole study, which a shard cannot write, and whether they were given.
+    pub(crate) fn open(
+        options: &KeepOptions,
+        solution: &str,
+        outputs: &[(&str, bool)],
+    ) -> Result<Self> {
+        let Some(folder) = &options.out else { return Ok(Self(None)) };
+        if let (Some(name), Some((output, _))) =
+            (options.shard, outputs.iter().find(|(_, given)| *given))
+        {
+            bail!(
+                "--shard {name} {output}: a shard computes a part of the cases; give {output} to the same command without --shard, \
+                 once all shards have ended"
+            );
+        }
+        let common = origin(solution)?;
+        let open = || match options.shard {
+            None => Ledger::open(folder, &common).map(Store::Ledger),
+            Some(name) => {
+                Shard::open(folder, name, &common).map(|shard| Store::Shard { shard, name })
+            }
+        };
+        let store = open().map_err(|error| refused(error, folder, solution)).context("--out")?;
         prepare_folder(folder).context("--out")?;
-        let keep = Self(Some(Place { ledger, common: origin(solution)? }));
+        let keep = Self(Some(Place { store, common }));
         keep.tell_damage();
         Ok(keep)
     }
 
-    /// The results of all cases, in their order: those that are kept, and what `compute` makes of the others.
+    /// Which cases are this process's to compute, by their predicted costs, in any unit that is the same on all machines.
+    pub(crate) fn own(&self, costs: &[f64]) -> Vec<bool> {
+        match &self.0 {
+            Some(Place { store: Store::Shard { name, .. }, .. }) => name.own(costs),
+            _ => vec![true; costs.len()],
+        }
+    }
+
+    /// The results of all cases, in their order: those that are kept, and what `compute` makes of the others. A shard computes
+    /// its `own` alone.
     ///
     /// `settings` say all that a case's result depends on; threads are left out of them, for a result does not depend on
     /// their number. Cases that another process is at work on are waited for, last of all. `shared` is called on a result
-    /// during whose making another case was under way.
+    /// during whose making another case was under way, or, in a shard, another thread wanted its cores.
     pub(crate) fn all<T: Serialize + DeserializeOwned + Send>(
         &self,
         settings: &[Value],
+        own: &[bool],
         order: Order,
         shared: impl Fn(&mut T) + Sync,
         compute: impl Fn(usize) -> Result<T> + Sync,
-    ) -> Result<Vec<T>> {
+    ) -> Result<Found<T>> {
         let mut results: Vec<Option<T>> = settings.iter().map(|_| None).collect();
+        let work = |index: usize| self.one(&settings[index], order, &shared, || compute(index));
         loop {
-            let open: Vec<usize> =
-                (0..settings.len()).filter(|index| results[*index].is_none()).collect();
+            let open: Vec<usize> = (0..settings.len())
+                .filter(|&index| own[index] && results[index].is_none())
+                .collect();
             if open.is_empty() {
                 break;
             }
-            let work = |index: usize| self.one(&settings[index], &shared, || compute(index));
             let found = match order {
                 Order::OneByOne => open.iter().map(|&index| work(index)).collect(),
                 Order::AtOnce => at_once(&open, work),
@@ -81,48 +163,115 @@ impl Keep {
             }
         }
         self.tell_damage();
-        Ok(results.into_iter().flatten().collect())
+        Ok(match self.part(settings, own) {
+            None => Found::All(results.into_iter().flatten().collect()),
+            Some(part) => Found::Part(part),
+        })
+    }
+
+    /// What this process, if it is a shard, has of a study, when its `own` cases are finished.
+    pub(crate) fn part(&self, settings: &[Value], own: &[bool]) -> Option<Part> {
+        let Some(Place { store: Store::Shard { shard, name }, .. }) = &self.0 else { return None };
+        let is_known =
+            |settings: &&Value| self.key(settings).is_some_and(|key| shard.value(&key).is_some());
+        let known = settings.iter().filter(is_known).count();
+        let own = own.iter().filter(|own| **own).count();
+        Some(Part { name: *name, own, known, all: settings.len() })
+    }
+
+    /// What a case is known by.
+    fn key(&self, settings: &Value) -> Option<Value> {
+        let Place { common, .. } = self.0.as_ref()?;
+        Some(json!({ "settings": decisive(settings), "from": common }))
     }
 
     /// The result of one case; `None` while another process is at work on it.
     fn one<T: Serialize + DeserializeOwned>(
         &self,
         settings: &Value,
+        order: Order,
         shared: impl Fn(&mut T),
         compute: impl FnOnce() -> Result<T>,
     ) -> Result<Option<T>> {
-        let Some(Place { ledger, common }) = &self.0 else { return compute().map(Some) };
-        let key = json!({ "settings": decisive(settings), "from": common });
-        match ledger.claim(&key).context("--out")? {
-            Claim::Taken => Ok(None),
-            Claim::Done(value) => {
-                let result = serde_json::from_value(value);
-                result.map(Some).context("--out: a kept case is not of the form that is expected")
-            }
-            Claim::Mine(case) => {
+        let (Some(Place { store, .. }), Some(key)) = (&self.0, self.key(settings)) else {
+            return compute().map(Some);
+        };
+        let read = |value: Value| {
+            let result = serde_json::from_value(value);
+            result.map(Some).context("--out: a kept case is not of the form that is expected")
+        };
+        let form = |result: &T| serde_json::to_value(result).context("cannot form JSON");
+        match store {
+            Store::Ledger(ledger) => match ledger.claim(&key).context("--out")? {
+                Claim::Taken => Ok(None),
+                Claim::Done(value) => read(value),
+                Claim::Mine(case) => {
+                    let mut result = compute()?;
+                    if !case.alone().context("--out")? {
+                        shared(&mut result);
+                    }
+                    case.finish(&form(&result)?).context("--out")?;
+                    Ok(Some(result))
+                }
+            },
+            Store::Shard { shard, .. } => {
+                if let Some(value) = shard.value(&key) {
+                    return read(value);
+                }
+                let (started, before) = (Instant::now(), machine::waited_for_cores());
                 let mut result = compute()?;
-                if !case.alone().context("--out")? {
+                let waited = before
+                    .zip(machine::waited_for_cores())
+                    .map(|(before, after)| after.saturating_sub(before));
+                let is_alone = order == Order::OneByOne
+                    && waited.is_some_and(|waited| {
+                        waited.as_secs_f64() <= MOST_WAITING * started.elapsed().as_secs_f64()
+                    });
+                if !is_alone {
                     shared(&mut result);
                 }
-                let value = serde_json::to_value(&result).context("cannot form JSON")?;
-                case.finish(&value).context("--out")?;
+                shard.finish(&key, &form(&result)?).context("--out")?;
                 Ok(Some(result))
             }
         }
     }
 
     fn tell_damage(&self) {
-        let Some(Place { ledger, .. }) = &self.0 else { return };
-        for damage in ledger.take_damaged() {
+        let damaged = match &self.0 {
+            None => return,
+            Some(Place { store: Store::Ledger(ledger), .. }) => ledger.take_damaged(),
+            Some(Place { store: Store::Shard { shard, .. }, .. }) => shard.take_damaged(),
+        };
+        for damage in damaged {
+            let aside =
+                damage.moved_to.map(|file| format!("it is set aside in {}", file.display()));
             terminal::warn(format_args!(
-                "{}, line {}: {}; it is set aside in {}, and its case is computed again",
+                "{}, line {}: {}; {}, and its case is computed again",
                 damage.file.display(),
                 damage.line,
                 damage.problem,
-                ledger.damaged_file().display()
+                aside.as_deref().unwrap_or("it is passed over")
             ));
         }
     }
+}
+
+/// A folder's refusal in the words of the command line.
+fn refused(error: LedgerError, folder: &Path, solution: &str) -> anyhow::Error {
+    let LedgerError::OtherOrigin { path, found, expected } = error else { return error.into() };
+    let by = if found["build"] == expected["build"] {
+        format!("for another text of the specification than {solution} has now")
+    } else {
+        format!(
+            "by another build of mms ({}) than this one ({BUILD})",
+            found["build"].as_str().unwrap_or("unknown")
+        )
+    };
+    anyhow::anyhow!(
+        "{} was written {by}: name another folder, as in --out {}-2, for all shards",
+        path.display(),
+        folder.display()
+    )
 }
 
 /// The settings that results depend on: all but the number of threads.

@@ -130,6 +130,7 @@ fn perform(arguments: &Arguments, given: &[OsString]) -> anyhow::Result<bool> {
         Command::Resume(options) => commands::resume(options),
         Command::Converge(options) => commands::converge(options),
         Command::Stability(options) => commands::stability(options),
+        Command::Batch(options) => commands::batch(options),
         Command::Score(options) => commands::score(options),
         Command::Tradeoff(options) => commands::tradeoff(options),
         Command::Reproduce(options) => commands::reproduce(options),

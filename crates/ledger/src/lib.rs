@@ -8,6 +8,9 @@
 //! - `damaged.jsonl`: lines of `cases.jsonl` that could not be trusted. They are set aside when they are met: blanked
 //!   where they stood, so that no other line moves, and their cases are free to be computed again.
 //! - `claims/`: a lock file for each case under way, and `lock`, which orders the processes.
+//! - `cases-I-of-N.jsonl`: the cases of a [`Shard`], in the same form. One process at a time appends to it, and takes no locks, so
+//!   that the folder may lie on a file system of many machines. Its lines are read when a ledger or a shard is opened. Damaged
+//!   ones are told and stay.
 //!
 //! A process that is killed loses the cases that it had claimed and not finished, and no others: its locks vanish with
 //! it, and a line that it had not written whole is set aside. Lines are handed to the system one by one and not forced
@@ -18,7 +21,7 @@
 //! use serde_json::json;
 //!
 //! # let folder = tempfile::tempdir()?;
-//! let ledger = Ledger::open(folder.path())?;
+//! let ledger = Ledger::open(folder.path(), &json!("this build"))?;
 //! let key = json!({ "cells": 32, "cfl": 0.4 });
 //! match ledger.claim(&key)? {
 //!     Claim::Done(value) => println!("known already: {value}"),
@@ -30,6 +33,7 @@
 //! ```
 
 mod line;
+mod shard;
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -42,6 +46,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 pub use line::canonical;
+pub use shard::{Shard, ShardName};
 
 /// The finished cases of a study.
 pub struct Ledger {
@@ -59,6 +64,8 @@ struct State {
     line: usize,
     /// Values by the text of their keys.
     values: HashMap<String, Value>,
+    /// The same of the shards' files.
+    shards: HashMap<String, Value>,
     damaged: Vec<Damage>,
 }
 
@@ -71,6 +78,8 @@ pub struct Damage {
     pub line: usize,
     /// What is wrong with it.
     pub problem: &'static str,
+    /// The file that it was moved to; none where it stays, as in the file of a shard.
+    pub moved_to: Option<PathBuf>,
 }
 
 /// What a case is to the process that asks for it.
@@ -96,16 +105,29 @@ pub struct Case<'a> {
 }
 
 /// Why a ledger could not be read or written.
-// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Debug, Error)]
-#[error("cannot {action} {}: {cause}", path.display())]
-pub struct LedgerError {
-    /// What was tried.
-    pub action: &'static str,
-    /// The file or folder.
-    pub path: PathBuf,
-    /// Why it failed.
-    pub cause: io::Error,
+pub enum LedgerError {
+    /// The system refused a file or folder.
+    // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
+    #[error("cannot {action} {}: {cause}", path.display())]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// Why it failed.
+        cause: io::Error,
+    },
+    /// The cases of a shard are of another origin: their results may be others.
+    #[error("{} has cases of another origin: {found}, not {expected}", path.display())]
+    OtherOrigin {
+        /// The file.
+        path: PathBuf,
+        /// The origin that it states.
+        found: Value,
+        /// The origin that was asked for.
+        expected: Value,
+    },
 }
 
 const CASES: &str = "cases.jsonl";
@@ -114,12 +136,13 @@ const LOCK: &str = "lock";
 const CLAIMS: &str = "claims";
 
 impl Ledger {
-    /// Opens the ledger in `folder`, which is made where there is none, and sets damaged lines aside.
+    /// Opens the ledger in `folder`, which is made where there is none, sets damaged lines aside, and takes in the cases of its
+    /// shards. Those have to be of `origin`, which says what results depend on beside their keys.
     ///
     /// # Errors
     ///
-    /// Where the folder or its files cannot be read or written.
-    pub fn open(folder: &Path) -> Result<Self, LedgerError> {
+    /// Where the folder or its files cannot be read or written, and where a shard is of another origin.
+    pub fn open(folder: &Path, origin: &Value) -> Result<Self, LedgerError> {
         let claims = folder.join(CLAIMS);
         fs::create_dir_all(&claims).map_err(error("make the folder", &claims))?;
         let open = |name: &str| {
@@ -133,10 +156,16 @@ impl Ledger {
             offset: 0,
             line: 1,
             values: HashMap::new(),
+            shards: HashMap::new(),
             damaged: Vec::new(),
         };
         let ledger = Self { folder: folder.to_owned(), state: Mutex::new(state) };
-        ledger.with_lock(|_| Ok(()))?;
+        let shards = shard::read_all(folder, origin)?;
+        ledger.with_lock(|state| {
+            state.damaged.extend(shards.damaged);
+            state.shards = shards.values;
+            Ok(())
+        })?;
         Ok(ledger)
     }
 
@@ -151,7 +180,7 @@ impl Ledger {
         let key = canonical(key);
         let path = self.folder.join(CLAIMS).join(format!("{}.lock", line::sum(key.as_bytes())));
         self.with_lock(|state| {
-            if let Some(value) = state.values.get(&key) {
+            if let Some(value) = state.values.get(&key).or_else(|| state.shards.get(&key)) {
                 return Ok(Claim::Done(value.clone()));
             }
             let alone = self.nobody_at_work(None)?;
@@ -161,7 +190,7 @@ impl Ledger {
         })
     }
 
-    /// The number of finished cases, those of other processes included.
+    /// The number of finished cases, those of other processes included and those of shards left out.
     ///
     /// # Errors
     ///
@@ -177,8 +206,7 @@ impl Ledger {
     }
 
     /// The file that damaged lines are moved to.
-    #[must_use]
-    pub fn damaged_file(&self) -> PathBuf {
+    fn damaged_file(&self) -> PathBuf {
         self.folder.join(DAMAGED)
     }
 
@@ -237,7 +265,9 @@ impl Ledger {
                     state.values.entry(key).or_insert(value);
                 }
                 Err(problem) => {
-                    bad.push((Damage { file: path.clone(), line: number, problem }, start..end));
+                    let moved_to = Some(self.damaged_file());
+                    let damage = Damage { file: path.clone(), line: number, problem, moved_to };
+                    bad.push((damage, start..end));
                 }
             }
             start = end + 1;
@@ -382,5 +412,5 @@ fn try_lock(path: &Path) -> Result<Option<File>, LedgerError> {
 }
 
 fn error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> LedgerError + 'a {
-    move |cause| LedgerError { action, path: path.to_owned(), cause }
+    move |cause| LedgerError::System { action, path: path.to_owned(), cause }
 }

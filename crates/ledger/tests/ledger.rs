@@ -30,7 +30,7 @@ fn value(case: u64) -> Value {
 
 /// Finishes what it can of the study, calling `then` with each case that it finished itself.
 fn work(folder: &Path, mut then: impl FnMut(u64)) {
-    let ledger = Ledger::open(folder).unwrap();
+    let ledger = Ledger::open(folder, &Value::Null).unwrap();
     for case in 0..CASES {
         if let Claim::Mine(mine) = ledger.claim(&key(case)).unwrap() {
             mine.finish(&value(case)).unwrap();
@@ -111,7 +111,7 @@ fn lines(folder: &Path) -> Vec<Value> {
 }
 
 fn assert_complete(folder: &Path) {
-    let ledger = Ledger::open(folder).unwrap();
+    let ledger = Ledger::open(folder, &Value::Null).unwrap();
     assert_eq!(ledger.take_damaged(), []);
     for case in 0..CASES {
         assert!(matches!(ledger.claim(&key(case)).unwrap(), Claim::Done(v) if v == value(case)));
@@ -138,7 +138,7 @@ fn killed_at_thirty_moments_it_loses_no_finished_case_and_doubles_none() {
         working.child.kill().unwrap();
         working.child.wait().unwrap();
         finished.extend(working.rest());
-        let ledger = Ledger::open(place.path()).unwrap();
+        let ledger = Ledger::open(place.path(), &Value::Null).unwrap();
         for &case in &finished {
             let claim = ledger.claim(&key(case)).unwrap();
             assert!(matches!(claim, Claim::Done(v) if v == value(case)), "case {case} is lost");
@@ -181,7 +181,7 @@ fn processes_side_by_side_share_the_cases() {
 #[test]
 fn a_case_is_taken_while_another_is_at_it_and_free_when_that_one_is_gone() {
     let place = tempfile::tempdir().unwrap();
-    let [one, other] = [(); 2].map(|()| Ledger::open(place.path()).unwrap());
+    let [one, other] = [(); 2].map(|()| Ledger::open(place.path(), &Value::Null).unwrap());
     let Claim::Mine(mine) = one.claim(&key(1)).unwrap() else { panic!("it is free") };
     assert!(matches!(other.claim(&key(1)).unwrap(), Claim::Taken));
     assert!(matches!(one.claim(&key(1)).unwrap(), Claim::Taken), "nor twice in one process");
@@ -197,7 +197,7 @@ fn a_case_is_taken_while_another_is_at_it_and_free_when_that_one_is_gone() {
 #[test]
 fn a_case_is_alone_unless_another_was_under_way() {
     let place = tempfile::tempdir().unwrap();
-    let [one, other] = [(); 2].map(|()| Ledger::open(place.path()).unwrap());
+    let [one, other] = [(); 2].map(|()| Ledger::open(place.path(), &Value::Null).unwrap());
     let mine = |ledger: &'static str, claim| match claim {
         Claim::Mine(case) => case,
         _ => panic!("{ledger}: not free"),
@@ -233,7 +233,7 @@ fn damaged_lines_are_named_set_aside_and_free_again() {
     bytes.extend_from_slice(b"\n{\"sha256\":\"0011");
     fs::write(&file, bytes).unwrap();
 
-    let ledger = Ledger::open(place.path()).unwrap();
+    let ledger = Ledger::open(place.path(), &Value::Null).unwrap();
     let damaged = ledger.take_damaged();
     let numbers: Vec<_> = damaged.iter().map(|damage| damage.line).collect();
     assert_eq!(numbers, [11, 21, 31, 41, 51, 402]);
@@ -241,7 +241,7 @@ fn damaged_lines_are_named_set_aside_and_free_again() {
     assert!(damaged[0].problem.contains("checksum does not fit"), "{damaged:?}");
     assert!(damaged[1].problem.contains("does not start with a checksum"), "{damaged:?}");
     assert!(damaged[5].problem.contains("cut short"), "{damaged:?}");
-    let aside = fs::read_to_string(ledger.damaged_file()).unwrap();
+    let aside = fs::read_to_string(place.path().join("damaged.jsonl")).unwrap();
     assert_eq!(aside.lines().count(), 6);
     let kept: Value = serde_json::from_str(aside.lines().nth(1).unwrap()).unwrap();
     assert_eq!(kept["line"], 21);
@@ -253,17 +253,17 @@ fn damaged_lines_are_named_set_aside_and_free_again() {
         assert_eq!(free, [10, 20, 30, 40, 50].contains(&case), "case {case}");
     }
     // Each is set aside once, and what is computed anew is kept.
-    assert_eq!(Ledger::open(place.path()).unwrap().take_damaged(), []);
+    assert_eq!(Ledger::open(place.path(), &Value::Null).unwrap().take_damaged(), []);
     work(place.path(), |_| {});
     fs::write(&file, fs::read_to_string(&file).unwrap().replacen(&"x".repeat(300), "y", 1))
         .unwrap();
-    assert_eq!(Ledger::open(place.path()).unwrap().take_damaged().len(), 1);
+    assert_eq!(Ledger::open(place.path(), &Value::Null).unwrap().take_damaged().len(), 1);
 }
 
 #[test]
 fn a_line_cut_short_by_another_process_is_met_before_the_next_is_written() {
     let place = tempfile::tempdir().unwrap();
-    let ledger = Ledger::open(place.path()).unwrap();
+    let ledger = Ledger::open(place.path(), &Value::Null).unwrap();
     let Claim::Mine(mine) = ledger.claim(&key(0)).unwrap() else { panic!("it is free") };
     let file = place.path().join("cases.jsonl");
     let append = |text: &[u8]| {
@@ -276,7 +276,7 @@ fn a_line_cut_short_by_another_process_is_met_before_the_next_is_written() {
     assert_eq!(damaged.len(), 1);
     assert_eq!(damaged[0].line, 1);
     assert_eq!(lines(place.path()), [key(0)]);
-    let again = Ledger::open(place.path()).unwrap();
+    let again = Ledger::open(place.path(), &Value::Null).unwrap();
     assert!(again.take_damaged().is_empty() && again.finished().unwrap() == 1);
 }
 
@@ -285,7 +285,7 @@ fn a_line_cut_short_by_another_process_is_met_before_the_next_is_written() {
 #[ignore = "is started by the other test, in a process of its own"]
 fn child_on_a_full_disk() {
     let Some(folder) = std::env::var_os(FOLDER) else { return };
-    let ledger = Ledger::open(Path::new(&folder)).unwrap();
+    let ledger = Ledger::open(Path::new(&folder), &Value::Null).unwrap();
     let finish = |case: u64, value: &Value| {
         let Claim::Mine(mine) = ledger.claim(&key(case)).unwrap() else { panic!("it is free") };
         mine.finish(value)
@@ -313,7 +313,7 @@ fn a_full_disk_costs_the_case_that_met_it_and_no_other() {
         .unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && said.contains("1 passed"), "{said}");
-    let ledger = Ledger::open(place.path()).unwrap();
+    let ledger = Ledger::open(place.path(), &Value::Null).unwrap();
     assert_eq!(ledger.take_damaged(), []);
     assert_eq!(lines(place.path()), [key(0), key(1)]);
 }
@@ -323,6 +323,6 @@ fn a_folder_that_cannot_be_is_named() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("file");
     fs::write(&file, "mine").unwrap();
-    let message = Ledger::open(&file).unwrap_err().to_string();
+    let message = Ledger::open(&file, &Value::Null).unwrap_err().to_string();
     assert!(message.contains("cannot make the folder") && message.contains("file"), "{message}");
 }

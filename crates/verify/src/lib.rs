@@ -89,7 +89,7 @@ pub use total::POLAR_ANGLES;
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
-    differences, extrapolate, families, leading, median, pareto, tradeoff,
+    differences, extrapolate, families, leading, list, listed, median, pareto, tradeoff,
 };
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,

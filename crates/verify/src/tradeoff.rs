@@ -8,6 +8,8 @@
 //! while that is cheap. A ladder ends where that holds for all its grids that the budget can pay for, where its error no longer falls, or
 //! where a run stops. From a ladder's third grid on, half and twice its CFL number are tried as well, as long as that gains.
 //!
+//! A stated list of settings is measured as it stands, with [`listed`].
+//!
 //! Nothing here knows a clock or a solver: both are given, so that tests can state them.
 
 use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
@@ -162,7 +164,8 @@ pub struct Cheapest {
     pub tolerance: f64,
     /// The entry, if any meets it.
     pub entry: Option<usize>,
-    /// Whether the neighbouring cell counts were run and meet it too; otherwise there was no time for that.
+    /// Whether the neighbouring cell counts were run and meet it too; otherwise there was no time for that, or they are not in
+    /// the list.
     pub neighbours_hold: bool,
 }
 
@@ -560,6 +563,7 @@ struct Sweep<'a, E> {
     goal: Goal<'a>,
     families: Vec<Family>,
     ladders: Vec<Ladder>,
+    cases: Cases,
     found: Tradeoff,
 }
 
@@ -574,38 +578,105 @@ pub fn tradeoff<E>(
     machine: &Machine<'_, E>,
     progress: &mut dyn FnMut(&Setting),
 ) -> Result<Tradeoff, E> {
-    let at =
-        |setting: &Setting, cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
-    let known = |setting: &Setting| Family {
-        setting: *setting,
-        plans: LADDER.iter().map(|&cells| (machine.plan)(&at(setting, cells))).collect(),
-        cost: CostModel::default(),
-    };
-    let ladder = |(family, setting): (usize, &Setting)| Ladder {
-        family,
-        cfl: setting.case.cfl,
-        next: 0,
-        known: Vec::new(),
-        parent: None,
-        halvings: 0,
-        open: true,
-    };
-    let mut sweep = Sweep {
-        machine,
-        goal: *goal,
-        families: families.iter().map(known).collect(),
-        ladders: families.iter().enumerate().map(ladder).collect(),
-        found: Tradeoff { families: families.len(), ..Tradeoff::default() },
-    };
+    let mut sweep = Sweep::new(families, goal, machine, Cases::Chosen);
     sweep.climb(progress)?;
     sweep.compare_settings(progress)?;
     sweep.name_cheapest(progress)?;
     sweep.fill(progress)?;
-    sweep.found.for_tolerance = sweep.prove(sweep.cheapest_for_tolerance(), progress)?;
-    sweep.found.for_time = sweep.prove(sweep.best_in_time(), progress)?;
-    sweep.found.front = sweep.front();
-    sweep.found.effects = sweep.effects();
-    Ok(sweep.found)
+    sweep.conclude(progress)
+}
+
+/// Measures each of `families` at each of `cases`, the pairs of cell count and CFL number, and says what is worth its cost.
+/// Budgets count for nothing, and what does not fit the solution is left out.
+///
+/// # Errors
+///
+/// As [`tradeoff`].
+pub fn listed<E>(
+    families: &[Setting],
+    cases: &[(usize, f64)],
+    goal: &Goal<'_>,
+    machine: &Machine<'_, E>,
+    progress: &mut dyn FnMut(&Setting),
+) -> Result<Tradeoff, E> {
+    let goal = Goal { budget_s: f64::INFINITY, ..*goal };
+    let mut sweep = Sweep::new(families, &goal, machine, Cases::Listed);
+    for (family, setting) in list(families, cases, machine.plan) {
+        if sweep.run(family, &setting, progress)?.is_none() {
+            sweep.skip(Skip::Refused, 1);
+        }
+    }
+    sweep.name_cheapest(progress)?;
+    sweep.conclude(progress)
+}
+
+/// The settings of [`listed`] that fit the solution, each with the index of its family.
+pub fn list(
+    families: &[Setting],
+    cases: &[(usize, f64)],
+    plan: &dyn Fn(&Setting) -> Option<Plan>,
+) -> Vec<(usize, Setting)> {
+    let at = |family: &Setting, &(cells, cfl): &(usize, f64)| Setting {
+        case: Case { cells, cfl, ..family.case },
+        ..*family
+    };
+    let all = families
+        .iter()
+        .enumerate()
+        .flat_map(|(index, family)| cases.iter().map(move |case| (index, at(family, case))));
+    all.filter(|(_, setting)| plan(setting).is_some()).collect()
+}
+
+/// Where cases come from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cases {
+    /// One follows from another, as long as the budget lasts.
+    Chosen,
+    /// They are stated, and may have been run elsewhere.
+    Listed,
+}
+
+impl<'a, E> Sweep<'a, E> {
+    fn new(
+        families: &[Setting],
+        goal: &Goal<'a>,
+        machine: &'a Machine<'a, E>,
+        cases: Cases,
+    ) -> Self {
+        let at =
+            |setting: &Setting, cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
+        let known = |setting: &Setting| Family {
+            setting: *setting,
+            plans: LADDER.iter().map(|&cells| (machine.plan)(&at(setting, cells))).collect(),
+            cost: CostModel::default(),
+        };
+        let ladder = |(family, setting): (usize, &Setting)| Ladder {
+            family,
+            cfl: setting.case.cfl,
+            next: 0,
+            known: Vec::new(),
+            parent: None,
+            halvings: 0,
+            open: true,
+        };
+        Self {
+            machine,
+            goal: *goal,
+            families: families.iter().map(known).collect(),
+            ladders: families.iter().enumerate().map(ladder).collect(),
+            cases,
+            found: Tradeoff { families: families.len(), ..Tradeoff::default() },
+        }
+    }
+
+    /// What follows from all that was run.
+    fn conclude(mut self, progress: &mut dyn FnMut(&Setting)) -> Result<Tradeoff, E> {
+        self.found.for_tolerance = self.prove(self.cheapest_for_tolerance(), progress)?;
+        self.found.for_time = self.prove(self.best_in_time(), progress)?;
+        self.found.front = self.front();
+        self.found.effects = self.effects();
+        Ok(self.found)
+    }
 }
 
 impl<E> Sweep<'_, E> {
@@ -834,7 +905,9 @@ impl<E> Sweep<'_, E> {
         }
         let bytes = (self.machine.plan)(setting).map_or(0.0, |plan| plan.bytes);
         let (walls, cpus) = (vec![row.wall_s], vec![row.cpu_s]);
-        let is_short = row.status == Status::Ok && row.wall_s < SHORT_S;
+        // Another machine's times are no repeats.
+        let is_short =
+            row.status == Status::Ok && row.wall_s < SHORT_S && self.cases == Cases::Chosen;
         self.found.entries.push(Entry { setting: *setting, row, walls, cpus, total_s, bytes });
         let entry = self.found.entries.len() - 1;
         while is_short && self.found.entries[entry].walls.len() < TIMINGS && self.left(3) > 0.0 {
@@ -935,7 +1008,8 @@ impl<E> Sweep<'_, E> {
         Ok(())
     }
 
-    /// Whether the next coarser and the next finer grid meet the tolerance as well; `None` if there was no time.
+    /// Whether the next coarser and the next finer grid meet the tolerance as well; `None` if there was no time, or if they are
+    /// not in the list.
     fn neighbours_hold(
         &mut self,
         entry: usize,
@@ -950,7 +1024,14 @@ impl<E> Sweep<'_, E> {
         }) else {
             return Ok(None);
         };
-        for neighbour in neighbours(&setting, self.machine.plan) {
+        let all = match self.cases {
+            Cases::Chosen => neighbours(&setting, self.machine.plan),
+            Cases::Listed => match self.listed_neighbours(&setting) {
+                Some(both) => both.to_vec(),
+                None => return Ok(None),
+            },
+        };
+        for neighbour in all {
             let known = self.found.entries.iter().any(|e| e.setting == neighbour);
             if !known {
                 let plan = (self.machine.plan)(&neighbour);
@@ -967,6 +1048,20 @@ impl<E> Sweep<'_, E> {
             }
         }
         Ok(Some(true))
+    }
+
+    /// The setting on the next coarser and the next finer grid of the list; none where one is missing.
+    fn listed_neighbours(&self, setting: &Setting) -> Option<[Setting; 2]> {
+        let cells = setting.case.cells;
+        let others = || {
+            self.found.entries.iter().map(|entry| entry.setting).filter(|other| {
+                Setting { case: Case { cells, ..other.case }, ..*other } == *setting
+            })
+        };
+        let coarser = others().filter(|other| other.case.cells < cells);
+        let finer = others().filter(|other| other.case.cells > cells);
+        let by_cells = |other: &Setting| other.case.cells;
+        Some([coarser.max_by_key(by_cells)?, finer.min_by_key(by_cells)?])
     }
 
     fn cheapest_for_tolerance(&self) -> Option<usize> {

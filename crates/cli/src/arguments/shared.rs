@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser};
+use mmsmith_ledger::ShardName;
 
-use super::values::assignment;
+use super::values::{assignment, shard};
 
 /// Where finished cases are kept.
 #[derive(Args)]
@@ -13,6 +14,10 @@ pub(crate) struct KeepOptions {
     /// stopped, and several processes may share one
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Compute those cases alone that fall to shard I of N, by predicted cost, and write no table: the shards of a study run on as
+    /// many machines, in any order, and the same command without this option prints the table. mms batch writes the script
+    #[arg(long, value_name = "I/N", requires = "out", value_parser = shard)]
+    pub(crate) shard: Option<ShardName>,
 }
 
 /// Values for parameters of a solution.

@@ -7,7 +7,7 @@ use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::{KeepOptions, ParameterOptions, parsed};
-use super::values::{positive_number, seconds, thread_count};
+use super::values::{positive_count, positive_number, seconds, thread_count};
 
 #[derive(Args)]
 pub(crate) struct TradeoffOptions {
@@ -17,6 +17,13 @@ pub(crate) struct TradeoffOptions {
     /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better
     #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
     pub(crate) budget: f64,
+    /// Run every scheme that fits on these cell counts, whatever that takes, in place of a sweep within a budget; cases so stated
+    /// can be shared out with --shard
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "budget")]
+    pub(crate) cells: Vec<usize>,
+    /// CFL numbers for --cells
+    #[arg(long, value_name = "X,...", value_delimiter = ',', default_value = "0.4", allow_negative_numbers = true, value_parser = positive_number, requires = "cells")]
+    pub(crate) cfls: Vec<f64>,
     /// Name the cheapest setting with at most this error, and run it once more to confirm it; exit status 1 if there is none
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
@@ -110,6 +117,19 @@ choices!(
 );
 
 impl TradeoffOptions {
+    /// Cell count and CFL number of every case, where they are stated.
+    pub(crate) fn cases(&self) -> Option<Vec<(usize, f64)>> {
+        let pairs =
+            self.cells.iter().flat_map(|&cells| self.cfls.iter().map(move |&cfl| (cells, cfl)));
+        let mut cases: Vec<(usize, f64)> = Vec::new();
+        for case in pairs {
+            if !cases.contains(&case) {
+                cases.push(case);
+            }
+        }
+        (!cases.is_empty()).then_some(cases)
+    }
+
     /// What holds where nothing is said.
     pub(crate) fn usual(name: &str, budget: f64) -> Self {
         Self { budget, ..parsed(&[name]) }

@@ -1,5 +1,6 @@
 //! Values of options, read from text; every refusal says which values are right.
 
+use mmsmith_ledger::ShardName;
 use mmsmith_verify as verify;
 
 pub(super) fn positive_count(text: &str) -> Result<usize, String> {
@@ -21,6 +22,14 @@ pub(super) fn thread_count(text: &str) -> Result<usize, String> {
         .ok()
         .filter(|count| *count <= 1024)
         .ok_or_else(|| "it must be a whole number from 1 to 1024".into())
+}
+
+/// A shard of a study, as `3/8`.
+pub(super) fn shard(text: &str) -> Result<ShardName, String> {
+    let parts = text.trim().split_once('/').and_then(|(index, count)| {
+        Some(ShardName::new(index.parse().ok()?, thread_count(count).ok()?))
+    });
+    parts.flatten().ok_or_else(|| "it must be one shard of at most 1024, from 1/8 to 8/8".into())
 }
 
 pub(super) fn positive_number(text: &str) -> Result<f64, String> {

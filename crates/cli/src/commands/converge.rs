@@ -14,7 +14,7 @@ use super::scheme::Settled;
 use super::{Model, caption, settings, with_threads};
 use crate::arguments::{ConvergeOptions, SchemeOptions};
 use crate::json::Output;
-use crate::keep::{Keep, Order};
+use crate::keep::{Found, Keep, Order};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Curve, Plot};
@@ -38,7 +38,19 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let settled = &Settled::settle(&said, &model.exact)?;
     let base = Case { cells: options.cells[0], ..settled.case };
     let extent = model.admit(&sweep.cases(&base))?;
-    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    let keep = Keep::open(
+        &options.kept,
+        &options.name,
+        &[
+            ("--json", settled.json.is_some()),
+            ("--plot", options.plot.is_some()),
+            ("--csv", options.csv.is_some()),
+            ("--markdown", options.markdown.is_some()),
+            ("--latex", options.latex.is_some()),
+            ("--expect", options.expect.is_some()),
+            ("--tolerance", options.tolerance.is_some()),
+        ],
+    )?;
     let output = Output::prepare_if(settled.json.as_ref())?;
     let [plot, values, markdown, latex] =
         [&options.plot, &options.csv, &options.markdown, &options.latex]
@@ -51,9 +63,52 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let predicted_s = expected.as_ref().map(|seconds| parts * seconds.iter().sum::<f64>());
         let whole = Bar::expecting("starting", predicted_s);
         let bar = whole.part(0.0, 1.0 / parts);
-        let study = study(&model, &base, &sweep, &keep, expected, &bar, |case| {
+        let work = work(&model, &sweep.cases(&base))?;
+        // Together the differences take each run once more, and one with half its step.
+        let differences_work = 3.0 * work.iter().sum::<f64>();
+        let own = match &sweep {
+            Sweep::Cells(_) => keep.own(&work),
+            Sweep::Cfls(_) => keep.own(&[work.as_slice(), &[differences_work]].concat()),
+        };
+        let (own, own_differences) = own.split_at(work.len());
+        let expected = expected.unwrap_or(work);
+        let records = rows(&model, &base, &sweep, (&keep, own), &expected, &bar, |case| {
             settings(&selection, settled, extent, case.cells, case.cfl)
         })?;
+        let differences = match &sweep {
+            Sweep::Cfls(cfls) => {
+                let mut what = settings(&selection, settled, extent, base.cells, cfls);
+                what["differences"] = true.into();
+                let found = keep.all(
+                    &[what],
+                    own_differences,
+                    Order::OneByOne,
+                    |_| {},
+                    |_| {
+                        let bar = whole.part(1.0 / parts, 1.0);
+                        differences(&model, &base, cfls, "difference", &bar)
+                            .map(|found| TemporalRecord::from(&found))
+                    },
+                )?;
+                Some(found)
+            }
+            Sweep::Cells(_) => None,
+        };
+        // It must not stand between the tables.
+        drop((bar, whole));
+        let (records, differences) = match (records, differences) {
+            (Found::All(records), Some(Found::All(found))) => (records, found.into_iter().next()),
+            (Found::All(records), _) => (records, None),
+            (Found::Part(rows), Some(Found::Part(found))) => {
+                terminal::say(&rows.and(&found).to_string())?;
+                return Ok(true);
+            }
+            (Found::Part(rows), _) => {
+                terminal::say(&rows.to_string())?;
+                return Ok(true);
+            }
+        };
+        let study = study(&model, &base, &sweep, records)?;
         // In time the expectation is about the differences; the total error is mostly a spatial one.
         let in_space = match (&sweep, asked) {
             (Sweep::Cells(_), Some(asked)) => asked,
@@ -65,31 +120,11 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let strict = options.expect.is_some() || options.tolerance.is_some();
         let settle = |judged: Verdicts| if strict { judged } else { unless_unjudged(judged) };
         let judged = settle(judge_above(&study, &sweep, &in_space, tolerance, &floors));
-        let differences = match &sweep {
-            Sweep::Cfls(cfls) => {
-                let mut what = settings(&selection, settled, extent, base.cells, cfls);
-                what["differences"] = true.into();
-                let found = keep.all(
-                    &[what],
-                    Order::OneByOne,
-                    |_| {},
-                    |_| {
-                        let bar = whole.part(1.0 / parts, 1.0);
-                        differences(&model, &base, cfls, "difference", &bar)
-                            .map(|found| TemporalRecord::from(&found))
-                    },
-                )?;
-                let Some(found) = found.into_iter().next().map(Temporal::from) else {
-                    bail!("no differences were measured");
-                };
-                let expected = asked.unwrap_or_else(|| expected_in_time(&base));
-                let judged = settle(judge_differences(&found, &expected, tolerance));
-                Some((found, judged))
-            }
-            Sweep::Cells(_) => None,
-        };
-        // It must not stand between the tables.
-        drop((bar, whole));
+        let differences = differences.map(Temporal::from).map(|found| {
+            let expected = asked.unwrap_or_else(|| expected_in_time(&base));
+            let judged = settle(judge_differences(&found, &expected, tolerance));
+            (found, judged)
+        });
 
         let caption = caption(&selection, settled, extent);
         let mut sections: Vec<(String, Table)> = Vec::new();
@@ -165,32 +200,31 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     })
 }
 
-/// The cases of a study, those that are kept and the others, and their orders.
-fn study(
+/// The work of each case, which is the same on every machine: particles times steps.
+pub(super) fn work(model: &Model, cases: &[Case]) -> Result<Vec<f64>> {
+    let work = |case| -> Result<f64> {
+        let plan = plan(&model.exact, model.arithmetic(), case)?;
+        Ok(plan.steps as f64 * plan.particles)
+    };
+    cases.iter().map(work).collect()
+}
+
+/// The rows of a study, those that are kept and the others. `keep` comes with which of them are this process's; `work` says how
+/// far the bar goes with each.
+fn rows(
     model: &Model,
     base: &Case,
     sweep: &Sweep,
-    keep: &Keep,
-    seconds: Option<Vec<f64>>,
+    (keep, own): (&Keep, &[bool]),
+    work: &[f64],
     bar: &Bar,
     settings: impl Fn(&Case) -> Value,
-) -> Result<Study> {
+) -> Result<Found<Record>> {
     let cases = sweep.cases(base);
-    // Without a prediction a particle's step is the unit of work.
-    let work = match seconds {
-        Some(seconds) => seconds,
-        None => {
-            let work = |case| -> Result<f64> {
-                let plan = plan(&model.exact, model.arithmetic(), case)?;
-                Ok(plan.steps as f64 * plan.particles)
-            };
-            cases.iter().map(work).collect::<Result<_>>()?
-        }
-    };
     let total: f64 = work.iter().sum();
     let keys: Vec<_> = cases.iter().map(settings).collect();
     let mark = |record: &mut Record| record.timed_alone = false;
-    let records = keep.all(&keys, Order::OneByOne, mark, |index| {
+    keep.all(&keys, own, Order::OneByOne, mark, |index| {
         let what = match &sweep {
             Sweep::Cells(cells) => format!("{} cells", cells[index]),
             Sweep::Cfls(cfls) => format!("CFL {}", cfls[index]),
@@ -203,7 +237,11 @@ fn study(
         let mut outputs = Outputs::new(&mut show);
         let row = run(&model.exact, model.arithmetic(), &cases[index], &mut outputs);
         Ok(Record::from(&row.map_err(|cause| StudyError { index, cause })?))
-    })?;
+    })
+}
+
+/// The study that rows make, with its orders.
+fn study(model: &Model, base: &Case, sweep: &Sweep, records: Vec<Record>) -> Result<Study> {
     let mut study = Study::new(records.into_iter().map(Row::from).collect(), sweep);
     // Rows that rounding may have caused have no order.
     let steps: Vec<f64> = study.rows.iter().map(|row| step(row, sweep)).collect();

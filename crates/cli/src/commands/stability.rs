@@ -12,11 +12,11 @@ use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::scheme::{Settled, USUAL_CFL};
-use super::{Model, caption, settings, with_threads};
+use super::{Model, caption, converge, settings, with_threads};
 use crate::arguments::{SchemeOptions, StabilityOptions};
 use crate::csv;
 use crate::json::Output;
-use crate::keep::{Keep, Order};
+use crate::keep::{Found, Keep, Order, Part};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Limits, Map};
@@ -65,6 +65,9 @@ impl Point {
 pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
+    if let (Some(_), Some(shard)) = (options.at, options.kept.shard) {
+        bail!("--at --shard {shard}: one run is one case; leave --shard out");
+    }
     if let Some(cfl) = options.at {
         return judge(options, cfl, &criteria);
     }
@@ -76,7 +79,13 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
         [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
     let (plot, values) = (plot?, values?);
     with_threads(options.scheme.threads, || {
-        let found = survey(options, &Bar::new("largest stable CFL number"))?;
+        let found = match survey(options, &Bar::new("largest stable CFL number"))? {
+            Surveyed::All(found) => found,
+            Surveyed::Part(part) => {
+                terminal::say(&part.to_string())?;
+                return Ok(true);
+            }
+        };
         terminal::say(&found.text())?;
         if let Some(output) = output {
             output.write(&found.document()?)?;
@@ -101,8 +110,14 @@ pub(super) struct Survey<'a> {
     rows: Vec<StabilityRow>,
 }
 
+/// The limits that were asked for, or a shard's part of them.
+pub(super) enum Surveyed<'a> {
+    All(Box<Survey<'a>>),
+    Part(Part),
+}
+
 /// Looks for the limits that were asked for.
-pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Survey<'a>> {
+pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Surveyed<'a>> {
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
@@ -115,12 +130,21 @@ pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Sur
     }
     let search = Search { lower, upper, width: options.width, criteria };
     points.iter().try_for_each(|point| search.validate(point.model.arithmetic()))?;
-    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
-    let rows = limits(&points, &search, &keep, bar)?;
+    let outputs = [
+        ("--json", options.scheme.json.is_some()),
+        ("--plot", options.plot.is_some()),
+        ("--csv", options.csv.is_some()),
+    ];
+    let keep = Keep::open(&options.kept, &options.name, &outputs)?;
+    let rows = match limits(&points, &search, &keep, bar)? {
+        Found::All(rows) => rows,
+        Found::Part(part) => return Ok(Surveyed::Part(part)),
+    };
     // What is varied may have no meaning without its values.
     let settled = settle(&options.scheme, &points[0].model);
     let settled = settled.unwrap_or_else(|_| points[0].settled.clone());
-    Ok(Survey { options, selection, settled, search, points, rows })
+    let found = Survey { options, selection, settled, search, points, rows };
+    Ok(Surveyed::All(Box::new(found)))
 }
 
 impl Survey<'_> {
@@ -207,16 +231,25 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
 }
 
 /// The limits of all points; the cases are independent, and go side by side where there are several.
-fn limits(points: &[Point], search: &Search, keep: &Keep, bar: &Bar) -> Result<Vec<StabilityRow>> {
+fn limits(
+    points: &[Point],
+    search: &Search,
+    keep: &Keep,
+    bar: &Bar,
+) -> Result<Found<StabilityRow>> {
     let keys: Vec<_> = points
         .iter()
         .map(|point| json!({ "case": point.settings(), "search": search }))
         .map(without_threads)
         .collect();
     let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
-    let shares = Shares::of(points.len());
+    let own = keep.own(&work(points)?);
+    let shares = Shares::of(own.iter().filter(|own| **own).count());
+    // Places among this process's own.
+    let place = |index: usize| own[..index].iter().filter(|own| **own).count();
     keep.all(
         &keys,
+        &own,
         order,
         |_| {},
         |index| {
@@ -226,14 +259,20 @@ fn limits(points: &[Point], search: &Search, keep: &Keep, bar: &Bar) -> Result<V
                 values => values.join(", "),
             };
             let mut show = |SearchProgress { run, share }: SearchProgress| {
-                bar.show_share(|| format!("{name}, run {run}"), shares.set(index, share));
+                bar.show_share(|| format!("{name}, run {run}"), shares.set(place(index), share));
             };
             let Point { model, settled, .. } = point;
             let row = find(&model.exact, model.arithmetic(), &settled.case, search, &mut show)?;
-            bar.show_share(|| name.clone(), shares.set(index, 1.0));
+            bar.show_share(|| name.clone(), shares.set(place(index), 1.0));
             Ok(row)
         },
     )
+}
+
+/// The work of a run of each point at one CFL number; searches take about as many runs.
+fn work(points: &[Point]) -> Result<Vec<f64>> {
+    let each = |Point { model, settled, .. }: &Point| converge::work(model, &[settled.case]);
+    Ok(points.iter().map(each).collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// How much of each case is done, where several are under way.

@@ -4,6 +4,7 @@ mod advice;
 mod time;
 mod words;
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
@@ -11,8 +12,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
     Arithmetic, Case, CaseError, Chosen, Effect, Entry, Field, Goal, MARGIN, Machine, Norm,
-    Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, plan,
-    run as simulate, time_steps, tradeoff as measure,
+    Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, list,
+    listed as listed_ones, plan, run as simulate, time_steps, tradeoff as measure,
 };
 use serde_json::{Value, json};
 
@@ -21,7 +22,7 @@ use super::Model;
 use crate::arguments::{Against, Precision, TradeoffOptions};
 use crate::csv;
 use crate::json::Output;
-use crate::keep::{Keep, Order};
+use crate::keep::{Found, Keep, Order, Part};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Front, Point};
@@ -106,6 +107,21 @@ impl Runner<'_> {
         self.pools.get(&setting.threads).context("no threads were started for this setting")
     }
 
+    /// What the case of a setting is known by.
+    fn key(&self, setting: &Setting) -> Value {
+        let mut key = words::document(setting);
+        // Times are part of this result, and so are the threads.
+        key["timed_with_threads"] = setting.threads.into();
+        key["tradeoff"] = json!({
+            "solution": self.selection.name(),
+            "parameters": self.selection.parameters(),
+            "cells": setting.case.cells,
+            "cfl": setting.case.cfl,
+            "periods": setting.case.periods,
+        });
+        key
+    }
+
     fn run(&self, setting: &Setting, most_s: f64) -> Result<Option<Row>> {
         let until = self.time.until(most_s);
         let compute = |_: usize| -> Result<Record> {
@@ -120,19 +136,10 @@ impl Runner<'_> {
             self.time.ran(setting, &mut row);
             Ok(Record::from(&row))
         };
-        let mut key = words::document(setting);
-        // Times are part of this result, and so are the threads.
-        key["timed_with_threads"] = setting.threads.into();
-        key["tradeoff"] = json!({
-            "solution": self.selection.name(),
-            "parameters": self.selection.parameters(),
-            "cells": setting.case.cells,
-            "cfl": setting.case.cfl,
-            "periods": setting.case.periods,
-        });
         let mark = |record: &mut Record| record.timed_alone = false;
-        match self.keep.all(&[key], Order::OneByOne, mark, compute) {
-            Ok(records) => Ok(records.into_iter().next().map(Row::from)),
+        match self.keep.all(&[self.key(setting)], &[true], Order::OneByOne, mark, compute) {
+            Ok(Found::All(records)) => Ok(records.into_iter().next().map(Row::from)),
+            Ok(Found::Part(_)) => Ok(None),
             Err(error) => match error.downcast::<CutShort>() {
                 Ok(CutShort(row)) => Ok(Some(row)),
                 // Such as a mass matrix that too few particles make singular.
@@ -164,7 +171,13 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
         .map(|path| Output::prepare_if(path.as_ref()));
     let [json, csv, plot, advice] = outputs;
     let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
-    let report = sweep(options, &Bar::new("planning"))?;
+    let report = match sweep(options, &Bar::new("planning"))? {
+        Swept::All(report) => report,
+        Swept::Part(part) => {
+            terminal::say(&part.to_string())?;
+            return Ok(true);
+        }
+    };
     terminal::say(&report.text())?;
     if let Some(file) = json {
         file.write(&report.document()?)?;
@@ -181,26 +194,47 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
     Ok(report.holds())
 }
 
+/// A report, or a shard's part of what it needs.
+pub(super) enum Swept<'a> {
+    All(Box<Report<'a>>),
+    Part(Part),
+}
+
 /// Measures what was asked for.
-pub(super) fn sweep<'a>(options: &'a TradeoffOptions, bar: &Bar) -> Result<Report<'a>> {
+pub(super) fn sweep<'a>(options: &'a TradeoffOptions, bar: &Bar) -> Result<Swept<'a>> {
     sweep_in(options, Time::Real(Instant::now()), bar)
 }
 
-fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<Report<'a>> {
+fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<Swept<'a>> {
+    let listed = options.cases();
+    if let (Some(shard), None) = (options.kept.shard, &listed) {
+        bail!(
+            "--shard {shard}: a sweep within a budget chooses its cases as it goes; state them, as in --cells 16,32,64 --shard {shard}"
+        );
+    }
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let exact = Model::new(&selection, Precision::F64)?;
     // What is interpreted has double precision only.
     let single = Model::new(&selection, Precision::F32).ok();
     let threads = options.threads.unwrap_or(1);
     let more = machine::cores().min(MOST_THREADS);
-    let more = (more > threads && options.threads.is_none()).then_some(more);
+    let is_compared = options.threads.is_none() && listed.is_none();
+    let more = (more > threads && is_compared).then_some(more);
     let pool = |threads: usize| -> Result<(usize, rayon::ThreadPool)> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         Ok((threads, pool.context("--threads: cannot start the threads")?))
     };
     // Some schemes use one thread, whatever is asked for.
     let pools = [1, threads].into_iter().chain(more).map(pool).collect::<Result<_>>()?;
-    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    let outputs = [
+        ("--json", options.json.is_some()),
+        ("--csv", options.csv.is_some()),
+        ("--plot", options.plot.is_some()),
+        ("--advice", options.advice.is_some()),
+        ("--tolerance", options.tolerance.is_some()),
+        ("--time", options.time.is_some()),
+    ];
+    let keep = Keep::open(&options.kept, &options.name, &outputs)?;
     let runner =
         Runner { exact: &exact, single: single.as_ref(), pools, time, keep, selection: &selection };
     let what =
@@ -228,13 +262,46 @@ fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<R
         repeat: &|setting: &Setting, most_s| runner.repeat(setting, most_s),
         clock: &|| runner.time.now(),
     };
-    let mut show = |setting: &Setting| {
-        let share = runner.time.now() / options.budget;
-        bar.show_share(|| words::line(setting), share.min(1.0));
+    let found = match &listed {
+        None => {
+            let mut show = |setting: &Setting| {
+                let share = runner.time.now() / options.budget;
+                bar.show_share(|| words::line(setting), share.min(1.0));
+            };
+            measure(&tried, &goal, &calls, &mut show)?
+        }
+        Some(cases) => {
+            let settings: Vec<Setting> =
+                list(&tried, cases, &what).into_iter().map(|(_, setting)| setting).collect();
+            let work = |setting: &Setting| {
+                what(setting).map_or(0.0, |plan| plan.steps as f64 * plan.particles)
+            };
+            let work: Vec<f64> = settings.iter().map(work).collect();
+            let own = runner.keep.own(&work);
+            let total: f64 =
+                work.iter().zip(&own).map(|(work, own)| if *own { *work } else { 0.0 }).sum();
+            let done = Cell::new(0.0);
+            // A setting is shown before it is run.
+            let mut show = |setting: &Setting| {
+                bar.show_share(|| words::line(setting), (done.get() / total).min(1.0));
+                let place = settings.iter().position(|known| known == setting);
+                done.set(done.get() + place.map_or(0.0, |place| work[place]));
+            };
+            if options.kept.shard.is_some() {
+                for (setting, _) in settings.iter().zip(&own).filter(|(_, own)| **own) {
+                    show(setting);
+                    runner.run(setting, f64::INFINITY)?;
+                }
+                let keys: Vec<Value> = settings.iter().map(|setting| runner.key(setting)).collect();
+                if let Some(part) = runner.keep.part(&keys, &own) {
+                    return Ok(Swept::Part(part));
+                }
+            }
+            listed_ones(&tried, cases, &goal, &calls, &mut show)?
+        }
     };
-    let found = measure(&tried, &goal, &calls, &mut show)?;
     let used_s = runner.time.now();
-    Ok(Report { options, selection, found, compared, threads, used_s })
+    Ok(Swept::All(Box::new(Report { options, selection, found, compared, threads, used_s })))
 }
 
 /// What was found, to be told.
@@ -360,16 +427,24 @@ impl Report<'_> {
     fn text(&self) -> String {
         let runs = self.found.entries.len();
         let mut text = format!(
-            "{} ({}), {} period(s), {} thread(s) for schemes that use several, where nothing else is said\n{}\n{runs} settings of {} schemes in {:.1} s of {} s\n",
+            "{} ({}), {} period(s), {} thread(s) for schemes that use several, where nothing else is said\n{}\n{runs} settings of {} schemes{}\n",
             self.selection.name(),
             self.selection.told_parameters(),
             self.options.periods,
             self.threads,
             self.definition(),
             self.found.families,
-            self.used_s,
-            self.options.budget,
+            match self.options.cells.is_empty() {
+                true => format!(" in {:.1} s of {} s", self.used_s, self.options.budget),
+                false => String::new(),
+            },
         );
+        let beside = self.found.entries.iter().filter(|entry| !entry.row.timed_alone).count();
+        if beside > 0 {
+            text += &format!(
+                "  {beside} of them shared their cores with other work: their times are too long\n"
+            );
+        }
         for (skip, count) in &self.found.skipped {
             text += &format!("  {count} left out: {}\n", reason(*skip));
         }
@@ -395,7 +470,10 @@ impl Report<'_> {
                     let entry = &self.found.entries[index];
                     let doubt = match named.neighbours_hold {
                         true => "",
-                        false => " (no time to try its neighbours)",
+                        false if self.options.cells.is_empty() => {
+                            " (no time to try its neighbours)"
+                        }
+                        false => " (not between two of the cell counts)",
                     };
                     format!(
                         "  {:e}: {:.2e} s, error {:.2e}: {}{doubt}\n",
@@ -595,7 +673,9 @@ impl Report<'_> {
                 "solution": self.selection.name(),
                 "parameters": self.selection.parameters(),
                 "periods": self.options.periods,
-                "budget_s": self.options.budget,
+                "budget_s": self.options.cells.is_empty().then_some(self.options.budget),
+                "cells": self.options.cells,
+                "cfls": if self.options.cells.is_empty() { &[][..] } else { &self.options.cfls },
                 "field": self.options.field,
                 "norm": self.options.norm,
                 "against": self.options.against,

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use super::PROBLEMS;
 use super::section::Section;
 use crate::arguments::TradeoffOptions;
-use crate::commands::tradeoff::sweep;
+use crate::commands::tradeoff::{Swept, sweep};
 use crate::json::Output;
 use crate::progress::Agenda;
 use crate::terminal;
@@ -27,7 +27,9 @@ pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Sectio
             ["tradeoff.json", "tradeoff.csv", "tradeoff.svg", "tradeoff.md"].map(file);
         let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
         let options = TradeoffOptions::usual(problem, budget);
-        let report = sweep(&options, &agenda.next(budget))?;
+        let Swept::All(report) = sweep(&options, &agenda.next(budget))? else {
+            bail!("the report needs the whole sweep, not a shard's part of it");
+        };
         let (svg, front) = (report.picture(), report.front());
         let said = format!("\n{problem}: the front of error against cost\n{}", front.text());
         agenda.aside(|| terminal::say(&said))?;

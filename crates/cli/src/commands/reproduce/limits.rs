@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use mmsmith_verify::Shape;
 
 use super::section::Section;
 use super::{CD, PROBLEMS, Pace};
 use crate::arguments::StabilityOptions;
 use crate::commands::scheme::usual;
-use crate::commands::stability::survey;
+use crate::commands::stability::{Surveyed, survey};
 use crate::json::Output;
 use crate::progress::Bar;
 
@@ -33,7 +33,9 @@ pub(super) fn section(out: &Path, bar: &Bar) -> Result<Section> {
     let (json, csv, plot) =
         (file("stability.json")?, file("stability.csv")?, file("stability.svg")?);
     let options = StabilityOptions::map(problem, CELLS, OVER);
-    let found = survey(&options, bar)?;
+    let Surveyed::All(found) = survey(&options, bar)? else {
+        bail!("the report needs the limits of all settings, not those of one shard");
+    };
     json.write(&found.document()?)?;
     csv.write_text(&found.sheet())?;
     let svg = found.picture();

@@ -8,12 +8,12 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
-use super::{Point, definition, told, without_threads};
+use super::{Point, definition, told, without_threads, work};
 use crate::arguments::{SchemeOptions, StabilityOptions, word};
 use crate::commands::scheme::Settled;
 use crate::commands::{caption, settings, with_threads};
 use crate::json::Output;
-use crate::keep::{Keep, Order};
+use crate::keep::{Found, Keep, Order};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::terminal;
@@ -32,7 +32,9 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
     let points: Vec<Point> = (0..options.samples)
         .map(|sample| draw(options, &settled.case, &selection, sample))
         .collect::<Result<_>>()?;
-    let keep = Keep::open(options.kept.out.as_ref(), &options.name)?;
+    let keep =
+        Keep::open(&options.kept, &options.name, &[("--json", options.scheme.json.is_some())])?;
+    let own = keep.own(&work(&points)?);
     let keys: Vec<_> = points
         .iter()
         .map(|Point { selection, settled, extent, .. }| {
@@ -42,11 +44,13 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
         })
         .collect();
     with_threads(settled.threads, || {
-        let found: Vec<Observed> = {
+        let found: Found<Observed> = {
             let bar = Bar::new("random settings");
             let done = AtomicUsize::new(0);
+            let count = own.iter().filter(|own| **own).count();
             keep.all(
                 &keys,
+                &own,
                 Order::AtOnce,
                 |_| {},
                 |index| {
@@ -54,11 +58,18 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
                     let case = &settled.case;
                     let found = is_stable(&model.exact, model.arithmetic(), case, criteria)?;
                     let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    let share = done as f64 / points.len() as f64;
-                    bar.show_share(|| format!("setting {done}/{}", points.len()), share);
+                    let share = done as f64 / count as f64;
+                    bar.show_share(|| format!("setting {done}/{count}"), share);
                     Ok(found)
                 },
             )?
+        };
+        let found = match found {
+            Found::All(found) => found,
+            Found::Part(part) => {
+                terminal::say(&part.to_string())?;
+                return Ok(true);
+            }
         };
         let extent = points.first().and_then(|point| point.extent);
         let mut text = settled.choice() + &caption(&selection, settled, extent);

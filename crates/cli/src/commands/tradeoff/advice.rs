@@ -77,7 +77,8 @@ impl Report<'_> {
             let entry = &entries[index];
             let proof = match named.neighbours_hold {
                 true => "its neighbouring cell counts meet it too",
-                false => "there was no time to try its neighbours",
+                false if self.options.cells.is_empty() => "there was no time to try its neighbours",
+                false => "it is not between two of the cell counts",
             };
             lines.push(format!(
                 "For an error of {:e} take {}: {:.2e} in {:.1e} s, and {proof}. `{}`",

@@ -47,7 +47,10 @@ impl Counted {
 
 fn sweep_of(options: &TradeoffOptions) -> Report<'_> {
     let bar = Bar::new("planning");
-    sweep_in(options, Time::Counted(Counted::default()), &bar).expect("a sweep")
+    match sweep_in(options, Time::Counted(Counted::default()), &bar).expect("a sweep") {
+        Swept::All(report) => *report,
+        Swept::Part(part) => panic!("{part}"),
+    }
 }
 
 /// All that a sweep promises beside its files, with a clock that no other work on the machine can hold up.

@@ -1,0 +1,28 @@
+//! Options of `mms batch`.
+
+use clap::{Args, ValueEnum};
+
+use super::values::thread_count;
+
+#[derive(Args)]
+pub(crate) struct BatchOptions {
+    /// The system that runs the job
+    #[arg(value_enum, value_name = "SYSTEM")]
+    pub(crate) system: BatchSystem,
+    /// Number of shards of a study
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = thread_count)]
+    pub(crate) shards: usize,
+    /// Cores of each task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = thread_count)]
+    pub(crate) cores: usize,
+    /// The command, after --: a study with --out DIR, or a run
+    #[arg(last = true, required = true, value_name = "COMMAND")]
+    pub(crate) command: Vec<String>,
+}
+
+/// Batch systems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BatchSystem {
+    /// Slurm, by sbatch
+    Slurm,
+}
