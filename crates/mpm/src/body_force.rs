@@ -5,8 +5,8 @@ use nalgebra::{RealField, SMatrix, SVector};
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T: Copy, const D: usize>: Sync {
     /// Writes into `b` the body force at the reference positions `X` and time `t`; both slices have the same length.
-    /// They belong to the particles `first`, `first + 1` and so on. Ids never change: values that depend on the reference
-    /// position alone may be kept from an earlier step.
+    /// They belong to the particles `first`, `first + 1` and so on. Values that depend on the reference position alone may be kept from
+    /// an earlier step, as long as the [arrangement](crate::Arrangement) is the same.
     ///
     /// Called from several threads, each with its own run of particles. The contents of `b` on entry are unspecified.
     fn evaluate(&self, first: usize, X: &[SVector<T, D>], t: T, b: &mut [SVector<T, D>]);

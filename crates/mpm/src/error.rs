@@ -81,6 +81,75 @@ pub enum StepError {
     },
 }
 
+impl StepError {
+    /// Numbers that say all of an error.
+    pub(crate) const NUMBERS: usize = 10;
+
+    /// The same of another particle.
+    pub(crate) fn about(mut self, id: usize) -> Self {
+        let (Self::Inverted { particle, .. }
+        | Self::NotFinite { particle, .. }
+        | Self::LeftGrid { particle, .. }
+        | Self::TooLarge { particle, .. }) = &mut self;
+        *particle = id;
+        self
+    }
+
+    /// The error as numbers, for another process.
+    pub(crate) fn to_numbers(&self) -> [f64; Self::NUMBERS] {
+        let mut numbers = [0.0; Self::NUMBERS];
+        let mut set = |kind: f64, (step, time, particle): (usize, f64, usize), rest: &[f64]| {
+            numbers[..4].copy_from_slice(&[kind, step as f64, time, particle as f64]);
+            numbers[4..4 + rest.len()].copy_from_slice(rest);
+        };
+        let place = |position: &[f64]| {
+            let mut place = [f64::NAN; 3];
+            place[..position.len()].copy_from_slice(position);
+            (position.len() as f64, place)
+        };
+        match self {
+            Self::Inverted { step, time, particle, J } => {
+                set(0.0, (*step, *time, *particle), &[*J])
+            }
+            Self::NotFinite { step, time, particle, position, J } => {
+                let (dimension, [x, y, z]) = place(position);
+                set(1.0, (*step, *time, *particle), &[*J, dimension, x, y, z]);
+            }
+            Self::LeftGrid { step, time, particle, position, axis, lower, upper } => {
+                let (dimension, [x, y, z]) = place(position);
+                let axis = *axis as f64 + 10.0 * dimension;
+                set(2.0, (*step, *time, *particle), &[axis, *lower, *upper, x, y, z]);
+            }
+            Self::TooLarge { step, time, particle, axis, half_size, limit } => {
+                set(3.0, (*step, *time, *particle), &[*axis as f64, *half_size, *limit]);
+            }
+        }
+        numbers
+    }
+
+    /// The error that these numbers say.
+    pub(crate) fn from_numbers(numbers: &[f64; Self::NUMBERS]) -> Self {
+        let [kind, step, time, particle, a, b, c, x, y, z] = *numbers;
+        let (step, particle) = (step as usize, particle as usize);
+        match kind as u8 {
+            0 => Self::Inverted { step, time, particle, J: a },
+            1 => {
+                let position = [c, x, y][..b as usize].to_vec();
+                Self::NotFinite { step, time, particle, position, J: a }
+            }
+            2 => {
+                let (dimension, axis) = (a as usize / 10, a as usize % 10);
+                let position = [x, y, z][..dimension].to_vec();
+                Self::LeftGrid { step, time, particle, position, axis, lower: b, upper: c }
+            }
+            _ => {
+                let axis = a as usize;
+                Self::TooLarge { step, time, particle, axis, half_size: b, limit: c }
+            }
+        }
+    }
+}
+
 /// Why a simulation could not be set up.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -88,6 +157,21 @@ pub enum SetupError {
     /// There is nothing to simulate.
     #[error("there are no particles; is the grid too coarse, or the body outside it?")]
     NoParticles,
+    /// More processes than a grid can be cut for.
+    #[error(
+        "{ranks} processes are more than the {most} that the rows of this grid can be shared out to; start {most} at most"
+    )]
+    TooManyRanks {
+        /// The number of processes.
+        ranks: usize,
+        /// The largest number that is of use.
+        most: usize,
+    },
+    /// Polygons that more than one process would hold.
+    #[error(
+        "particles that are polygons are simulated by one process; start one, or leave out --layout clipped"
+    )]
+    PolygonsOfOneProcess,
     /// More particles than ids.
     #[error("{particles} particles are more than the supported {limit}")]
     TooManyParticles {

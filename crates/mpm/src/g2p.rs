@@ -147,6 +147,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             return;
         }
         self.affine = vec![SMatrix::zeros(); self.particles.x.len()];
+        if let Some(part) = &mut self.part {
+            part.is_affine = true;
+        }
         self.p2g_momentum();
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);

@@ -18,6 +18,8 @@ pub(crate) struct Constants<T, const D: usize> {
     pub(crate) inverse_spacing: T,
     /// Distance in memory between neighbouring nodes along each axis.
     pub(crate) strides: [usize; D],
+    /// The nodes of the grid before the first one that this process holds, a whole number.
+    pub(crate) nodes_before: f64,
     pub(crate) bins: BinRows,
     pub(crate) time_step: T,
     /// Nodes with less mass than this count as empty.
@@ -38,6 +40,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             upper: grid.upper(),
             inverse_spacing: grid.spacing.recip(),
             strides: layout.strides,
+            nodes_before: (layout.first_row * layout.row()) as f64,
             bins: bins.rows(),
             time_step,
             // Weights below the square of the rounding error only come about by rounding.

@@ -63,7 +63,10 @@ impl Ghost {
 pub(crate) struct Layout<const D: usize> {
     pub(crate) dims: [usize; D],
     pub(crate) strides: [usize; D],
+    /// Number of nodes that this process holds: all, or those of some successive rows.
     pub(crate) nodes: usize,
+    /// The first row that it holds.
+    pub(crate) first_row: usize,
     ghosts: Vec<Ghost>,
     /// Axis and layer of each wall.
     walls: Vec<(usize, usize)>,
@@ -77,8 +80,14 @@ impl<const D: usize> Layout<D> {
             let bytes = nodes.saturating_mul(bytes_per_node as u128);
             SetupError::GridTooLarge { cells: grid.cells.to_vec(), bytes }
         };
-        let mut layout =
-            Self { dims: [0; D], strides: [0; D], nodes: 1, ghosts: vec![], walls: vec![] };
+        let mut layout = Self {
+            dims: [0; D],
+            strides: [0; D],
+            nodes: 1,
+            first_row: 0,
+            ghosts: vec![],
+            walls: vec![],
+        };
         for (axis, &cells) in grid.cells.iter().enumerate() {
             if cells == 0 {
                 return Err(SetupError::NoCells { axis });
@@ -117,6 +126,17 @@ impl<const D: usize> Layout<D> {
             return Err(too_large());
         }
         Ok(layout)
+    }
+
+    /// Holds some rows alone.
+    pub(crate) fn hold(&mut self, rows: Range<usize>) {
+        self.first_row = rows.start;
+        self.nodes = rows.len() * self.row();
+    }
+
+    /// The rows that this process holds.
+    pub(crate) fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.nodes / self.row().max(1)
     }
 
     /// Nodes in a row: all that share an index along the last axis.

@@ -7,12 +7,15 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use bytemuck::{Pod, cast_slice, cast_slice_mut};
+use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
 use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::node::Node;
-use crate::parallel::bins::{AddToBand, Bins, NodeHooks, UpdateAndAdd};
+use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
+use crate::parallel::coloring::Shared;
 use crate::scheme::{Taken, Transfer};
 
 /// How the grid is updated after P2G.
@@ -185,7 +188,7 @@ impl Edge {
 
 impl<'a, T, S, const D: usize> GridUpdate<'a, T, S, D>
 where
-    T: RealField + Copy,
+    T: RealField + Copy + Pod,
     S: NodeUpdate<T, D>,
 {
     pub(crate) fn new(layout: &'a Layout<D>, c: &'a Constants<T, D>, update: S) -> Self {
@@ -200,7 +203,10 @@ where
         nodes: &mut [Node<T, D>],
         add: &AddToBand<'_, Node<T, D>>,
     ) {
-        self.with_hooks(nodes, |nodes, hooks| bins.for_each(self.layout, nodes, hooks, add));
+        let ranks = bins.ranks();
+        self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
+            bins.for_each(self.layout, nodes, hooks, add);
+        });
     }
 
     /// Calls `add` for every bin, as [`Bins::for_each_mut`], and updates the nodes.
@@ -211,7 +217,8 @@ where
         arrays: (&mut [A], &mut [B], &mut [C]),
         add: &UpdateAndAdd<'_, Node<T, D>, A, B, C>,
     ) {
-        self.with_hooks(nodes, |nodes, hooks| {
+        let ranks = bins.ranks();
+        self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
             bins.for_each_mut(self.layout, nodes, hooks, arrays, add)
         });
     }
@@ -219,6 +226,7 @@ where
     /// Calls `add` with the hooks that clear nodes before P2G and update them after it.
     fn with_hooks(
         &self,
+        ranks: Option<&dyn Ranks>,
         nodes: &mut [Node<T, D>],
         add: impl FnOnce(&mut [Node<T, D>], NodeHooks<'_, Node<T, D>>),
     ) {
@@ -226,8 +234,30 @@ where
             |nodes: &mut [_]| self.update.clear(nodes),
             |nodes: &mut [_], first| self.rows(nodes, first),
         );
-        add(nodes, NodeHooks { before: &before, after: &after });
-        self.finish(nodes);
+        let Some(ranks) = ranks else {
+            add(nodes, NodeHooks { before: &before, after: &after, halo: None });
+            self.finish(nodes);
+            return;
+        };
+        let neighbour = |shared: Shared| match shared.is_below {
+            true => ranks.rank() - 1,
+            false => ranks.rank() + 1,
+        };
+        let send = |shared, nodes: &[Node<T, D>]| {
+            let numbers: Vec<T> = nodes.iter().flat_map(|node| node.numbers().to_vec()).collect();
+            ranks.send(neighbour(shared), cast_slice(&numbers));
+        };
+        let receive = |shared, nodes: &mut [Node<T, D>]| {
+            let mut numbers = vec![T::zero(); nodes.len() * (2 * D + 1)];
+            ranks.receive(neighbour(shared), cast_slice_mut(&mut numbers));
+            for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(2 * D + 1)) {
+                *node = Node::zero();
+                node.values[..=2 * D].copy_from_slice(numbers);
+            }
+        };
+        let finish = |nodes: &mut [_]| self.finish(nodes);
+        let halo = Some(Halo { send: &send, receive: &receive, finish: &finish });
+        add(nodes, NodeHooks { before: &before, after: &after, halo });
     }
 
     /// Updates whole rows, from the node of index `first` on, after their last contribution; rows of an edge only where all
@@ -236,6 +266,7 @@ where
         let Self { layout, edges, .. } = self;
         layout.fold_rows(nodes, &|image, ghost, flip| self.fold(image, ghost, flip));
         let rows = first / layout.row()..(first + nodes.len()) / layout.row();
+        let rows = layout.first_row + rows.start..layout.first_row + rows.end;
         let [low, high] = edges;
         let mut to_update = rows.clone();
         if !low.is_within(&rows) {
@@ -257,12 +288,14 @@ where
 
     /// Updates the edges that [`rows`](Self::rows) left, after it was called for all rows.
     fn finish(&self, nodes: &mut [Node<T, D>]) {
-        let row = self.layout.row();
-        for edge in self.edges.iter().filter(|edge| !edge.is_updated.load(Ordering::Relaxed)) {
-            self.fold_edge(edge, nodes, 0);
-            let Range { start, end } = edge.rows;
-            self.complete(&mut nodes[start * row..end * row], start);
-            self.layout.unfold_edge(&edge.rows, 0, nodes, &Node::flipped);
+        let (row, rows) = (self.layout.row(), self.layout.rows());
+        // Other processes' edges are not all here.
+        let here = self.edges.iter().filter(|edge| edge.is_within(&rows));
+        for edge in here.filter(|edge| !edge.is_updated.load(Ordering::Relaxed)) {
+            self.fold_edge(edge, nodes, rows.start);
+            let (start, end) = (edge.rows.start - rows.start, edge.rows.end - rows.start);
+            self.complete(&mut nodes[start * row..end * row], edge.rows.start);
+            self.layout.unfold_edge(&edge.rows, rows.start, nodes, &Node::flipped);
         }
     }
 
@@ -279,10 +312,10 @@ where
         });
     }
 
-    /// Updates the rows from row `first` on, after all contributions and folds.
+    /// Updates the rows from row `first` of the grid on, after all contributions and folds.
     fn complete(&self, nodes: &mut [Node<T, D>], first: usize) {
         let &Self { layout, c, update, .. } = self;
-        update.update(c, nodes, first * layout.row());
+        update.update(c, nodes, (first - layout.first_row) * layout.row());
         layout.on_walls(first, nodes, |node, axis| update.on_wall(c, node, axis));
         layout.unfold_rows(nodes, &Node::flipped);
     }

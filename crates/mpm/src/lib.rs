@@ -67,6 +67,7 @@ mod body;
 mod body_force;
 mod clip;
 mod corner_exchange;
+mod decomposition;
 mod domain;
 mod error;
 #[doc(hidden)]
@@ -103,6 +104,7 @@ mod xpic;
 pub use body::{Annulus, Body, Mesh};
 pub use body_force::{AtTime, BodyForce, NoBodyForce};
 pub use clip::{Clip, Facet, Side};
+pub use decomposition::{Arrangement, Share};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;

@@ -31,6 +31,11 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         Self { values }
     }
 
+    /// All but the padding.
+    pub(crate) fn numbers(&self) -> &[T] {
+        &self.values[..=2 * D]
+    }
+
     #[inline(always)]
     pub(crate) fn mass(&self) -> T {
         self.values[2 * D]

@@ -8,11 +8,12 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::body::{Body, Mesh};
 use crate::body_force::BodyForce;
 use crate::corner_exchange::Exchange;
+use crate::decomposition::{Arrangement, Part, Share, admit};
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::grid::{Grid, Layout};
-use crate::health::Invalid;
+use crate::health::{Invalid, Outcome};
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
@@ -49,6 +50,7 @@ pub trait Simulated<const D: usize>: Stressed<D> {
         body: Body<Self, D>,
         law: Law<Self, D>,
         settings: Settings<Self>,
+        share: Option<Share>,
     ) -> Result<Simulation<Self, D>, SetupError>;
 
     /// [`Simulation::step`].
@@ -67,8 +69,9 @@ macro_rules! simulated {
                 body: Body<Self, $D>,
                 law: Law<Self, $D>,
                 settings: Settings<Self>,
+                share: Option<Share>,
             ) -> Result<Simulation<Self, $D>, SetupError> {
-                Simulation::set_up(grid, body, law, settings)
+                Simulation::set_up(grid, body, law, settings, share)
             }
 
             fn step(
@@ -98,7 +101,24 @@ impl<T: Simulated<D>, const D: usize> Simulation<T, D> {
         law: impl Into<Law<T, D>>,
         settings: Settings<T>,
     ) -> Result<Self, SetupError> {
-        T::set_up(grid, body.into(), law.into(), settings)
+        T::set_up(grid, body.into(), law.into(), settings, None)
+    }
+
+    /// As [`new`](Self::new), by one of several processes, of which each has a share of the body; all of them make the same calls from
+    /// now on. Particles move to the process whose part of the grid they are in.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new), at all processes alike where a particle's state is the reason; [`SetupError::TooManyRanks`], and
+    /// [`SetupError::PolygonsOfOneProcess`].
+    pub fn shared_out(
+        grid: Grid<T, D>,
+        body: impl Into<Body<T, D>>,
+        share: Share,
+        law: impl Into<Law<T, D>>,
+        settings: Settings<T>,
+    ) -> Result<Self, SetupError> {
+        T::set_up(grid, body.into(), law.into(), settings, Some(share))
     }
 
     /// Advances by one time step.
@@ -121,10 +141,11 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         body: Body<T, D>,
         law: Law<T, D>,
         settings: Settings<T>,
+        share: Option<Share>,
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
-        check(&grid, &body, &settings)?;
-        let mut state = allocate(&grid, body, of_blocks(&law), &settings)?;
+        check(&grid, &body, &settings, share.as_ref())?;
+        let mut state = allocate(&grid, body, of_blocks(&law), &settings, share)?;
         let Particles { x, F, .. } = &state.particles;
         let worst = (0..x.len()).filter_map(|p| {
             Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p))
@@ -138,9 +159,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
             }
             _ => worst.min(),
         };
-        if let Some((invalid, particle)) = worst {
-            let error = describe(&state, invalid, particle, 0, T::zero());
-            return Err(SetupError::InitialState(error));
+        let outcome = state.agree(Outcome { failure: worst, resort: false });
+        if let Some((invalid, particle)) = outcome.failure {
+            return Err(SetupError::InitialState(tell(&state, invalid, particle, 0, T::zero())));
         }
         state.sort();
         state.start_affine();
@@ -163,7 +184,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         if let Some((invalid, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);
-            let error = describe(&self.state, invalid, particle, step, time);
+            let error = tell(&self.state, invalid, particle, step, time);
             self.failed = Some(error.clone());
             return Err(error);
         }
@@ -174,6 +195,11 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag).
     pub fn particles(&self) -> &Particles<T, D> {
         &self.state.particles
+    }
+
+    /// Which particles this process holds, where there are several.
+    pub fn arrangement(&self) -> Option<Arrangement<'_>> {
+        self.state.part.as_ref().map(Part::arrangement)
     }
 
     /// The corners of the particles' domains at the current time, with CPDI2.
@@ -292,6 +318,7 @@ fn check<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
     body: &Body<T, D>,
     settings: &Settings<T>,
+    share: Option<&Share>,
 ) -> Result<(), SetupError> {
     let positive = |quantity: &dyn Fn() -> String, value: T| {
         if value > T::zero() && value.is_finite() {
@@ -322,13 +349,17 @@ fn check<T: Lanes, const D: usize>(
         ("mass", mass.len()),
         ("volume", volume.len()),
         ("half_edges", boxes),
+        ("ids", share.map_or(expected, |share| share.ids.len())),
         ("corners", mesh.as_ref().map_or(expected, |mesh| mesh.corners.len())),
     ] {
         if found != expected {
             return Err(SetupError::LengthMismatch { array, found, expected });
         }
     }
-    if expected == 0 {
+    if share.is_some() && polygons.is_some() {
+        return Err(SetupError::PolygonsOfOneProcess);
+    }
+    if expected == 0 && share.is_none() {
         return Err(SetupError::NoParticles);
     }
     let limit = u32::MAX as usize;
@@ -404,6 +435,7 @@ fn allocate<T: Lanes, const D: usize>(
     mut body: Body<T, D>,
     law: Box<dyn BlockLaw<T, D>>,
     settings: &Settings<T>,
+    share: Option<Share>,
 ) -> Result<State<T, D>, SetupError> {
     let Settings { shape, integrator, transfer, .. } = *settings;
     let count = body.particles.x.len();
@@ -418,7 +450,19 @@ fn allocate<T: Lanes, const D: usize>(
     let grids = 1 + usize::from(reprojects) + usize::from(ahead);
     let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
-    let layout = Layout::new(grid, bytes_per_node)?;
+    let mut layout = Layout::new(grid, bytes_per_node)?;
+    let points = match &support {
+        Support::Polygons(corners) => corners.count(),
+        _ => count,
+    };
+    let mut bins = Bins::new(&layout, points);
+    let part = share.map(Part::new);
+    if let Some(part) = &part {
+        admit(part.ranks.count(), &layout, bins.rows())?;
+        bins.share_out(part.ranks.clone());
+        // The first sort tells which rows this process holds.
+        layout.hold(0..1);
+    }
     // Asking first turns a grid that is too large into an error instead of an abort.
     let nodes = |is_needed: bool| {
         let mut nodes = Vec::new();
@@ -431,18 +475,20 @@ fn allocate<T: Lanes, const D: usize>(
         Ok::<_, SetupError>(nodes)
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
-    let points = match &support {
-        Support::Polygons(corners) => corners.count(),
-        _ => count,
-    };
-    let bins = Bins::new(&layout, points);
-    let least = particles.mass.iter().fold(particles.mass[0], |least, &m| least.min(m));
     let Particles { mass, volume, .. } = &particles;
-    let (m, V) = (mass[0], volume[0]);
-    let uniform = mass.iter().all(|&mass| mass == m) && volume.iter().all(|&volume| volume == V);
+    let least = mass.iter().copied().reduce(|least, m| least.min(m));
+    let least = match &part {
+        Some(part) => part.least(least),
+        None => least.unwrap_or(T::one()),
+    };
+    let uniform = mass.first().copied().zip(volume.first().copied()).filter(|(m, V)| {
+        mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
+    });
     let early = integrator.early() > 0.0;
     Ok(State {
-        uniform: uniform.then_some((m, V)),
+        uniform,
+        part,
+        keeps_F_early: early,
         constants: Constants::new(grid, &layout, &bins, settings.time_step, least),
         nodes: now,
         F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
@@ -461,6 +507,20 @@ fn allocate<T: Lanes, const D: usize>(
         layout,
         bins,
     })
+}
+
+/// The error for an invalid particle, at all processes; `particle` is its number in the whole body.
+fn tell<T: Lanes, const D: usize>(
+    state: &State<T, D>,
+    invalid: Invalid,
+    particle: usize,
+    step: usize,
+    time: T,
+) -> StepError {
+    match &state.part {
+        None => describe(state, invalid, particle, step, time),
+        Some(part) => part.tell(particle, |own| describe(state, invalid, own, step, time)),
+    }
 }
 
 /// The error for an invalid particle, with the figures of its present state.

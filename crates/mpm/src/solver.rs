@@ -3,6 +3,7 @@
 use nalgebra::SVector;
 
 use crate::body_force::BodyForce;
+use crate::decomposition::Arrangement;
 use crate::error::{SetupError, StepError};
 use crate::material::Law;
 use crate::particles::Particles;
@@ -21,6 +22,9 @@ pub trait Solver<T, const D: usize> {
     /// The particles as they are now, and their law.
     fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>);
 
+    /// Which particles this process holds, where there are several.
+    fn arrangement(&self) -> Option<Arrangement<'_>>;
+
     /// How far velocities lag behind positions, a time.
     fn velocity_lag(&self) -> T;
 
@@ -35,6 +39,10 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
 
     fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>) {
         (self.particles(), self.law())
+    }
+
+    fn arrangement(&self) -> Option<Arrangement<'_>> {
+        Simulation::arrangement(self)
     }
 
     fn velocity_lag(&self) -> T {
@@ -123,6 +131,10 @@ macro_rules! driven {
             fn observe(&mut self) -> (&Particles<f64, $D>, &Law<f64, $D>) {
                 self.body.observe();
                 (self.body.particles(), self.body.law())
+            }
+
+            fn arrangement(&self) -> Option<Arrangement<'_>> {
+                None
             }
 
             fn velocity_lag(&self) -> f64 {

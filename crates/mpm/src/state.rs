@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::corner_exchange::Exchange;
+use crate::decomposition::Part;
 use crate::geometry::Constants;
 use crate::grid::Layout;
 use crate::health::Outcome;
@@ -29,8 +30,12 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) layout: Layout<D>,
     pub(crate) bins: Bins,
     pub(crate) nodes: Vec<Node<T, D>>,
+    /// Where other processes hold the rest of the body: this one's part.
+    pub(crate) part: Option<Part>,
     /// F after the early part of a step, while the weights still need F at its start; empty without such a part.
     pub(crate) F_early: Vec<SMatrix<T, D, D>>,
+    /// Whether there is such a part.
+    pub(crate) keeps_F_early: bool,
     /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
     pub(crate) reprojected: Vec<Node<T, D>>,
     /// The fused pass: the grid of the next step while particles add to it; XPIC: the next term of the filter.
@@ -56,8 +61,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
         outcome
     }
 
-    /// Sorts the particles into bins.
+    /// The outcome of all processes.
+    pub(crate) fn agree(&self, outcome: Outcome) -> Outcome {
+        self.part.as_ref().map_or(outcome, |part| part.agree(outcome))
+    }
+
+    /// Sorts the particles into bins, those of other processes too.
     pub(crate) fn sort(&mut self) {
+        self.redistribute();
         let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
         if let Support::Polygons(corners) = support {
             bins.sort(layout, &|corner| exchange.first_node(c, corners, corner));

@@ -55,6 +55,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if early > 0.0 {
             self.p2g_momentum();
             let outcome = self.g2p_stretch(dt * real(early));
+            let outcome = self.agree(outcome);
             if outcome.failure.is_some() {
                 std::mem::swap(&mut self.particles.F, &mut self.F_early);
                 return outcome;
@@ -74,6 +75,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         } else {
             self.g2p(late)
         };
+        let outcome = self.agree(outcome);
         self.resort_if(outcome)
     }
 
@@ -83,6 +85,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.p2g(body_force, times);
         }
         let outcome = self.g2p2g(body_force, times.end);
+        let outcome = self.agree(outcome);
         // After a sort or a failure the partial sums on the grid are of no use.
         self.is_ahead = outcome.is_clean();
         self.resort_if(outcome)

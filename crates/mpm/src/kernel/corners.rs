@@ -89,7 +89,7 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
         at: &[[Eight<T, V>; D]; MOST_CORNERS],
         shares: &Shares<Eight<T, V>, D>,
     ) {
-        let mut first = [0.0; GROUP];
+        let mut first = [-c.nodes_before; GROUP];
         let mut reach = Lane8::zero();
         for a in 0..D {
             let (mut low, mut high) = (at[0][a].lanes, at[0][a].lanes);
@@ -786,6 +786,7 @@ pub(crate) fn velocity_at<T: Lanes, const D: usize>(
             place += (index(axis.base) + far) * c.strides[a];
             S *= axis.S[far];
         }
+        let place = place.wrapping_sub(c.nodes_before as usize);
         let Some(Node { values }) = nodes.get(place) else {
             debug_assert!(false, "a corner beyond the grid");
             return velocity;

@@ -362,7 +362,7 @@ where
 {
     let mut any_extended = false;
     for k in 0..BLOCK {
-        let mut first = 0.0;
+        let mut first = -c.nodes_before;
         for a in 0..D {
             let (xi, l) = of_particle(k, a);
             any_extended |= l > extended_above;

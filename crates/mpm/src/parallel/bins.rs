@@ -10,12 +10,16 @@
 //! order of the last sort decides the order of all sums: it belongs to the state of a run, and a run that continues to
 //! the same bits restores it.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use bytemuck::cast_slice_mut;
+use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
 use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
 use crate::parallel::chunks::on_all_threads;
-use crate::parallel::coloring::{ColoredBands, Schedule, count};
+use crate::parallel::coloring::{ColoredBands, Held, Schedule, Shared, count};
 use crate::parallel::disjoint::{PartElements, Partition};
 
 /// Rows in a bin, in two and three dimensions.
@@ -45,8 +49,24 @@ impl BinRows {
     }
 
     /// The bin of a particle at a sort, by the first row of its stencil.
-    fn bin_of(self, row: usize) -> usize {
+    pub(crate) fn bin_of(self, row: usize) -> usize {
         (row.saturating_sub(SLACK) / self.height).min(self.bins - 1)
+    }
+
+    /// Number of bins.
+    pub(crate) fn count(self) -> usize {
+        self.bins
+    }
+
+    /// The first row of a bin's band.
+    pub(crate) fn first_row(self, bin: usize) -> usize {
+        bin * self.height
+    }
+
+    /// The rows of the bands of these bins, on a grid of so many.
+    pub(crate) fn rows_of(self, held: &Held, all: usize) -> Range<usize> {
+        let Range { start, end } = held.segments();
+        start * self.height..if end < self.bins { end * self.height } else { all }
     }
 
     /// Range of the lower edge of a particle's box along the last axis within which the particle stays in `bin`, for a
@@ -69,12 +89,15 @@ impl BinRows {
 ///
 /// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
 /// kernels use them in place.
-#[derive(Debug)]
 pub(crate) struct Bins {
     rows: BinRows,
-    /// Bin of every particle.
+    /// The bins that this process holds.
+    held: Held,
+    /// The processes that hold all of them, where those are several.
+    ranks: Option<Arc<dyn Ranks>>,
+    /// Bin of every particle, among those of the whole grid.
     bin_of: Vec<u32>,
-    /// Particle ids, bin after bin.
+    /// Particle numbers, bin after bin.
     order: Partition,
     /// Buffer of the two-colour schedule.
     schedule: Schedule,
@@ -102,6 +125,19 @@ pub(crate) struct NodeHooks<'a, N> {
     pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
     /// After the last contribution; the second argument is the index of the first node.
     pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
+    /// What passes between this process and those that hold other bins, where there are such.
+    pub(crate) halo: Option<Halo<'a, N>>,
+}
+
+/// Messages with the processes of the bands below and above.
+#[derive(Clone, Copy)]
+pub(crate) struct Halo<'a, N> {
+    /// Sends the nodes of a segment that is shared.
+    pub(crate) send: &'a (dyn Fn(Shared, &[N]) + Sync),
+    /// Receives them.
+    pub(crate) receive: &'a (dyn Fn(Shared, &mut [N]) + Sync),
+    /// Between the last contribution of all and the last messages.
+    pub(crate) finish: &'a (dyn Fn(&mut [N]) + Sync),
 }
 
 impl Bins {
@@ -112,6 +148,8 @@ impl Bins {
         let sub_bins = if D == 3 { layout.dims[1].div_ceil(SUB_BIN_LINES) } else { 1 };
         Self {
             rows,
+            held: Held::whole(bins),
+            ranks: None,
             bin_of: vec![0; particles],
             order: Partition::new(particles, bins),
             schedule: Schedule::default(),
@@ -124,6 +162,25 @@ impl Bins {
     /// The rows of each bin.
     pub(crate) fn rows(&self) -> BinRows {
         self.rows
+    }
+
+    /// Makes room for so many particles in the bins `held`; `sort` has to follow.
+    pub(crate) fn hold(&mut self, held: Held, particles: usize) {
+        self.counts.resize(held.bands.len() * self.sub_bins + 1, 0);
+        self.order = Partition::new(particles, held.bands.len());
+        self.bin_of.resize(particles, 0);
+        self.keys.resize(particles, 0);
+        self.held = held;
+    }
+
+    /// Shares the bins out among processes; [`hold`](Self::hold) has to follow.
+    pub(crate) fn share_out(&mut self, ranks: Arc<dyn Ranks>) {
+        self.ranks = Some(ranks);
+    }
+
+    /// The processes that hold all bins, where those are several.
+    pub(crate) fn ranks(&self) -> Option<Arc<dyn Ranks>> {
+        self.ranks.clone()
     }
 
     /// Bin of every particle.
@@ -144,21 +201,22 @@ impl Bins {
         [cast_slice_mut(bin_of), cast_slice_mut(order), cast_slice_mut(starts)]
     }
 
-    /// Sorts all particles by the sub-bin of the first node of their stencils, `first_node(particle)`.
+    /// Sorts all particles by the sub-bin of the first node of their stencils, `first_node(particle)`, in the numbers of the whole
+    /// grid.
     pub(crate) fn sort<const D: usize>(
         &mut self,
         layout: &Layout<D>,
         first_node: &(dyn Fn(usize) -> usize + Sync),
     ) {
         let Self { rows, sub_bins, .. } = *self;
-        let (row, line) = (layout.row(), layout.dims[0]);
+        let (row, line, first) = (layout.row(), layout.dims[0], self.held.bands.start);
         self.keys.par_iter_mut().zip(&mut self.bin_of).enumerate().for_each(
             |(p, (key, bin_of))| {
                 let node = first_node(p);
                 let bin = rows.bin_of(node / row);
                 let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
                 *bin_of = bin as u32;
-                *key = (bin * sub_bins + sub_bin) as u32;
+                *key = ((bin - first) * sub_bins + sub_bin) as u32;
             },
         );
         self.counts.fill(0);
@@ -179,7 +237,7 @@ impl Bins {
         }
     }
 
-    /// Calls `add` for every bin, in parallel where bands do not overlap.
+    /// Calls `add` for every bin here, in parallel where bands do not overlap.
     pub(crate) fn for_each<N: Send, const D: usize>(
         &mut self,
         layout: &Layout<D>,
@@ -187,10 +245,11 @@ impl Bins {
         hooks: NodeHooks<'_, N>,
         add: &AddToBand<'_, N>,
     ) {
-        let Self { rows, order, schedule, .. } = self;
-        let bands = ColoredBands::new(nodes, rows.height * layout.row(), schedule);
-        for_each_band(&bands, hooks, &|band, first, bin| {
-            if let Some(particles) = order.part(bin) {
+        let Self { rows, held, order, schedule, .. } = self;
+        let start = held.bands.start;
+        let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
+        for_each_band(bands, hooks, &|band, first, bin| {
+            if let Some(particles) = order.part(bin - start) {
                 add(band, first, particles);
             }
         });
@@ -211,38 +270,71 @@ impl Bins {
         B: Send,
         C: Send,
     {
-        let Self { rows, order, schedule, .. } = self;
+        let Self { rows, held, order, schedule, .. } = self;
+        let start = held.bands.start;
         let Some(elements) = order.elements(arrays) else {
             debug_assert!(false, "particles that are not sorted");
             return;
         };
-        let bands = ColoredBands::new(nodes, rows.height * layout.row(), schedule);
-        for_each_band(&bands, hooks, &|band, first, bin| {
-            if let Some(elements) = elements.take(bin) {
+        let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
+        for_each_band(bands, hooks, &|band, first, bin| {
+            if let Some(elements) = elements.take(bin - start) {
                 add(band, first, bin as u32, elements);
             }
         });
     }
 }
 
-/// Calls `add(band, first, bin)` for each bin, and the hooks around it.
+/// Calls `add(band, first, bin)` for each bin here, and the hooks around it.
+///
+/// Of a segment that is shared with another process one has the first band. It sends its sums, which the other one adds to, and gets
+/// the updated nodes back.
 fn for_each_band<N: Send>(
-    bands: &ColoredBands<'_, N>,
+    mut bands: ColoredBands<'_, N>,
     hooks: NodeHooks<'_, N>,
     add: &(dyn Fn(&mut [N], usize, usize) + Sync),
 ) {
-    on_all_threads(&|thread| {
-        while let Some(mut band) = bands.take(thread) {
-            (hooks.before)(band.first_touched().0);
-            let bin = band.segment();
-            let (elements, first) = band.elements();
-            add(elements, first, bin);
-            let (completed, first) = band.completed();
-            if !completed.is_empty() {
-                (hooks.after)(completed, first);
+    let sums: Vec<Shared> = bands.shared().collect();
+    let is_lent = |segment: usize| {
+        sums.iter().find(|shared| shared.is_first_here && shared.segment == segment)
+    };
+    let pass = |bands: &ColoredBands<'_, N>| {
+        on_all_threads(&|thread| {
+            while let Some(mut band) = bands.take(thread) {
+                (hooks.before)(band.first_touched().0);
+                let bin = band.segment();
+                let (elements, first) = band.elements();
+                add(elements, first, bin);
+                if let Some(Halo { send, .. }) = hooks.halo {
+                    for (segment, nodes) in band.segments() {
+                        if let Some(shared) = is_lent(segment) {
+                            send(*shared, nodes);
+                        }
+                    }
+                }
+                let (completed, first) = band.completed();
+                if !completed.is_empty() {
+                    (hooks.after)(completed, first);
+                }
             }
-        }
-    });
+        });
+    };
+    pass(&bands);
+    let Some(Halo { send, receive, finish }) = hooks.halo else { return };
+    for &shared in sums.iter().filter(|shared| !shared.is_first_here) {
+        receive(shared, bands.of_shared(shared));
+        bands.arrived(shared);
+    }
+    if sums.iter().any(|shared| !shared.is_first_here) {
+        pass(&bands);
+    }
+    finish(bands.all());
+    for &shared in sums.iter().filter(|shared| !shared.is_first_here) {
+        send(shared, bands.of_shared(shared));
+    }
+    for &shared in sums.iter().filter(|shared| shared.is_first_here) {
+        receive(shared, bands.of_shared(shared));
+    }
 }
 
 #[cfg(test)]
@@ -350,6 +442,7 @@ mod tests {
                     assert_eq!(first % row, 0);
                     nodes.iter_mut().for_each(|node| *node += 100);
                 },
+                halo: None,
             };
             bins.for_each(&layout, &mut nodes, hooks, &|band, first, _| {
                 assert_eq!(first % (height * row), 0);

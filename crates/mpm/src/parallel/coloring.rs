@@ -3,6 +3,10 @@
 //! The array is cut into segments. A band is a segment and the next one, so it overlaps with the bands of its neighbours. Bands
 //! alternate between two colours. A band of the second colour waits for its neighbours of the first colour; bands of one
 //! colour never overlap. The safety argument for the mutable slices is in this file.
+//!
+//! A process may hold some successive bands of an array whose others are held by other processes. It holds the segments that its bands
+//! cover. Of these it shares the first with the band below, and the last with the band above: such a band counts as any other,
+//! and [`ColoredBands::arrived`] says that it has released the segment.
 
 #![allow(unsafe_code, reason = "overlapping bands of one array, changed by several threads")]
 
@@ -11,12 +15,56 @@ use std::ops::Range;
 use std::slice;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// The bands that a process holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Held {
+    /// Their numbers, each that of its first segment.
+    pub(crate) bands: Range<usize>,
+    /// The number of segments of the whole array, and so of bands.
+    pub(crate) all: usize,
+}
+
+/// A segment that a band here and one of another process cover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shared {
+    /// Whether the other band is the one below.
+    pub(crate) is_below: bool,
+    pub(crate) segment: usize,
+    /// Whether the band here comes first: the other one then completes the segment.
+    pub(crate) is_first_here: bool,
+}
+
+impl Held {
+    /// All bands of an array of so many segments.
+    pub(crate) fn whole(segments: usize) -> Self {
+        Self { bands: 0..segments, all: segments }
+    }
+
+    /// The segments that the bands cover.
+    pub(crate) fn segments(&self) -> Range<usize> {
+        self.bands.start..self.all.min(self.bands.end + 1)
+    }
+
+    /// The segments that other processes' bands cover as well.
+    pub(crate) fn shared(&self) -> impl Iterator<Item = Shared> + use<> {
+        let Self { bands: Range { start, end }, all } = *self;
+        let below = (start > 0).then_some((true, start, start));
+        let above = (end < all).then_some((false, end, end - 1));
+        below.into_iter().chain(above).map(move |(is_below, segment, own)| Shared {
+            is_below,
+            segment,
+            is_first_here: !is_second_color(all, own),
+        })
+    }
+}
+
 /// Progress of the bands: taken or not, and released segments.
 #[derive(Debug, Default)]
 pub(crate) struct Schedule {
-    /// For each segment the number of bands that have released it.
+    of: Held,
+    /// For each segment here the number of bands that have released it.
     released: Vec<usize>,
-    /// For each band whether a thread has taken it.
+    /// For each band here whether a thread has taken it.
     taken: Vec<bool>,
     /// Number of bands that threads hold at present.
     held: usize,
@@ -50,7 +98,7 @@ pub(crate) fn count(length: usize, segment_length: usize) -> usize {
 /// Whether a band comes after its neighbours. The band of the last segment has the first colour, so that the band before it
 /// completes both.
 fn is_second_color(segments: usize, segment: usize) -> bool {
-    (segments - segment).is_multiple_of(2)
+    (segments + segment).is_multiple_of(2)
 }
 
 /// The segments that a band covers.
@@ -66,42 +114,55 @@ fn visit(segments: usize, segment: usize, of: usize) -> Visit {
 }
 
 impl Schedule {
-    /// Resets to as many untaken bands as segments.
-    fn start(&mut self, segments: usize) {
+    /// Resets to untaken bands.
+    fn start(&mut self, of: &Held) {
+        self.of.clone_from(of);
         self.released.clear();
-        self.released.resize(segments, 0);
+        self.released.resize(of.segments().len(), 0);
         self.taken.clear();
-        self.taken.resize(segments, false);
+        self.taken.resize(of.bands.len(), false);
         self.held = 0;
+    }
+
+    fn is_taken(&self, band: usize) -> bool {
+        self.taken[band - self.of.bands.start]
     }
 
     /// The order of taking: each band of the second colour soon after its neighbours, whose elements still lie in the cache.
     /// The `part`-th of `parts` threads begins at a place of its own, so that each stays among neighbours for long.
+    ///
+    /// Bands that those of other processes wait for come first of all.
     fn order(&self, (part, parts): (usize, usize)) -> impl Iterator<Item = usize> + use<> {
-        let segments = self.taken.len();
+        let Held { bands, all } = self.of.clone();
         // A band of the second colour has the place two after its number, next after that of its upper neighbour.
-        let places = segments + 2;
+        let places = bands.len() + 2;
         let first = places * part / parts.max(1);
-        let segment = move |place: usize| {
-            let is_second = is_second_color(places, place);
-            let segment = if is_second { place.checked_sub(2) } else { Some(place) };
-            segment.filter(|&segment| segment < segments)
+        let mut awaited = [None; 2];
+        for (band, shared) in awaited.iter_mut().zip(self.of.shared()) {
+            let own = if shared.is_below { shared.segment } else { shared.segment - 1 };
+            *band = shared.is_first_here.then_some(own);
+        }
+        let band = move |place: usize| {
+            let band = bands.start + place;
+            let is_second = is_second_color(all, band);
+            let band = if is_second { band.checked_sub(2) } else { Some(band) };
+            band.filter(|band| bands.contains(band))
         };
-        (first..places).chain(0..first).filter_map(segment)
+        awaited.into_iter().flatten().chain((first..places).chain(0..first).filter_map(band))
     }
 
     /// Whether all earlier bands have released the segments of a band.
     fn is_ready(&self, segment: usize) -> bool {
-        let segments = self.taken.len();
-        covered(segments, segment)
-            .all(|of| self.released[of] == visit(segments, segment, of).before)
+        let Held { bands, all } = &self.of;
+        covered(*all, segment)
+            .all(|of| self.released[of - bands.start] == visit(*all, segment, of).before)
     }
 
     /// The first band in order that is ready, for one of some threads.
     fn take(&mut self, thread: (usize, usize)) -> Next {
-        let mut left = self.order(thread).filter(|&segment| !self.taken[segment]);
+        let mut left = self.order(thread).filter(|&segment| !self.is_taken(segment));
         if let Some(segment) = left.find(|&segment| self.is_ready(segment)) {
-            self.taken[segment] = true;
+            self.taken[segment - self.of.bands.start] = true;
             self.held += 1;
             return Next::Band(segment);
         }
@@ -110,8 +171,8 @@ impl Schedule {
 
     /// Releases a band.
     fn release(&mut self, segment: usize) {
-        let segments = self.taken.len();
-        covered(segments, segment).for_each(|of| self.released[of] += 1);
+        let Held { bands, all } = &self.of;
+        covered(*all, segment).for_each(|of| self.released[of - bands.start] += 1);
         self.held -= 1;
     }
 }
@@ -125,7 +186,7 @@ const ATTEMPTS: usize = 1 << 14;
 /// The bands of an array.
 pub(crate) struct ColoredBands<'a, N> {
     schedule: Mutex<&'a mut Schedule>,
-    segments: usize,
+    of: Held,
     first: *mut N,
     length: usize,
     segment_length: usize,
@@ -137,18 +198,50 @@ pub(crate) struct ColoredBands<'a, N> {
 unsafe impl<N: Send> Sync for ColoredBands<'_, N> {}
 
 impl<'a, N> ColoredBands<'a, N> {
-    /// The bands of `array`, for segments of `segment_length` elements; the last one has the remainder as well. `schedule` is
-    /// a buffer; its contents do not matter.
+    /// The bands `of` of an array, for segments of `segment_length` elements; the last one of all has the remainder as well. `array`
+    /// are the segments that they cover. `schedule` is a buffer; its contents do not matter.
+    ///
+    /// # Panics
+    ///
+    /// Where `array` does not have the elements of those segments.
     pub(crate) fn new(
         array: &'a mut [N],
         segment_length: usize,
+        of: Held,
         schedule: &'a mut Schedule,
     ) -> Self {
-        let segments = count(array.len(), segment_length);
-        schedule.start(segments);
+        // What the unsafe code relies on.
+        let least = of.segments().len() * segment_length;
+        let is_open = of.segments().end < of.all;
+        assert!(if is_open { array.len() == least } else { of.all == 1 || array.len() >= least });
+        schedule.start(&of);
         let (first, length) = (array.as_mut_ptr(), array.len());
         let schedule = Mutex::new(schedule);
-        Self { schedule, segments, first, length, segment_length, borrowed: PhantomData }
+        Self { schedule, of, first, length, segment_length, borrowed: PhantomData }
+    }
+
+    /// The segments that bands of other processes cover as well.
+    pub(crate) fn shared(&self) -> impl Iterator<Item = Shared> + use<N> {
+        self.of.shared()
+    }
+
+    /// All elements, while no thread holds a band.
+    pub(crate) fn all(&mut self) -> &mut [N] {
+        // SAFETY: the array is borrowed for 'a, and bands that are held borrow `self`, which is exclusive here.
+        unsafe { slice::from_raw_parts_mut(self.first, self.length) }
+    }
+
+    /// Says that the band of another process that covers a shared segment as well has released it.
+    pub(crate) fn arrived(&self, shared: Shared) {
+        let place = shared.segment - self.of.bands.start;
+        self.schedule().released[place] += 1;
+    }
+
+    /// The elements of a segment that is shared, while no thread holds a band.
+    pub(crate) fn of_shared(&mut self, shared: Shared) -> &mut [N] {
+        let range = self.range(shared.segment..shared.segment + 1);
+        // SAFETY: as in `Band::elements` the range lies in the array; bands that are held borrow `self`, which is exclusive here.
+        unsafe { slice::from_raw_parts_mut(self.first.add(range.start), range.len()) }
     }
 
     fn schedule(&self) -> MutexGuard<'_, &'a mut Schedule> {
@@ -169,10 +262,11 @@ impl<'a, N> ColoredBands<'a, N> {
         None
     }
 
-    /// The indices of the elements in some segments.
+    /// The indices of the elements in some segments, of those here.
     fn range(&self, segments: Range<usize>) -> Range<usize> {
+        let Range { start, end } = self.of.segments();
         let index = |segment| {
-            if segment < self.segments { segment * self.segment_length } else { self.length }
+            if segment < end { (segment - start) * self.segment_length } else { self.length }
         };
         index(segments.start)..index(segments.end)
     }
@@ -185,7 +279,7 @@ pub(crate) struct Band<'p, 'a, N> {
 }
 
 impl<N> Band<'_, '_, N> {
-    /// Number of the band's first segment.
+    /// Number of the band's first segment, in the whole array.
     pub(crate) fn segment(&self) -> usize {
         self.segment
     }
@@ -193,9 +287,9 @@ impl<N> Band<'_, '_, N> {
     /// The elements, and the index of the first of them in the array.
     pub(crate) fn elements(&mut self) -> (&mut [N], usize) {
         let Self { bands, segment } = *self;
-        let range = bands.range(covered(bands.segments, segment));
-        // SAFETY: the range lies in the array, which is borrowed for 'a: segments ascend to at most the last one, and with them
-        // `ColoredBands::range` to the length of the array. A band is handed out once (`taken`), and a segment is covered
+        let range = bands.range(covered(bands.of.all, segment));
+        // SAFETY: the range lies in the array, which is borrowed for 'a: segments ascend to at most the last one here, and with them
+        // `ColoredBands::range` to the length of the array, which `ColoredBands::new` has compared with their number. A band is handed out once (`taken`), and a segment is covered
         // by two bands at most, neighbours, of which one has the first colour and one the second. The second is handed out
         // after the first has released all that both cover (`is_ready`), which it does when it is dropped. So no two bands
         // that are held overlap. Writes of one are visible to the next: both pass through the mutex. `&mut self` lets one
@@ -205,11 +299,22 @@ impl<N> Band<'_, '_, N> {
         (elements, range.start)
     }
 
+    /// The segments of the band, and the elements of each.
+    pub(crate) fn segments(&mut self) -> impl Iterator<Item = (usize, &[N])> {
+        let Self { bands, segment } = *self;
+        let (elements, first) = self.elements();
+        let elements = &*elements;
+        covered(bands.of.all, segment).map(move |of| {
+            let range = bands.range(of..of + 1);
+            (of, &elements[range.start - first..range.end - first])
+        })
+    }
+
     /// The elements in the leading segments of the band for whose visit `choose` is true.
     fn leading(&mut self, choose: impl Fn(Visit) -> bool) -> (&mut [N], usize) {
         let Self { bands, segment } = *self;
-        let segments = covered(bands.segments, segment)
-            .take_while(|&of| choose(visit(bands.segments, segment, of)));
+        let all = bands.of.all;
+        let segments = covered(all, segment).take_while(|&of| choose(visit(all, segment, of)));
         let length = bands.range(segment..segment + segments.count()).len();
         let (elements, first) = self.elements();
         (&mut elements[..length], first)
@@ -243,7 +348,7 @@ mod tests {
     /// The bands as one of some threads takes them, alone.
     fn alone(segments: usize, thread: (usize, usize)) -> Vec<usize> {
         let mut schedule = Schedule::default();
-        schedule.start(segments);
+        schedule.start(&Held::whole(segments));
         let take = |_| match schedule.take(thread) {
             Next::Band(segment) => {
                 schedule.release(segment);
@@ -274,7 +379,7 @@ mod tests {
     fn bands_that_overlap_are_never_held_together() {
         for segments in 1..=7 {
             let mut schedule = Schedule::default();
-            schedule.start(segments);
+            schedule.start(&Held::whole(segments));
             assert_eq!(schedule.released.len(), segments);
             let mut over = vec![vec![]; segments];
             // All that are ready at once, released before the next are asked for.
@@ -326,7 +431,12 @@ mod tests {
                 // Contents left over from an earlier run do not matter.
                 let mut array: Vec<_> = (7..7 + length as u64).collect();
                 let completed = Mutex::new(vec![0; length]);
-                let bands = ColoredBands::new(&mut array, segment_length, &mut schedule);
+                let bands = ColoredBands::new(
+                    &mut array,
+                    segment_length,
+                    Held::whole(count(length, segment_length)),
+                    &mut schedule,
+                );
                 std::thread::scope(|scope| {
                     for thread in 0..threads {
                         let (bands, completed) = (&bands, &completed);
@@ -369,7 +479,7 @@ mod tests {
     #[test]
     fn a_thread_that_holds_a_band_itself_is_not_kept_waiting_for_ever() {
         let (mut array, mut schedule) = ([0; 6], Schedule::default());
-        let bands = ColoredBands::new(&mut array, 2, &mut schedule);
+        let bands = ColoredBands::new(&mut array, 2, Held::whole(3), &mut schedule);
         let first = bands.take((0, 1)).unwrap();
         let third = bands.take((0, 1)).unwrap();
         assert_eq!((first.segment(), third.segment()), (0, 2));
@@ -382,7 +492,7 @@ mod tests {
     #[test]
     fn a_panic_releases_a_band() {
         let (mut array, mut schedule) = ([0; 4], Schedule::default());
-        let bands = ColoredBands::new(&mut array, 2, &mut schedule);
+        let bands = ColoredBands::new(&mut array, 2, Held::whole(2), &mut schedule);
         let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let band = bands.take((0, 1)).unwrap();
             panic!("{}", band.segment());

@@ -7,5 +7,5 @@
 
 pub(crate) mod bins;
 pub(crate) mod chunks;
-mod coloring;
+pub(crate) mod coloring;
 pub(crate) mod disjoint;

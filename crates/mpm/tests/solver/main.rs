@@ -5,6 +5,7 @@ mod failures;
 mod mechanics;
 mod order;
 mod polygons;
+mod ranks;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod registers;

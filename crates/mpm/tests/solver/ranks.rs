@@ -1,0 +1,209 @@
+//! Several processes, here threads with messages, simulate a body to the bits of one.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_mpm::{
+    Body, Grid, Integrator, Material, Scalar, Settings, SetupError, Shape, Share, Simulation,
+    StepError, Transfer,
+};
+use mmsmith_ranks::{Ranks, in_process};
+use nalgebra::{SMatrix, SVector};
+use proptest::prelude::*;
+
+use crate::schemes::{self, noise};
+
+/// A column: walls at its foot and sides, long enough for several processes.
+fn grid<const D: usize>() -> Grid<f64, D> {
+    let mut grid = Grid {
+        lower: SVector::repeat(-0.25),
+        spacing: 0.125,
+        cells: [5; D],
+        walls: [[true, false]; D],
+    };
+    grid.cells[D - 1] = if D == 1 { 1500 } else { 60 };
+    grid.walls[D - 1] = [true, true];
+    grid
+}
+
+/// A deformed body of unequal masses that flies up from the foot, or in the middle of the column down.
+fn body<const D: usize>(speed: f64, is_uniform: bool) -> Body<f64, D> {
+    let (height, grid) = (if D == 1 { 120.0 } else { 4.0 }, grid::<D>());
+    let foot = if speed < 0.0 { 2.0 } else { -0.25 };
+    let inside = |X: &SVector<f64, D>| {
+        (0..D - 1).all(|a| X[a] < 0.25) && X[D - 1] > foot && X[D - 1] < foot + height
+    };
+    let mut body = Body::lattice(&grid, 2, 2.0, inside);
+    let p = &mut body.particles;
+    for k in 0..p.len() {
+        p.v[k] = SVector::from_fn(|a, _| 0.5 * noise(7 * k + a));
+        p.v[k][D - 1] += speed;
+        p.F[k] += SMatrix::from_fn(|i, j| 0.05 * noise(11 * k + 3 * i + j));
+        if !is_uniform {
+            p.mass[k] *= 1.0 + 0.1 * noise(k);
+        }
+    }
+    body
+}
+
+fn law() -> Material<f64> {
+    Material::NeoHookean { lambda: 60.0, mu: 40.0 }
+}
+
+fn body_force<const D: usize>(X: &[SVector<f64, D>], t: f64, b: &mut [SVector<f64, D>]) {
+    for (X, b) in X.iter().zip(b) {
+        *b = X.map(|x| (3.0 * x + 5.0 * t).sin());
+    }
+}
+
+/// The particles of `body` that a process begins with, and their numbers: some here, some there.
+fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D>, Vec<u64>) {
+    let count = body.particles.len();
+    let is_own = |p: &usize| p / 7 % ranks.count() == ranks.rank();
+    let own: Vec<usize> = (0..count).filter(is_own).collect();
+    let mut part = body.clone();
+    let p = &body.particles;
+    part.particles.X = own.iter().map(|&k| p.X[k]).collect();
+    part.particles.x = own.iter().map(|&k| p.x[k]).collect();
+    part.particles.v = own.iter().map(|&k| p.v[k]).collect();
+    part.particles.F = own.iter().map(|&k| p.F[k]).collect();
+    part.particles.mass = own.iter().map(|&k| p.mass[k]).collect();
+    part.particles.volume = own.iter().map(|&k| p.volume[k]).collect();
+    part.half_edges = own.iter().map(|&k| body.half_edges[k]).collect();
+    if let (Some(part), Some(whole)) = (&mut part.mesh, &body.mesh) {
+        part.corners = own.iter().map(|&k| whole.corners[k]).collect();
+        let used: Vec<u32> = {
+            let mut used: Vec<u32> =
+                part.corners.iter().flat_map(|corners| corners[..1 << D].to_vec()).collect();
+            used.sort_unstable();
+            used.dedup();
+            used
+        };
+        part.X = used.iter().map(|&corner| whole.X[corner as usize]).collect();
+        part.x = used.iter().map(|&corner| whole.x[corner as usize]).collect();
+        for corner in part.corners.iter_mut().flat_map(|corners| &mut corners[..1 << D]) {
+            *corner = used.binary_search(corner).unwrap() as u32;
+        }
+    }
+    (part, own.into_iter().map(|id| id as u64).collect())
+}
+
+/// State of a particle: number, position, velocity, deformation gradient.
+type Of<const D: usize> = (u64, SVector<f64, D>, SVector<f64, D>, SMatrix<f64, D, D>);
+
+fn state<const D: usize>(simulation: &Simulation<f64, D>) -> Vec<Of<D>>
+where
+    f64: Scalar<D>,
+{
+    let p = simulation.particles();
+    let ids: Vec<u64> = match simulation.arrangement() {
+        Some(arrangement) => arrangement.ids.to_vec(),
+        None => (0..p.len() as u64).collect(),
+    };
+    (0..p.len()).map(|k| (ids[k], p.x[k], p.v[k], p.F[k])).collect()
+}
+
+/// Steps that a body flies, with the particles of a process after them, and the error that ended them.
+fn fly<const D: usize>(
+    simulation: &mut Simulation<f64, D>,
+    steps: usize,
+) -> (Vec<Of<D>>, Option<StepError>, u64)
+where
+    f64: Scalar<D>,
+{
+    let end = (0..steps).find_map(|_| simulation.step(&body_force::<D>).err());
+    (state(simulation), end, simulation.arrangement().map_or(0, |found| found.version))
+}
+
+fn agrees<const D: usize>(settings: Settings<f64>, counts: &[usize], speed: f64, steps: usize)
+where
+    f64: Scalar<D>,
+{
+    let whole = body::<D>(speed, settings.transfer == Transfer::Flip);
+    let mut alone = Simulation::new(grid::<D>(), whole.clone(), law(), settings).unwrap();
+    let (expected, error, _) = fly(&mut alone, steps);
+    assert_ne!(
+        expected,
+        state(&Simulation::new(grid::<D>(), whole.clone(), law(), settings).unwrap())
+    );
+    for &count in counts {
+        let found = in_process(count, |ranks| {
+            let (body, ids) = share(&whole, &*ranks);
+            let share = Share { ranks, ids };
+            let mut part =
+                Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+            fly(&mut part, steps)
+        });
+        let what = format!("{count} processes, {settings:?}");
+        // Cuts or particles have moved on the way.
+        assert!(error.is_some() || found[0].2 > 1, "{what}: sorted {} times", found[0].2);
+        for (particles, found, _) in &found {
+            assert_eq!(found, &error, "{what}");
+            assert!(particles.is_sorted_by_key(|of| of.0), "{what}");
+        }
+        let mut all: Vec<Of<D>> = found.into_iter().flat_map(|(particles, ..)| particles).collect();
+        all.sort_by_key(|of| of.0);
+        assert!(all == expected, "{what}");
+    }
+}
+
+fn flying(settings: Settings<f64>) -> Settings<f64> {
+    let halve = settings.integrator == Integrator::Cd;
+    Settings { time_step: 1.0 / 256.0, halve_first_acceleration: halve, ..settings }
+}
+
+#[test]
+fn every_scheme_has_the_bits_of_one_process() {
+    for settings in schemes::schemes().map(flying) {
+        agrees::<2>(settings, &[2, 3], 14.0, 12);
+    }
+}
+
+#[test]
+fn so_it_is_on_a_line_and_in_space() {
+    for settings in schemes::schemes().map(flying).step_by(3) {
+        agrees::<1>(settings, &[2, 4], 16.0, 40);
+        agrees::<3>(settings, &[3], -14.0, 9);
+    }
+}
+
+#[test]
+fn particles_that_turn_inside_out_are_told_alike_by_all() {
+    let settings = Settings {
+        shape: Shape::Gimp,
+        integrator: Integrator::Usf,
+        transfer: Transfer::Flip,
+        time_step: 1.0 / 16.0,
+        halve_first_acceleration: false,
+    };
+    agrees::<2>(settings, &[1, 2, 5, 7], 2.0, 40);
+}
+
+#[test]
+fn more_processes_than_rows_are_refused_with_the_largest_number() {
+    let whole = body::<2>(1.0, true);
+    let settings = flying(schemes::schemes().next().unwrap());
+    let most = in_process(9, |ranks| {
+        let (body, ids) = share(&whole, &*ranks);
+        let share = Share { ranks, ids };
+        Simulation::shared_out(grid::<2>(), body, share, law(), settings).err()
+    });
+    // 69 rows are 8 bins, of which the last two go together.
+    assert_eq!(most, vec![Some(SetupError::TooManyRanks { ranks: 9, most: 7 }); 9]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn random_settings_have_the_bits_of_one_process(
+        scheme in 0..schemes::schemes().count(),
+        count in 1..8_usize,
+        speed in -15.0..15.0_f64,
+        steps in 8..20_usize,
+    ) {
+        let settings = flying(schemes::schemes().nth(scheme).unwrap());
+        // Fast enough to be sorted once more.
+        let speed = speed + 12.0 * speed.signum();
+        agrees::<2>(settings, &[count], speed, steps);
+    }
+}

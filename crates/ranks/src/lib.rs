@@ -1,0 +1,156 @@
+//! Messages between the processes of one run: plain bytes, of lengths that both sides know.
+//!
+//! A [`Ranks`] is one process among several. What the solver and the measurement ask of it is little: to send, to receive, and the
+//! largest of some whole numbers. Numbers with a fraction are never summed here: their sums would depend on who adds first.
+//!
+//! [`in_process`] gives ranks that are threads of one process, for tests; the command has ranks of MPI.
+
+mod in_process;
+mod traffic;
+
+use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, cast_slice_mut};
+
+pub use in_process::in_process;
+pub use traffic::{Traffic, counted};
+
+/// One of the processes of a run.
+///
+/// All of them make the same calls in the same order, as far as a call is one of all. Messages from one rank to another arrive in
+/// the order in which they were sent.
+pub trait Ranks: Send + Sync {
+    /// Which of them this is, from 0.
+    fn rank(&self) -> usize;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Sends a message, and does not wait for it to arrive.
+    fn send(&self, to: usize, bytes: &[u8]);
+
+    /// Waits for the next message of another rank, which has just the length of `bytes`.
+    fn receive(&self, from: usize, bytes: &mut [u8]);
+
+    /// The largest of the numbers of all ranks; a call of all.
+    fn largest(&self, value: u64) -> u64;
+}
+
+/// What each rank sent to this one, where `out` has what this one sends to each: a call of all.
+///
+/// Empty messages are not sent. `counts` says how many elements each rank sends here.
+pub fn exchange<E: NoUninit + AnyBitPattern>(
+    ranks: &dyn Ranks,
+    out: &[Vec<E>],
+    counts: &[usize],
+) -> Vec<E> {
+    for (to, elements) in out.iter().enumerate() {
+        if to != ranks.rank() && !elements.is_empty() {
+            ranks.send(to, cast_slice(elements));
+        }
+    }
+    let mut all = Vec::with_capacity(counts.iter().sum());
+    for (from, &count) in counts.iter().enumerate() {
+        if from == ranks.rank() {
+            all.extend_from_slice(&out[from]);
+            continue;
+        }
+        let start = all.len();
+        all.resize(start + count, E::zeroed());
+        if count > 0 {
+            ranks.receive(from, cast_slice_mut(&mut all[start..]));
+        }
+    }
+    all
+}
+
+/// How many elements each rank will send here, where `out` says how many this one sends to each: a call of all.
+pub fn announce(ranks: &dyn Ranks, out: &[usize]) -> Vec<usize> {
+    let own = ranks.rank();
+    for (to, &count) in out.iter().enumerate().filter(|(to, _)| *to != own) {
+        ranks.send(to, bytes_of(&(count as u64)));
+    }
+    let receive = |from: usize| {
+        if from == own {
+            return out[own];
+        }
+        let mut count = 0_u64;
+        ranks.receive(from, bytemuck::bytes_of_mut(&mut count));
+        count as usize
+    };
+    (0..ranks.count()).map(receive).collect()
+}
+
+/// The elements of all ranks, one after the other, at rank 0; nothing at the others. A call of all.
+pub fn gather<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, own: &[E]) -> Vec<E> {
+    let to_first = |count: usize| {
+        let mut counts = vec![0; ranks.count()];
+        counts[0] = count;
+        counts
+    };
+    let counts = announce(ranks, &to_first(own.len()));
+    let mut out = vec![Vec::new(); ranks.count()];
+    out[0] = own.to_vec();
+    exchange(ranks, &out, &counts)
+}
+
+/// Gives every rank the elements of one of them, as many as each has room for: a call of all.
+pub fn share<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, from: usize, elements: &mut [E]) {
+    if ranks.rank() != from {
+        ranks.receive(from, cast_slice_mut(elements));
+        return;
+    }
+    for to in (0..ranks.count()).filter(|to| *to != from) {
+        ranks.send(to, cast_slice(elements));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ranks_send_arrives_in_order() {
+        for count in 1..=5 {
+            let found = in_process(count, |ranks| {
+                let ranks = &*ranks;
+                let own = ranks.rank();
+                let out: Vec<Vec<u64>> =
+                    (0..count).map(|to| vec![(10 * own + to) as u64; to + own]).collect();
+                let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
+                let counts = announce(ranks, &lengths);
+                let all = exchange(ranks, &out, &counts);
+                let gathered = gather(ranks, &all);
+                let mut shared = [all.len() as u64, own as u64];
+                share(ranks, count - 1, &mut shared);
+                (all, gathered, shared, ranks.largest(own as u64))
+            });
+            let expected = |own: usize| -> Vec<u64> {
+                (0..count).flat_map(|from| vec![(10 * from + own) as u64; own + from]).collect()
+            };
+            let everything: Vec<u64> = (0..count).flat_map(expected).collect();
+            let last = expected(count - 1).len() as u64;
+            for (own, (all, gathered, shared, largest)) in found.into_iter().enumerate() {
+                assert_eq!(all, expected(own));
+                assert_eq!(gathered, if own == 0 { everything.clone() } else { Vec::new() });
+                assert_eq!((shared, largest), ([last, count as u64 - 1], count as u64 - 1));
+            }
+        }
+    }
+
+    #[test]
+    fn traffic_is_counted() {
+        let found = in_process(2, |ranks| {
+            let (ranks, traffic) = counted(ranks);
+            if ranks.rank() == 0 {
+                ranks.send(1, &[1, 2, 3]);
+                ranks.send(1, &[4]);
+            } else {
+                let (mut first, mut second) = ([0; 3], [0; 1]);
+                ranks.receive(0, &mut first);
+                ranks.receive(0, &mut second);
+                assert_eq!((first, second), ([1, 2, 3], [4]));
+            }
+            traffic.sent()
+        });
+        assert_eq!(found, [(2, 4), (0, 0)]);
+    }
+}
