@@ -46,7 +46,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Precision, word};
 use crate::library::Selection;
-use crate::{memory, number, terminal};
+use crate::{memory, number, processes, terminal};
 use scheme::Settled;
 
 /// A solution in the precisions that a simulation of it needs.
@@ -70,6 +70,10 @@ impl Model {
 
     /// Says on standard error what cases of more than a minute will take, and gives the seconds of each.
     fn announce(&self, cases: &[Case]) -> Option<Vec<f64>> {
+        // Each process would calibrate with the whole body.
+        if processes::ranks().is_some() {
+            return None;
+        }
         const LONG_S: f64 = 60.0;
         let seconds = predict::seconds(self, cases)?;
         let total: f64 = seconds.iter().sum();
@@ -88,7 +92,8 @@ impl Model {
         let mut extent = None;
         for case in cases {
             let plan = plan(&self.exact, self.arithmetic(), case)?;
-            memory::require(plan.bytes, case.cells)?;
+            let parts = processes::ranks().map_or(1, |ranks| ranks.count());
+            memory::require(plan.bytes / parts as f64, case.cells)?;
             extent = plan.extent;
         }
         Ok(extent)
@@ -132,6 +137,9 @@ fn settings(
     if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
         settings["polar_angles"] = json!(POLAR_ANGLES);
     }
+    if let Some(ranks) = processes::ranks() {
+        settings["ranks"] = ranks.count().into();
+    }
     if scheme.updated().is_some_and(|updated| updated.placement.is_clipped()) {
         settings["grid_angle"] = json!(parts.pose.angle);
         settings["grid_shift"] = json!(parts.pose.shift);
@@ -163,7 +171,7 @@ fn with_threads<R: Send>(
 ) -> Result<R> {
     // Zero lets rayon take all cores.
     rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.unwrap_or(0))
+        .num_threads(processes::threads(threads))
         .build()
         .context("--threads: cannot start the threads")?
         .install(work)

@@ -24,6 +24,7 @@ mod machine;
 mod memory;
 mod npy;
 mod number;
+mod processes;
 mod progress;
 mod svg;
 mod table;
@@ -48,16 +49,27 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = read(&given).unwrap_or_else(|refusal| refusal.exit());
     terminal::settle(arguments.talk.verbosity(), arguments.talk.color);
     terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
-    match perform(&arguments, &given) {
-        Ok(true) => 0,
-        Ok(false) => 1,
+    let joined = processes::join();
+    if !processes::is_first() {
+        terminal::silence();
+    }
+    let outcome = joined
+        .and_then(|()| processes::admit(&arguments.command))
+        .and_then(|()| perform(&arguments, &given));
+    match outcome {
+        Ok(passed) => {
+            processes::leave();
+            u8::from(!passed)
+        }
         Err(error) => {
             // A diagnostic is laid out as a whole already.
             match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
                 Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
                 None => terminal::error(format_args!("{error:#}")),
             }
-            if is_interrupted(&error) { INTERRUPTED } else { 2 }
+            let status = if is_interrupted(&error) { INTERRUPTED } else { 2 };
+            processes::fail(&message(&error), status);
+            status
         }
     }
 }

@@ -223,10 +223,20 @@ impl Generator<'_> {
         let (state, state_time, velocity_time, state_point) = self.state_stages();
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
         let (on_lattice, lattice_items) = self.body_force_on_lattice(&solution).unzip();
+        let lattice =
+            format_ident!("{}", if on_lattice.is_some() { "lattice" } else { "_lattice" });
+        if on_lattice.is_some() {
+            solution_items.extend(quote! {
+                fn has_form_on_lattice(&self) -> bool {
+                    true
+                }
+            });
+        }
         solution_items.extend(quote! {
-            fn body_force_at(
+            fn body_force_on(
                 &self,
                 X: &[#runtime::nalgebra::SVector<T, #dimension>],
+                #lattice: ::std::option::Option<#runtime::Lattice<T, #dimension>>,
             ) -> ::std::boxed::Box<dyn #runtime::BodyForceAtPoints<T, #dimension> + '_> {
                 #on_lattice
                 ::std::boxed::Box::new(#runtime::StagedPoints::<Self, T, #time, #point>::new(*self, X))
@@ -495,7 +505,7 @@ impl Generator<'_> {
         let (statements, values) = self.translator.statements(&self.staged.of_layers(lattice));
         let b = self.shaped(Shape::Vector, &values);
         let choice = quote! {
-            if let Some(lattice) = #runtime::Lattice::of(X) {
+            if let ::std::option::Option::Some(lattice) = lattice {
                 return ::std::boxed::Box::new(
                     #runtime::LatticePoints::<Self, T, #dimension, #time, #point, #layer>::new(*self, lattice),
                 );

@@ -309,10 +309,16 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         self.vector(&self.body_force, X, t)
     }
 
-    fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
-        if let Some(stages) = &self.lattice_stages
-            && let Some(lattice) = Lattice::of(X)
-        {
+    fn has_form_on_lattice(&self) -> bool {
+        self.lattice_stages.is_some()
+    }
+
+    fn body_force_on(
+        &self,
+        X: &[SVector<T, D>],
+        lattice: Option<Lattice<T, D>>,
+    ) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
+        if let (Some(stages), Some(lattice)) = (&self.lattice_stages, lattice) {
             return Box::new(stages.at(lattice, &self.parameters, self));
         }
         Box::new(self.body_force_stages.at(X, &self.parameters))

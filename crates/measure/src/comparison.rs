@@ -3,15 +3,15 @@
 use std::ops::Range;
 
 use mmsmith_mpm::{Law, Particles, Stressed};
+use mmsmith_ranks::{gather, share};
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::homes::{GROUP, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
-/// Particles in a group that one thread works on; fixed, so that sums do not depend on the number of threads.
-const GROUP: usize = 1024;
 /// Runs of particles for which what depends on the time alone is computed once.
 pub const RUNS: usize = 8;
 /// Particles in as many runs; what is compared of them fits into the first-level cache.
@@ -51,6 +51,18 @@ impl<'a, const D: usize> Comparison<'a, D> {
         PerField { u, v, F, P }
     }
 
+    /// As [`measure`](Self::measure) for one of several processes, of the particles of all of them; a call of all.
+    pub fn measure_all<T: Compared<D>>(
+        &self,
+        homes: &Homes,
+        observed: (&Particles<T, D>, &Law<T, D>),
+        time: f64,
+        lag: f64,
+    ) -> PerField<PerNorm<f64>> {
+        let [u, v, F, P] = over_homes(homes, &T::magnitudes(self, observed, (time, time - lag)));
+        PerField { u, v, F, P }
+    }
+
     /// The particle of largest position error at `time`, the first one without a number if there is such.
     pub fn worst_particle<T: Compared<D>>(
         &self,
@@ -58,6 +70,46 @@ impl<'a, const D: usize> Comparison<'a, D> {
         time: f64,
     ) -> usize {
         T::worst_particle(self, observed, time)
+    }
+
+    /// The magnitudes of the errors of u, v, F and P of every particle.
+    fn each<T: Compared<D>>(
+        &self,
+        observed: (&Particles<T, D>, &Law<T, D>),
+        times: (f64, f64),
+    ) -> Vec<[f64; 4]> {
+        let count = observed.0.len();
+        let of_chunk = |chunk: usize| {
+            let first = chunk * CHUNK;
+            let count = CHUNK.min(count - first);
+            let mut rows = [[[0.0; BLOCK]; 4]; RUNS];
+            let rows = &mut rows[..count.div_ceil(BLOCK)];
+            self.magnitudes(observed, times, &mut Room::zero(), first, rows);
+            let of_particle = |k: usize| std::array::from_fn(|n| rows[k / BLOCK][n][k % BLOCK]);
+            (0..count).map(of_particle).collect::<Vec<[f64; 4]>>()
+        };
+        each_group(count.div_ceil(CHUNK), &of_chunk).concat()
+    }
+
+    /// As [`worst_particle`](Self::worst_particle) for one of several processes, of the particles `ids` here and those of all others.
+    pub fn worst_of_all<T: Compared<D>>(
+        &self,
+        homes: &Homes,
+        ids: &[u64],
+        observed: (&Particles<T, D>, &Law<T, D>),
+        time: f64,
+    ) -> usize {
+        let errors = T::magnitudes(self, observed, (time, time));
+        let worst = errors.iter().zip(ids).fold((0.0, 0), |worst, (of, &id)| {
+            let error = of[0];
+            let is_worse = error > worst.0 || (error.is_nan() && !f64::is_nan(worst.0));
+            if is_worse { (error, id) } else { worst }
+        });
+        // Not numbers first, then the largest, then the first one.
+        let rank = |error: f64| if error.is_nan() { u64::MAX } else { error.to_bits() };
+        let largest = homes.ranks().largest(rank(worst.0));
+        let own = if rank(worst.0) == largest { worst.1 } else { u64::MAX };
+        !homes.ranks().largest(!own) as usize
     }
 
     fn worst<T: Compared<D>>(&self, observed: (&Particles<T, D>, &Law<T, D>), time: f64) -> usize {
@@ -109,6 +161,13 @@ pub trait Compared<const D: usize>: Real + Stressed<D> {
         times: (f64, f64),
     ) -> PerField<PerNorm<f64>>;
 
+    /// The magnitudes of the errors of u, v, F and P of every particle.
+    fn magnitudes(
+        comparison: &Comparison<'_, D>,
+        observed: (&Particles<Self, D>, &Law<Self, D>),
+        times: (f64, f64),
+    ) -> Vec<[f64; 4]>;
+
     /// The particle of largest position error at `time`.
     fn worst_particle(
         comparison: &Comparison<'_, D>,
@@ -126,6 +185,14 @@ macro_rules! compared {
                 times: (f64, f64),
             ) -> PerField<PerNorm<f64>> {
                 comparison.errors(observed, times)
+            }
+
+            fn magnitudes(
+                comparison: &Comparison<'_, $D>,
+                observed: (&Particles<Self, $D>, &Law<Self, $D>),
+                times: (f64, f64),
+            ) -> Vec<[f64; 4]> {
+                comparison.each(observed, times)
             }
 
             fn worst_particle(
@@ -306,6 +373,67 @@ pub fn over_particles<R, const N: usize>(
     room: impl Fn() -> R + Sync,
     magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
 ) -> [PerNorm<f64>; N] {
+    joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
+}
+
+/// The norms of `N` magnitudes over the particles of all processes, where `own` has those of this one's; a call of all.
+fn over_homes<const N: usize>(homes: &Homes, own: &[[f64; N]]) -> [PerNorm<f64>; N] {
+    let flat = own.as_flattened();
+    let here: Vec<f64> = {
+        let columns = (0..N).map(|n| {
+            let column: Vec<f64> = flat.iter().skip(n).step_by(N).copied().collect();
+            homes.bring(&column)
+        });
+        columns.collect::<Vec<_>>().concat()
+    };
+    let count = homes.here().len();
+    let groups = tallies(
+        count,
+        || (),
+        |(), first, rows: &mut [[Row<f64>; N]]| {
+            for (k, p) in (first..count.min(first + rows.len() * BLOCK)).enumerate() {
+                for n in 0..N {
+                    rows[k / BLOCK][n][k % BLOCK] = here[n * count + p];
+                }
+            }
+        },
+    );
+    let numbers: Vec<[f64; 4]> =
+        groups.iter().flatten().map(|tally: &Tally| tally.numbers()).collect();
+    let all = gather(homes.ranks(), numbers.as_flattened());
+    let all: Vec<Tally> = all
+        .chunks_exact(4)
+        .map(|numbers| Tally::of_numbers(std::array::from_fn(|k| numbers[k])))
+        .collect();
+    let groups: Vec<[Tally; N]> =
+        all.chunks_exact(N).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
+    let norms = joined(groups.iter()).map(|tally| tally.norms(homes.count()));
+    let mut numbers: Vec<f64> =
+        norms.iter().flat_map(|PerNorm { linf, l2, l1 }| [*linf, *l2, *l1]).collect();
+    share(homes.ranks(), 0, &mut numbers);
+    std::array::from_fn(|n| {
+        let [linf, l2, l1] = std::array::from_fn(|k| numbers[3 * n + k]);
+        PerNorm { linf, l2, l1 }
+    })
+}
+
+/// The tally of all groups, joined in their order.
+fn joined<'a, const N: usize>(groups: impl Iterator<Item = &'a [Tally; N]>) -> [Tally; N] {
+    let mut total = [Tally::default(); N];
+    for group in groups {
+        for (total, tally) in total.iter_mut().zip(group) {
+            *total = total.join(tally);
+        }
+    }
+    total
+}
+
+/// The tallies of each group of particles; `magnitudes` as for [`over_particles`].
+fn tallies<R, const N: usize>(
+    count: usize,
+    room: impl Fn() -> R + Sync,
+    magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
+) -> Vec<[Tally; N]> {
     let pass = |g: usize, scales: [f64; N]| {
         let mut room = room();
         let mut chunk = [[[0.0; BLOCK]; N]; RUNS];
@@ -337,13 +465,7 @@ pub fn over_particles<R, const N: usize>(
     let groups = count.div_ceil(GROUP);
     let place = backwards(groups, rayon::current_num_threads());
     let at_places = each_group(groups, &|at| group(place(at)));
-    let mut total = [Tally::default(); N];
-    for g in 0..groups {
-        for (total, tally) in total.iter_mut().zip(&at_places[place(g)]) {
-            *total = total.join(tally);
-        }
-    }
-    total.map(|tally| tally.norms(count))
+    (0..groups).map(|g| at_places[place(g)]).collect()
 }
 
 /// Magnitudes added to their tallies.

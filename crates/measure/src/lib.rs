@@ -4,6 +4,8 @@
 //! and dimension; what a run does but once in a while is elsewhere, and is compiled with less effort.
 
 mod comparison;
+mod homes;
 pub mod norms;
 
 pub use comparison::{Compared, Comparison, RUNS, Row, each_group, over_particles};
+pub use homes::Homes;

@@ -260,6 +260,16 @@ impl Tally {
         scale_of(self.max)
     }
 
+    /// All that a tally says.
+    pub(crate) fn numbers(&self) -> [f64; 4] {
+        [self.max, self.square, self.sum, self.scale]
+    }
+
+    /// The tally that these numbers say.
+    pub(crate) fn of_numbers([max, square, sum, scale]: [f64; 4]) -> Self {
+        Self { max, square, sum, scale }
+    }
+
     /// The norms over `count` particles.
     pub fn norms(&self, count: usize) -> PerNorm<f64> {
         let count = count as f64;

@@ -1,5 +1,7 @@
 //! Bodies of particles with the domains that they represent.
 
+use std::ops::Range;
+
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
@@ -48,6 +50,27 @@ impl<T, const D: usize> Default for Mesh<T, D> {
     }
 }
 
+impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
+    /// The corners of some successive particles.
+    fn part(&self, own: &Range<usize>) -> Self {
+        let mut part = Self { corners: self.corners[own.clone()].to_vec(), ..Self::default() };
+        let mut used: Vec<u32> =
+            part.corners.iter().flat_map(|corners| &corners[..1 << D]).copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        part.X = used.iter().map(|&corner| self.X[corner as usize]).collect();
+        part.x = used.iter().map(|&corner| self.x[corner as usize]).collect();
+        for corners in &mut part.corners {
+            let (own, others) = corners.split_at_mut(1 << D);
+            for corner in own {
+                *corner = used.partition_point(|known| known < corner) as u32;
+            }
+            others.fill(0);
+        }
+        part
+    }
+}
+
 /// A ring in the plane about the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Annulus<T> {
@@ -75,6 +98,25 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
             polygons: None,
             particles,
         }
+    }
+
+    /// Some successive particles alone, with their corners. Polygons stay as they are.
+    #[must_use]
+    pub fn part(&self, own: &Range<usize>) -> Self {
+        let Self { particles, half_edges, mesh, polygons } = self;
+        let Particles { X, x, v, F, mass, volume, half_size } = particles;
+        let particles = Particles {
+            X: X[own.clone()].to_vec(),
+            x: x[own.clone()].to_vec(),
+            v: v[own.clone()].to_vec(),
+            F: F[own.clone()].to_vec(),
+            mass: mass[own.clone()].to_vec(),
+            volume: volume[own.clone()].to_vec(),
+            half_size: *half_size,
+        };
+        let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
+        let mesh = mesh.as_ref().map(|mesh| mesh.part(own));
+        Self { particles, half_edges, mesh, polygons: polygons.clone() }
     }
 
     /// A ring at rest, fitted by polar cells of equal width and angle. Particles lie at the exact centroids of the cells

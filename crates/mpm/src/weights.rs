@@ -43,9 +43,14 @@ pub(crate) struct ExtendedWeights<T, const D: usize, const AFFINE: bool> {
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> ExtendedWeights<T, D, AFFINE> {
     #[inline(never)]
-    pub(crate) fn new(xi: &[T; D], l: &[T; D], strides: &[usize; D]) -> Self {
+    pub(crate) fn new(
+        xi: &[T; D],
+        l: &[T; D],
+        (strides, nodes_before): (&[usize; D], usize),
+    ) -> Self {
         let axes = extended_axes(xi, l);
-        let first_node = (0..D).map(|a| axes[a].base as usize * strides[a]).sum();
+        let first_node: usize = (0..D).map(|a| axes[a].base as usize * strides[a]).sum();
+        let first_node = first_node - nodes_before;
         Self { place: std::array::from_fn(|a| axes[a].after_first(xi[a])), axes, first_node }
     }
 }

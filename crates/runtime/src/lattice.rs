@@ -26,7 +26,23 @@ impl<T: Real, const D: usize> Lattice<T, D> {
     /// The points `X` by their layers; `None` where there are fewer than sixteen points a layer, or more than 65536 layers.
     #[must_use]
     pub fn of(X: &[SVector<T, D>]) -> Option<Self> {
-        let most = (X.len() / POINTS_A_LAYER).min(MOST_LAYERS);
+        let most = Self::most_layers(X.len());
+        Self::within(X, most).filter(|_| most > 0)
+    }
+
+    /// The points `X` by their layers, where the body that they are a part of is a lattice; `None` for more than 65536 layers.
+    #[must_use]
+    pub fn of_part(X: &[SVector<T, D>]) -> Option<Self> {
+        Self::within(X, MOST_LAYERS)
+    }
+
+    /// The most layers that so many points of a lattice may have.
+    #[must_use]
+    pub fn most_layers(points: usize) -> usize {
+        (points / POINTS_A_LAYER).min(MOST_LAYERS)
+    }
+
+    fn within(X: &[SVector<T, D>], most: usize) -> Option<Self> {
         let mut coordinates: [Vec<T>; D] = std::array::from_fn(|_| Vec::new());
         let mut known: [HashMap<u64, u16>; D] = std::array::from_fn(|_| HashMap::new());
         let mut layers = Vec::new();
@@ -45,7 +61,7 @@ impl<T: Real, const D: usize> Lattice<T, D> {
             }
             layers.push(own);
         }
-        (most > 0).then_some(Lattice { coordinates, layers })
+        Some(Lattice { coordinates, layers })
     }
 
     /// The coordinates of the layers along an axis, in the order of the points that had them first.

@@ -3,7 +3,8 @@
 use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
 use crate::{
-    BLOCK, BodyForceAtPoints, Boundary, Domain, Law, Real, StateAtPoints, StateRun, Surface,
+    BLOCK, BodyForceAtPoints, Boundary, Domain, Lattice, Law, Real, StateAtPoints, StateRun,
+    Surface,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -54,7 +55,21 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     ///
     /// Solutions that have no stages keep the positions and compute the rest at each evaluation.
     fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
+        let lattice = self.has_form_on_lattice().then(|| Lattice::of(X)).flatten();
+        self.body_force_on(X, lattice)
+    }
+    /// As [`body_force_at`](Self::body_force_at), at points whose lattice is known, or of which none is to be made use of: both ways
+    /// round in their own manner.
+    fn body_force_on(
+        &self,
+        X: &[SVector<T, D>],
+        _lattice: Option<Lattice<T, D>>,
+    ) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         Box::new(PlainPoints { solution: self, X: X.to_vec() })
+    }
+    /// Whether the body force has a form of its own on lattices.
+    fn has_form_on_lattice(&self) -> bool {
+        false
     }
     /// What a simulation is compared with at many fixed points, prepared as [`Solution::body_force_at`] prepares the body
     /// force: displacement, deformation gradient and stress at one time, and the velocity at another.

@@ -75,7 +75,7 @@ where
 {
     let started = Instant::now();
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, None)?;
     let setup_s = started.elapsed().as_secs_f64();
     let (mut done, mut wall_s, mut cpu_s) = (0, 0.0, 0.0);
     let mut each = Vec::new();

@@ -1,12 +1,15 @@
 //! A solver, what drives it, and the one loop that steps it.
 
+use std::collections::HashSet;
 use std::ops::{ControlFlow, RangeInclusive};
+use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{AtTime, BodyForce, Solver, StepError};
-use mmsmith_runtime::{BodyForceAtPoints, Real, Solution};
+use mmsmith_ranks::{Ranks, gather};
+use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
 use crate::case::Case;
@@ -54,13 +57,15 @@ pub(crate) enum Outcome<R> {
 pub(crate) type Seen<R> = Result<ControlFlow<R>, CaseError>;
 
 impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
-    /// The solver of a case at time zero with steps of `time_step`, whatever its formulation.
+    /// The solver of a case at time zero with steps of `time_step`, whatever its formulation. Where `ranks` simulate it together, all of
+    /// them call this.
     pub(crate) fn set_up(
         exact: &'a dyn Solution<f64, D>,
         model: &'a dyn Solution<T, D>,
         case: &Case,
         scene: &Scene<D>,
         time_step: f64,
+        ranks: Option<&Arc<dyn Ranks>>,
     ) -> Result<Self, CaseError>
     where
         f64: Precision<D>,
@@ -68,15 +73,20 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         let time_step: T = Real::nearest(time_step);
         let (mut solver, loaded) = match &case.scheme {
             Scheme::Updated(updated) => {
-                let set_up = updated::set_up(exact, model, updated, case, scene, time_step)?;
+                let set_up =
+                    updated::set_up(exact, model, updated, case, scene, (time_step, ranks))?;
                 let solver: Box<dyn Solver<T, D>> = set_up.solver;
                 (solver, set_up.loaded)
+            }
+            Scheme::Total(_) if ranks.is_some() => {
+                let instead = "updated-lagrangian, or start one process";
+                return Err(CaseError::setting("formulation", "total-lagrangian", instead));
             }
             Scheme::Total(total) => {
                 (total::set_up(exact, total, case, scene, time_step)?, Vec::new())
             }
         };
-        let body_force = ExactBodyForce::new(model, &solver.observe().0.X, loaded);
+        let body_force = ExactBodyForce::new(model, &solver.observe().0.X, loaded, ranks);
         Ok(Self { solver, body_force, dt: time_step.to_f64() })
     }
 }
@@ -101,6 +111,7 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
             if let Err(error) = outcome {
                 return Ok(Outcome::Stopped(error));
             }
+            self.body_force.follow(self.solver.as_mut());
             let (time, solver) = (step as f64 * self.dt, self.solver.as_mut());
             let is_interrupted = step_loop.is_interrupted();
             if let ControlFlow::Break(found) =
@@ -116,6 +127,22 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
     }
 }
 
+/// Whether the particles of all processes make a [`Lattice`]; a call of all.
+fn is_lattice<T: Real, const D: usize>(ranks: &dyn Ranks, X: &[SVector<T, D>]) -> bool {
+    let mut layers = 0;
+    for axis in 0..D {
+        let own: HashSet<u64> = X.iter().map(|X| X[axis].to_f64().to_bits()).collect();
+        // More than any lattice has, without telling which.
+        let own = own.into_iter().take(Lattice::<T, D>::most_layers(usize::MAX) + 1);
+        let all: HashSet<u64> = gather(ranks, &own.collect::<Vec<_>>()).into_iter().collect();
+        layers += all.len();
+    }
+    let points: u64 = gather(ranks, &[X.len() as u64]).iter().sum();
+    // What the first one has counted.
+    let most = Lattice::<T, D>::most_layers(points as usize);
+    ranks.largest(u64::from(most > 0 && layers <= most && ranks.rank() == 0)) > 0
+}
+
 /// The exact body force at the particles; what depends on their reference positions alone is kept.
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
@@ -123,11 +150,47 @@ struct ExactBodyForce<'a, T: Real, const D: usize> {
     /// Reference positions of points of the boundary with the exact stress, in the updated frame.
     loaded: Vec<SVector<T, D>>,
     planted: Planted,
+    /// Where several processes hold the particles, whether all of them make a lattice.
+    is_lattice: Option<bool>,
+    /// Of the arrangement that is kept.
+    version: Option<u64>,
 }
 
 impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
-    fn new(model: &'a dyn Solution<T, D>, X: &[SVector<T, D>], loaded: Vec<SVector<T, D>>) -> Self {
-        Self { kept: model.body_force_at(X), model, loaded, planted: Planted::here() }
+    fn new(
+        model: &'a dyn Solution<T, D>,
+        X: &[SVector<T, D>],
+        loaded: Vec<SVector<T, D>>,
+        ranks: Option<&Arc<dyn Ranks>>,
+    ) -> Self {
+        let planted = Planted::here();
+        let is_lattice = ranks.map(|ranks| model.has_form_on_lattice() && is_lattice(&**ranks, X));
+        let kept = Self::keep(model, X, is_lattice);
+        Self { kept, model, loaded, planted, is_lattice, version: None }
+    }
+
+    /// What is kept of particles that started at `X`. Those of one process may make a lattice where all do not, and the other way
+    /// round; the bits have to be those of all.
+    fn keep(
+        model: &'a dyn Solution<T, D>,
+        X: &[SVector<T, D>],
+        is_lattice: Option<bool>,
+    ) -> Box<dyn BodyForceAtPoints<T, D> + 'a> {
+        match is_lattice {
+            None => model.body_force_at(X),
+            Some(is_lattice) => {
+                model.body_force_on(X, is_lattice.then(|| Lattice::of_part(X)).flatten())
+            }
+        }
+    }
+
+    /// Takes note of particles that have come from other processes.
+    fn follow(&mut self, solver: &mut (dyn Solver<T, D> + 'a)) {
+        let version = solver.arrangement().map(|found| found.version);
+        if version != self.version {
+            self.version = version;
+            self.kept = Self::keep(self.model, &solver.observe().0.X, self.is_lattice);
+        }
     }
 }
 

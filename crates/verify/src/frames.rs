@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use mmsmith_mpm::{Law, Particles};
+use mmsmith_ranks::gather;
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Provenance, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use crate::inverse::inverse;
+use crate::measurement::Held;
 use crate::precision::Precision;
 
 /// Where and how often particle files are written.
@@ -77,26 +79,53 @@ impl FrameWriter {
         self.series.take_up(&times);
     }
 
-    /// Writes the state after `step` if it is one of those wanted.
+    /// Writes the state after `step` if it is one of those wanted: where several processes hold the particles, a piece each, and a
+    /// file that joins the pieces.
     pub(crate) fn write<T: Precision<D>, const D: usize>(
         &mut self,
         state: (&Particles<T, D>, &Law<T, D>),
+        held: Option<Held<'_>>,
         exact: &dyn Solution<f64, D>,
-        step: u64,
-        time: f64,
+        (step, time): (u64, f64),
     ) -> Result<(), Error> {
         if step < step_of_frame(self.next, self.count, self.steps) {
             return Ok(());
         }
         self.next += 1;
-        match frame(state, exact, step, time) {
-            Some(frame) => {
-                let velocity_time = (step > 0).then_some(time - self.velocity_lag);
-                let provenance = self.provenance.clone();
-                self.series.write(&Frame { velocity_time, provenance, ..frame }).map(|_| ())
-            }
-            None => Ok(()),
+        let velocity_time = (step > 0).then_some(time - self.velocity_lag);
+        let provenance = self.provenance.clone();
+        let frame = frame(state, exact, step, time);
+        let frame = frame.map(|frame| Frame { velocity_time, provenance, ..frame });
+        match held {
+            None => frame.map_or(Ok(()), |frame| self.series.write(&frame).map(|_| ())),
+            Some(held) => self.write_pieces(held, frame),
         }
+    }
+
+    fn write_pieces(
+        &mut self,
+        Held { ranks, ids }: Held<'_>,
+        frame: Option<Frame>,
+    ) -> Result<(), Error> {
+        let is_any_inside_out = ranks.largest(frame.is_none().into()) > 0;
+        let Some(mut frame) = frame.filter(|_| !is_any_inside_out) else { return Ok(()) };
+        for Array { values, .. } in &mut frame.arrays {
+            if let Values::Id(values) = values {
+                *values = ids.to_vec();
+            }
+        }
+        let is_empty = frame.points.is_empty();
+        if !is_empty {
+            // Whoever fails here ends all processes.
+            self.series.write_piece(self.next as usize - 1, &frame, ranks.rank())?;
+        }
+        // A piece is listed once it is whole.
+        let written = gather(ranks, &[u64::from(!is_empty)]);
+        if ranks.rank() == 0 {
+            let pieces: Vec<usize> = (0..ranks.count()).filter(|&rank| written[rank] > 0).collect();
+            self.series.join(&frame, &pieces)?;
+        }
+        Ok(())
     }
 }
 

@@ -3,9 +3,11 @@
 //! The body force of a manufactured solution does work, so that the energy of the exact motion is not constant. What a scheme
 //! gains or loses is the difference between the two.
 
-use mmsmith_measure::each_group;
+use bytemuck::Pod;
 use mmsmith_measure::norms::PerNorm;
+use mmsmith_measure::{Homes, each_group};
 use mmsmith_mpm::{Law, Particles};
+use mmsmith_ranks::{gather, share};
 use mmsmith_runtime::{Real, Solution};
 use serde::Serialize;
 
@@ -123,6 +125,74 @@ impl<const D: usize> Totals<D> {
     where
         f64: Precision<D>,
     {
+        let groups = Self::of_groups(particles, law, exact, time, velocity_time);
+        Self::joined(groups)
+    }
+
+    /// As [`of`](Self::of) for one of several processes, over the particles of all; a call of all.
+    fn of_all<T: Real + Pod>(
+        homes: &Homes,
+        particles: &Particles<T, D>,
+        law: &Law<f64, D>,
+        exact: &dyn Solution<f64, D>,
+        time: f64,
+        velocity_time: f64,
+    ) -> Self
+    where
+        f64: Precision<D>,
+    {
+        let Particles { X, x, v, F, mass, volume, half_size } = particles;
+        let here = Particles {
+            X: homes.bring(X),
+            x: homes.bring(x),
+            v: homes.bring(v),
+            F: homes.bring(F),
+            mass: homes.bring(mass),
+            volume: homes.bring(volume),
+            half_size: *half_size,
+        };
+        let groups = Self::of_groups(&here, law, exact, time, velocity_time);
+        let own: Vec<f64> = groups.iter().flat_map(Self::numbers).collect();
+        let all = gather(homes.ranks(), &own);
+        let groups = all.chunks_exact(Self::NUMBERS).map(Self::of_numbers).collect();
+        let mut numbers = Self::joined(groups).numbers();
+        share(homes.ranks(), 0, &mut numbers);
+        Self::of_numbers(&numbers)
+    }
+
+    /// Numbers that say the sums.
+    const NUMBERS: usize = 5 + 2 * D;
+
+    fn numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.exact_momenta];
+        for motion in [&self.computed, &self.exact] {
+            numbers.extend([motion.kinetic, motion.strain]);
+            numbers.extend(motion.momentum);
+        }
+        numbers
+    }
+
+    fn of_numbers(numbers: &[f64]) -> Self {
+        let motion = |first: usize| Motion {
+            kinetic: numbers[first],
+            strain: numbers[first + 1],
+            momentum: std::array::from_fn(|a| numbers[first + 2 + a]),
+        };
+        let (computed, exact) = (motion(1), motion(3 + D));
+        Self { computed, exact, exact_momenta: numbers[0], ..Self::of_none(0) }
+    }
+
+    /// The sums of each group of particles.
+    fn of_groups<T: Real>(
+        particles: &Particles<T, D>,
+        law: &Law<f64, D>,
+        exact: &dyn Solution<f64, D>,
+        time: f64,
+        velocity_time: f64,
+    ) -> Vec<Self>
+    where
+        f64: Precision<D>,
+    {
         let group = |g: usize| {
             let mut totals = Self::of_none(g * GROUP);
             for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
@@ -150,7 +220,10 @@ impl<const D: usize> Totals<D> {
             }
             totals
         };
-        let groups = each_group(particles.len().div_ceil(GROUP), &group);
+        each_group(particles.len().div_ceil(GROUP), &group)
+    }
+
+    fn joined(groups: Vec<Self>) -> Self {
         let mut total = Self::of_none(0);
         for next in groups {
             if next.error > total.error || next.error.is_nan() {
@@ -197,9 +270,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Takes the state after `step` down if its turn has come, or if it is the `last` one. `times` are those of positions and
     /// of velocities.
-    pub(crate) fn take<T: Real>(
+    ///
+    /// Where several processes hold the particles, `homes` says where their sums are formed; a call of all.
+    pub(crate) fn take<T: Real + Pod>(
         &mut self,
-        particles: &Particles<T, D>,
+        (particles, homes): (&Particles<T, D>, Option<&Homes>),
         (step, is_last): (u64, bool),
         (time, velocity_time): (f64, f64),
         u: PerNorm<f64>,
@@ -210,7 +285,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if step < next && !is_last {
             return;
         }
-        let totals = Totals::of(particles, &self.law, self.exact, time, velocity_time);
+        let (law, exact) = (&self.law, self.exact);
+        let totals = match homes {
+            None => Totals::of(particles, law, exact, time, velocity_time),
+            Some(homes) => Totals::of_all(homes, particles, law, exact, time, velocity_time),
+        };
         let (computed, exact) = (totals.computed.into(), totals.exact.into());
         self.moments.push(Moment { step, time, velocity_time, u, computed, exact });
     }

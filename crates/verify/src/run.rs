@@ -2,11 +2,12 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Instant;
 
-use mmsmith_measure::Comparison;
 use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
 use mmsmith_mpm::StepError;
+use mmsmith_ranks::Ranks;
 use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
@@ -17,6 +18,7 @@ use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
 use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::history::{Moment, Recorder};
+use crate::measurement::Measurement;
 use crate::plan::{Prepared, Steps, prepare};
 use crate::points;
 use crate::precision::Precision;
@@ -49,6 +51,9 @@ pub struct Outputs<'a> {
     /// last state included; what is there before the run is removed. A run that goes on from a checkpoint has those before it, if it was written with
     /// a history.
     pub history: Option<&'a mut Vec<Moment>>,
+    /// The processes that simulate it together, where there are several. All of them call [`run`] alike; files other than
+    /// particle files and checkpoints are those of rank 0.
+    pub ranks: Option<Arc<dyn Ranks>>,
     /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
     pub until: Option<Instant>,
 }
@@ -62,6 +67,7 @@ impl<'a> Outputs<'a> {
             snapshot: None,
             checkpoints: None,
             history: None,
+            ranks: None,
             until: None,
         }
     }
@@ -220,7 +226,7 @@ where
     f64: Precision<D>,
 {
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt)?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, outputs.ranks.as_ref())?;
     let mut row = follow(&mut driven, exact, case, &scene, steps, outputs)?;
     if row.status == Status::Ok {
         let unit = T::default_epsilon().to_f64() / 2.0;
@@ -271,7 +277,8 @@ where
     let dt = driven.dt;
     let solver = driven.solver.as_mut();
     let lag = solver.velocity_lag().to_f64();
-    let comparison = Comparison::new(exact, &solver.observe().0.X);
+    let mut measurement = Measurement::new(exact, solver, outputs.ranks.as_ref());
+    let count = measurement.count(solver);
     let mut frames = match outputs.frames {
         Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
         None => None,
@@ -295,16 +302,21 @@ where
             reached
         } else {
             if let Some(frames) = &mut frames {
-                frames.write(solver.observe(), exact, 0, 0.0)?;
+                frames.write(solver.observe(), measurement.held(), exact, (0, 0.0))?;
             }
             if let Some(snapshot) = &mut outputs.snapshot {
                 snapshot.take(solver.observe(), exact, (0, steps.count), 0.0);
             }
-            let at_start = comparison.measure(solver.observe(), 0.0, lag);
+            let at_start = measurement.errors(solver, 0.0, lag);
             if let Some(recorder) = &mut recorder {
                 let velocity_time = if case.scheme.starts_early() { -lag } else { 0.0 };
                 let particles = solver.observe().0;
-                recorder.take(particles, (0, false), (0.0, velocity_time), at_start.u);
+                recorder.take(
+                    (particles, measurement.homes()),
+                    (0, false),
+                    (0.0, velocity_time),
+                    at_start.u,
+                );
             }
             // Before the first step no velocity is stored yet that belongs to a time of the scheme.
             Reached {
@@ -320,15 +332,17 @@ where
         done = step;
         wall_s += of_step;
         cpu_s += cpu_of_step;
-        let measured = comparison.measure(solver.observe(), time, lag);
+        measurement.follow(solver);
+        let is_interrupted = measurement.any(is_interrupted);
+        let measured = measurement.errors(solver, time, lag);
         errors = PerField::combine(&errors, &measured, PerNorm::larger);
         let error = measured.u.linf;
         let mut end = (error > scene.size || error.is_nan()).then(|| {
-            let particle = comparison.worst_particle(solver.observe(), time);
+            let particle = measurement.worst_particle(solver, time);
             Status::Unstable { step, time, particle, error, size: scene.size }
         });
         if let Some(frames) = &mut frames {
-            frames.write(solver.observe(), exact, step, time)?;
+            frames.write(solver.observe(), measurement.held(), exact, (step, time))?;
         }
         if let Some(snapshot) = &mut outputs.snapshot {
             snapshot.take(solver.observe(), exact, (step, steps.count), time);
@@ -341,7 +355,8 @@ where
         }
         if let Some(recorder) = &mut recorder {
             let particles = solver.observe().0;
-            recorder.take(particles, (step, end.is_some()), (time, time - lag), measured.u);
+            let at = (time, time - lag);
+            recorder.take((particles, measurement.homes()), (step, end.is_some()), at, measured.u);
         }
         if let Some(end) = end {
             return Ok(ControlFlow::Break(end));
@@ -360,7 +375,6 @@ where
         Outcome::Stopped(error) => Status::Stopped(error),
         Outcome::Left(status) => status,
     };
-    let count = driven.solver.observe().0.len();
     let particle_steps = count as f64 * done as f64;
     Ok(Row {
         cells: case.cells,

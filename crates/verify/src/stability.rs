@@ -427,7 +427,7 @@ where
     let time_step = waves.time_step(case.cfl);
     // In the solver's precision, which is what it steps with.
     let count = steps_to(end, <T as Real>::nearest(time_step).to_f64())?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, time_step)?;
+    let mut driven = Driven::set_up(exact, model, case, &scene, time_step, None)?;
     Run { exact, scene: &scene, cfl: case.cfl, count, limits }.follow(&mut driven)
 }
 

@@ -135,7 +135,7 @@ where
             let share = (before + step) as f64 / total as f64;
             progress(Progress { case: index, step, steps: count, share });
         };
-        let set_up = Driven::set_up(exact, model, base, &scene, end / count as f64);
+        let set_up = Driven::set_up(exact, model, base, &scene, end / count as f64, None);
         let run = set_up.and_then(|driven| observe(driven, exact, &scene, count, &mut report));
         states.insert(count, run.map_err(|cause| StudyError { index, cause })?);
         before += count;

@@ -1,8 +1,14 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Arc;
+
 use mmsmith_mpm::{
-    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Side, Simulation, Solver,
+    Annulus, Body, Clip, Facet, Load, Particles, Settings, SetupError, Shape, Share, Side,
+    Simulation, Solver,
 };
+use mmsmith_ranks::Ranks;
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
@@ -120,23 +126,75 @@ fn load_points<const D: usize>(
     weights.into_iter().map(of_point).collect()
 }
 
-/// The body of a case at rest in the reference configuration.
+/// The particles of a body, in the order of their numbers, that a process begins with: as many as each other one does.
+fn born_here<const D: usize>(
+    scene: &Scene<D>,
+    updated: &Updated,
+    case: &Case,
+    ranks: &Arc<dyn Ranks>,
+) -> Result<Share, CaseError> {
+    let count = match (updated.placement, &scene.domain) {
+        (Placement::Clipped { .. }, _) => {
+            return Err(SetupError::PolygonsOfOneProcess.into());
+        }
+        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
+            let quarter = scene.extent() == Some(Extent::Quarter);
+            let ring = Annulus { inner, outer, quarter };
+            Body::<f64, D>::annulus(&ring, scene.spacing, case.per_cell, 1.0)?.particles.len()
+        }
+        (placement, _) => {
+            let inside = scene.inside(case.per_cell, placement.offset());
+            let count = Cell::new(0);
+            let none = Particles::<f64, D>::lattice(&scene.grid(), case.per_cell, 1.0, |X| {
+                count.set(count.get() + usize::from(inside(X)));
+                false
+            });
+            count.get() + none.len()
+        }
+    };
+    if count == 0 {
+        return Err(SceneError::Empty { cells: case.cells }.into());
+    }
+    let first = |rank: usize| (count * rank / ranks.count()) as u64;
+    let ids = (first(ranks.rank())..first(ranks.rank() + 1)).collect();
+    Ok(Share { ranks: ranks.clone(), ids })
+}
+
+/// The numbers of the particles of a share, which follow each other.
+fn numbers(share: &Share) -> Range<usize> {
+    let first = share.ids.first().map_or(0, |id| *id as usize);
+    first..first + share.ids.len()
+}
+
+/// The body of a case at rest in the reference configuration, or the share of it that a process begins with.
 fn body<T: Real, const D: usize>(
     scene: &Scene<D>,
     updated: &Updated,
     per_cell: usize,
     density: f64,
+    share: Option<&Share>,
 ) -> Result<Body<T, D>, CaseError> {
     let (grid, density) = (scene.grid::<T>(), T::nearest(density));
     let offset = match (updated.placement, &scene.domain) {
         (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
             let quarter = scene.extent() == Some(Extent::Quarter);
             let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
-            return Ok(Body::annulus(&ring, grid.spacing, per_cell, density)?);
+            let whole = Body::annulus(&ring, grid.spacing, per_cell, density)?;
+            return Ok(match share {
+                None => whole,
+                Some(share) => whole.part(&numbers(share)),
+            });
         }
         (placement, _) => placement.offset(),
     };
     let inside = scene.inside(per_cell, offset);
+    let next = Cell::new(0);
+    let own = share.map(numbers);
+    let inside = |X: &SVector<T, D>| {
+        let is_inside = inside(X);
+        let number = next.replace(next.get() + usize::from(is_inside));
+        is_inside && own.as_ref().is_none_or(|own| own.contains(&number))
+    };
     let mut body = match updated.shape {
         Shape::Cpdi2 => Body::lattice(&grid, per_cell, density, inside),
         _ => Particles::lattice(&grid, per_cell, density, inside).into(),
@@ -167,14 +225,18 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     updated: &Updated,
     case: &Case,
     scene: &Scene<D>,
-    time_step: T,
+    (time_step, ranks): (T, Option<&Arc<dyn Ranks>>),
 ) -> Result<SetUp<T, D>, CaseError> {
+    let share = match ranks {
+        Some(ranks) => Some(born_here(scene, updated, case, ranks)?),
+        None => None,
+    };
     let (mut body, loaded) = if updated.placement.is_clipped() {
         clipped(scene, updated.placement, case.per_cell, exact.density())?
     } else {
-        (body::<T, D>(scene, updated, case.per_cell, exact.density())?, Vec::new())
+        (body::<T, D>(scene, updated, case.per_cell, exact.density(), share.as_ref())?, Vec::new())
     };
-    if body.particles.is_empty() {
+    if body.particles.is_empty() && share.is_none() {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
@@ -204,7 +266,11 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         time_step,
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
-    let simulation = Simulation::new(scene.grid(), body, law(model.law())?, settings)?;
+    let (grid, law) = (scene.grid(), law(model.law())?);
+    let simulation = match share {
+        None => Simulation::new(grid, body, law, settings)?,
+        Some(share) => Simulation::shared_out(grid, body, share, law, settings)?,
+    };
     Ok(SetUp { solver: Box::new(simulation), loaded })
 }
 

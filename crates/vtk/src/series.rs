@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Frame, to_bytes, whole_file};
+use crate::{Array, Error, Frame, Values, to_bytes, whole_file};
 
 /// A folder with numbered `.vtu` files and one `.pvd` file that lists them with their times.
 ///
@@ -77,6 +77,41 @@ impl Series {
         Ok(path)
     }
 
+    /// Writes the next frame's piece of one of several processes, beside which [`join`](Self::join) has to be called by one of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`write`](Self::write).
+    pub fn write_piece(&self, number: usize, piece: &Frame, process: usize) -> Result<(), Error> {
+        let path = self.folder.join(self.piece(number, process));
+        whole_file::replace(&path, &to_bytes(piece)?)
+    }
+
+    /// Adds the frame that the `pieces` of some processes make to the list; returns the path of the file that joins them. `like` has
+    /// the arrays of each piece.
+    ///
+    /// # Errors
+    ///
+    /// Where the file system refuses, as [`write`](Self::write).
+    pub fn join(&mut self, like: &Frame, pieces: &[usize]) -> Result<PathBuf, Error> {
+        let number = self.listed.len();
+        let file = format!("{}-{number:06}.pvtu", self.name);
+        let path = self.folder.join(&file);
+        let sources = pieces.iter().map(|&process| escape(&self.piece(number, process)));
+        let text = joined(like, sources);
+        whole_file::replace(&path, text.as_bytes())?;
+        self.listed.push((like.time, file));
+        if let Err(error) = whole_file::replace(&self.pvd, self.list().as_bytes()) {
+            self.listed.pop();
+            return Err(error);
+        }
+        Ok(path)
+    }
+
+    fn piece(&self, number: usize, process: usize) -> String {
+        format!("{}-{number:06}-{process}.vtu", self.name)
+    }
+
     /// The file that lists the frames: the one to open in ParaView. It is there once a frame is written.
     pub fn pvd(&self) -> &Path {
         &self.pvd
@@ -94,6 +129,31 @@ impl Series {
         }
         list + "  </Collection>\n</VTKFile>\n"
     }
+}
+
+/// The file of a frame in pieces.
+fn joined(like: &Frame, sources: impl Iterator<Item = String>) -> String {
+    let array = |name: &str, number: &str, components: usize| {
+        format!(
+            "<PDataArray type=\"{number}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>\n"
+        )
+    };
+    let arrays = like.arrays.iter().map(|Array { name, values }| match values {
+        Values::Scalar(_) => array(name, "Float64", 1),
+        Values::Vector(_) => array(name, "Float64", 3),
+        Values::Tensor(_) => array(name, "Float64", 9),
+        Values::Id(_) => array(name, "UInt64", 1),
+    });
+    let arrays: String = arrays.map(|line| format!("      {line}")).collect();
+    let pieces: String =
+        sources.map(|source| format!("    <Piece Source=\"{source}\"/>\n")).collect();
+    format!(
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  \
+         <PUnstructuredGrid GhostLevel=\"0\">\n    <PPoints>\n      {}    </PPoints>\n    <PPointData>\n{arrays}    </PPointData>\n{pieces}  \
+         </PUnstructuredGrid>\n</VTKFile>\n",
+        array("Points", "Float64", 3)
+    )
 }
 
 /// The text as it stands between the quotes of an XML attribute.

@@ -1,6 +1,7 @@
 //! `mms run`: one simulation.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
@@ -20,7 +21,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
-use crate::{csv, number, terminal};
+use crate::{csv, number, processes, terminal};
 
 /// A run, by the words of its command line.
 pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
@@ -43,15 +44,18 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let cells = options.cells.unwrap_or(settled.case.cells);
     let case = Case { cells, ..settled.case };
     let extent = model.admit(&[case])?;
-    let output = Output::prepare_if(settled.json.as_ref())?;
-    let [history, plot] =
-        [&options.history, &options.plot].map(|path| Output::prepare_if(path.as_ref()));
-    let (history, plot) = (history?, plot?);
+    let keeps_history = options.history.is_some() || options.plot.is_some();
+    // One process writes what all have done.
+    let prepare = |path: &Option<PathBuf>| {
+        Output::prepare_if(path.as_ref().filter(|_| processes::is_first()))
+    };
+    let [output, history, plot] = [&settled.json, &options.history, &options.plot].map(prepare);
+    let (output, history, plot) = (output?, history?, plot?);
     if let Some(folder) = &options.vtk {
         prepare_folder(folder).context("--vtk")?;
     }
     let mut picture = Picture::asked(&options.picture, case.periods)?;
-    let mut moments = (history.is_some() || plot.is_some()).then(Vec::new);
+    let mut moments = keeps_history.then(Vec::new);
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
         name: selection.name().to_owned(),
@@ -80,6 +84,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 checkpoints: checkpoints.as_ref(),
                 history: moments.as_mut(),
                 snapshot: picture.as_mut().map(Picture::snapshot),
+                ranks: processes::ranks(),
                 ..Outputs::new(show)
             };
             let row = simulate(&model.exact, model.arithmetic(), &case, &mut outputs);

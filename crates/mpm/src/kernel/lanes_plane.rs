@@ -1,5 +1,7 @@
 //! P2G and G2P in the plane and on a line: velocity and acceleration of a node fit one register of four lanes.
 
+use std::ops::Range;
+
 use crate::kernel::any::{Contributions, Receive};
 use crate::node::{LANES, Node};
 use crate::simd::{Lane4, Lanes, Vectors};
@@ -261,7 +263,7 @@ fn slopes<T: Lanes, V: Vectors, const D: usize, const N: usize>(
     slopes
 }
 
-/// G2P of the first `count` particles, particle `k` with the weights `weights(k)`; as [`g2p`](crate::kernel::any::g2p).
+/// G2P of some successive `particles`, particle `k` with the weights `weights(k)`; as [`g2p`](crate::kernel::any::g2p).
 ///
 /// Successive particles with the same nodes form a run, which shares the differences between nodes.
 #[inline(always)]
@@ -270,7 +272,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
     weights: impl Fn(usize) -> L,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
-    count: usize,
+    particles: Range<usize>,
     receiver: &mut impl Receive<T, D>,
 ) where
     T: Lanes,
@@ -279,7 +281,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
 {
     let zero = Lane4::zero();
     let rows = rows::<D, W>();
-    let mut k = 0;
+    let Range { start: mut k, end: count } = particles;
     while k < count {
         let start = weights(k).first_node();
         let mut changes = [[zero; W]; W];
@@ -489,7 +491,7 @@ mod tests {
         let mut interpolated = [Interpolated::zero(); COUNT];
         if D < 3 {
             let receiver = &mut &mut interpolated[..];
-            g2p_in_plane(vectors, |k| &weights[k], &strides, &nodes, COUNT, receiver);
+            g2p_in_plane(vectors, |k| &weights[k], &strides, &nodes, 0..COUNT, receiver);
         } else {
             for (interpolated, weights) in interpolated.iter_mut().zip(&weights) {
                 *interpolated = g2p_in_space(vectors, &weights, &strides, &nodes);

@@ -38,6 +38,8 @@ pub(crate) struct ProductWeights<T, const D: usize> {
     is_affine: bool,
     /// Index of the first node of every particle.
     first_node: [usize; BLOCK],
+    /// As in [`Constants`].
+    nodes_before: usize,
     /// Weights `S[axis][place][k]`, except for the [middle node](is_middle).
     S: AtNodes<T, D>,
     /// Gradients per cell, in the same layout.
@@ -63,6 +65,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
             width: shape.width(),
             is_affine,
             first_node: [0; BLOCK],
+            nodes_before: 0,
             S: [[zero; MOST_NODES]; D],
             G: [[zero; MOST_NODES]; D],
             Z: [[zero; MOST_NODES]; D],
@@ -80,6 +83,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         shape: &ProductShape<T, D>,
         kinematics: Kinematics<'_, T, D>,
     ) {
+        self.nodes_before = c.nodes_before as usize;
         let l = &shape.l;
         match shape.on_axis {
             OnAxis::Hat => self.compute_on_axes::<Hat, 2, false>(c, l, kinematics),
@@ -432,6 +436,7 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
         for k in 0..count {
             let given = (contributions, k);
             if let Some((xi, l)) = weights.extended(k) {
+                let strides = (strides, weights.nodes_before);
                 p2g_extended::<T, D, AFFINE>(&xi, &l, strides, band, first, given);
             } else if D == 3 {
                 p2g_in_space(vectors, &of_particle(k), strides, band, first, given);
@@ -446,12 +451,12 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     xi: &[T; D],
     l: &[T; D],
-    strides: &[usize; D],
+    (strides, nodes_before): (&[usize; D], usize),
     band: &mut [Node<T, D>],
     first: usize,
     contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
-    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, strides);
+    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, (strides, nodes_before));
     p2g(&weights, strides, band, first, contribution);
 }
 
@@ -477,17 +482,25 @@ where
         let Self(G2pOfBlock { weights, strides, nodes, count, mut receiver }) = self;
         let count = count.min(BLOCK);
         let of_particle = |k| ParticleWeights::<T, D, W, AFFINE> { weights, k };
-        if D <= 2 && !weights.any_extended {
-            g2p_in_plane(vectors, of_particle, strides, nodes, count, &mut receiver);
-            return;
-        }
-        for k in 0..count {
-            let interpolated = match weights.extended(k) {
-                Some((xi, l)) => g2p_extended::<T, D, AFFINE>(&xi, &l, strides, nodes),
-                None if D == 3 => g2p_in_space(vectors, &of_particle(k), strides, nodes),
-                None => g2p(&of_particle(k), strides, nodes),
-            };
-            receiver.receive(k, &interpolated);
+        // A particle's bits do not depend on the others of its block, which are others where the body is shared out.
+        let mut k = 0;
+        while k < count {
+            if let Some((xi, l)) = weights.extended(k) {
+                let strides = (strides, weights.nodes_before);
+                receiver.receive(k, &g2p_extended::<T, D, AFFINE>(&xi, &l, strides, nodes));
+                k += 1;
+            } else if D == 3 {
+                receiver.receive(k, &g2p_in_space(vectors, &of_particle(k), strides, nodes));
+                k += 1;
+            } else {
+                let is_extended = |k: &usize| weights.extended(*k).is_some();
+                let end = match weights.any_extended {
+                    true => (k + 1..count).find(is_extended).unwrap_or(count),
+                    false => count,
+                };
+                g2p_in_plane(vectors, of_particle, strides, nodes, k..end, &mut receiver);
+                k = end;
+            }
         }
     }
 }
@@ -496,10 +509,11 @@ where
 fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     xi: &[T; D],
     l: &[T; D],
-    strides: &[usize; D],
+    (strides, nodes_before): (&[usize; D], usize),
     nodes: &[Node<T, D>],
 ) -> Interpolated<T, D> {
-    g2p(&ExtendedWeights::<T, D, AFFINE>::new(xi, l, strides), strides, nodes)
+    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, (strides, nodes_before));
+    g2p(&weights, strides, nodes)
 }
 
 #[cfg(test)]
@@ -542,7 +556,7 @@ mod tests {
                 block.compute(&c, &shape, Kinematics { x: &x, F: &F });
                 let exact = |k: usize| {
                     let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
-                    ExtendedWeights::<_, D, AFFINE>::new(&c.in_cells(&x[k]), &l, &c.strides)
+                    ExtendedWeights::<_, D, AFFINE>::new(&c.in_cells(&x[k]), &l, (&c.strides, 0))
                 };
                 for count in [BLOCK, 41] {
                     let mut interpolated = [Interpolated::zero(); BLOCK];

@@ -133,16 +133,20 @@ where
                 Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
             fly(&mut part, steps)
         });
-        let what = format!("{count} processes, {settings:?}");
+        let what = format!("{count} processes, {steps} steps from {speed}, {settings:?}");
+        let sorted = found[0].2;
         // Cuts or particles have moved on the way.
-        assert!(error.is_some() || found[0].2 > 1, "{what}: sorted {} times", found[0].2);
+        assert!(error.is_some() || sorted > 1, "{what}: sorted {sorted} times");
         for (particles, found, _) in &found {
             assert_eq!(found, &error, "{what}");
             assert!(particles.is_sorted_by_key(|of| of.0), "{what}");
         }
         let mut all: Vec<Of<D>> = found.into_iter().flat_map(|(particles, ..)| particles).collect();
         all.sort_by_key(|of| of.0);
-        assert!(all == expected, "{what}");
+        assert_eq!(all.len(), expected.len(), "{what}");
+        // As text: what is not a number equals itself.
+        let other = all.iter().zip(&expected).find(|(a, b)| format!("{a:?}") != format!("{b:?}"));
+        assert_eq!(other, None, "{what}, {error:?}, sorted {sorted} times");
     }
 }
 
@@ -161,7 +165,7 @@ fn every_scheme_has_the_bits_of_one_process() {
 #[test]
 fn so_it_is_on_a_line_and_in_space() {
     for settings in schemes::schemes().map(flying).step_by(3) {
-        agrees::<1>(settings, &[2, 4], 16.0, 40);
+        agrees::<1>(settings, &[2, 4], -16.0, 30);
         agrees::<3>(settings, &[3], -14.0, 9);
     }
 }
@@ -205,5 +209,43 @@ proptest! {
         // Fast enough to be sorted once more.
         let speed = speed + 12.0 * speed.signum();
         agrees::<2>(settings, &[count], speed, steps);
+    }
+}
+
+#[test]
+fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
+    let mut grid = grid::<2>();
+    for (cells, shape) in
+        [(48, Shape::Gimp), (56, Shape::Bspline2), (63, Shape::Gimp), (64, Shape::Bspline3)]
+    {
+        grid.cells[1] = cells;
+        let settings = flying(schemes::settings(shape, Integrator::Cd, Transfer::Flip));
+        let mut whole = Body::lattice(&grid, 2, 2.0, |_| true);
+        for (k, v) in whole.particles.v.iter_mut().enumerate() {
+            *v = SVector::from_fn(|a, _| 0.5 * noise(7 * k + a));
+        }
+        for steps in [0, 1, 2, 6] {
+            let mut alone = Simulation::new(grid.clone(), whole.clone(), law(), settings).unwrap();
+            let (expected, ..) = fly(&mut alone, steps);
+            for count in 1..=6 {
+                let found = in_process(count, |ranks| {
+                    let (body, ids) = share(&whole, &*ranks);
+                    let share = Share { ranks, ids };
+                    let mut part =
+                        Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
+                    fly(&mut part, steps).0
+                });
+                let mut all: Vec<Of<2>> = found.concat();
+                all.sort_by_key(|of| of.0);
+                let other: Vec<_> = all.iter().zip(&expected).filter(|(a, b)| a != b).collect();
+                assert_eq!(
+                    other.first(),
+                    None,
+                    "{} of {} differ: {count} processes, {cells} cells, {steps} steps, {shape:?}",
+                    other.len(),
+                    all.len()
+                );
+            }
+        }
     }
 }

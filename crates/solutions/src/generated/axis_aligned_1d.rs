@@ -470,9 +470,10 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     fn period(&self) -> T {
         self.fixed[15]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 1>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }

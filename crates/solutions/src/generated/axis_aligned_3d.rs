@@ -1064,11 +1064,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     fn period(&self) -> T {
         self.fixed[25]
     }
-    fn body_force_at(
+    fn has_form_on_lattice(&self) -> bool {
+        true
+    }
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
+        lattice: ::std::option::Option<crate::Lattice<T, 3>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        if let Some(lattice) = crate::Lattice::of(X) {
+        if let ::std::option::Option::Some(lattice) = lattice {
             return ::std::boxed::Box::new(
                 crate::LatticePoints::<Self, T, 3, 15, 2, 5>::new(*self, lattice),
             );

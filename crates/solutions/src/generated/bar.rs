@@ -510,9 +510,10 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     fn period(&self) -> T {
         self.fixed[16]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 1>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 2>::new(*self, X))
     }

@@ -511,11 +511,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for RigidMotion<T> {
     fn period(&self) -> T {
         self.fixed[7]
     }
-    fn body_force_at(
+    fn has_form_on_lattice(&self) -> bool {
+        true
+    }
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
+        lattice: ::std::option::Option<crate::Lattice<T, 2>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        if let Some(lattice) = crate::Lattice::of(X) {
+        if let ::std::option::Option::Some(lattice) = lattice {
             return ::std::boxed::Box::new(
                 crate::LatticePoints::<Self, T, 2, 5, 1, 2>::new(*self, lattice),
             );

@@ -789,9 +789,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     fn period(&self) -> T {
         self.fixed[12]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 2>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 3, 4>::new(*self, X))
     }

@@ -1620,9 +1620,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     fn period(&self) -> T {
         self.fixed[20]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 2>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 20, 9>::new(*self, X))
     }

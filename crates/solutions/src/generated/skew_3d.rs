@@ -2596,9 +2596,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for Skew3d<T> {
     fn period(&self) -> T {
         self.fixed[29]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 3>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 20, 10>::new(*self, X))
     }

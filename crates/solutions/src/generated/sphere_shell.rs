@@ -1197,9 +1197,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     fn period(&self) -> T {
         self.fixed[25]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 3>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 12>::new(*self, X))
     }

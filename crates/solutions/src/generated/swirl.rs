@@ -1553,9 +1553,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Swirl<T> {
     fn period(&self) -> T {
         self.fixed[14]
     }
-    fn body_force_at(
+    fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
+        _lattice: ::std::option::Option<crate::Lattice<T, 2>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
         ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 8, 6>::new(*self, X))
     }

@@ -24,6 +24,7 @@ fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
         snapshot: None,
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     run(exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -36,6 +37,7 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
         snapshot: None,
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     run(exact, Arithmetic::Single(single), case, &mut outputs).expect("a case that can be run")

@@ -27,6 +27,7 @@ fn history<S: Plane>(solution: S, case: &Case) -> (Row, Vec<Moment>) {
         snapshot: None,
         checkpoints: None,
         history: Some(&mut moments),
+        ranks: None,
         until: None,
     };
     let row = run(&exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run");

@@ -4,4 +4,5 @@ mod check;
 mod extremes;
 mod hand_coded;
 mod history;
+mod ranks;
 mod run;

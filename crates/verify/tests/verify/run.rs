@@ -24,6 +24,7 @@ fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
         snapshot: None,
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     run(solution, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -130,6 +131,7 @@ fn single_precision_has_the_same_particles_and_nearly_the_same_error() {
             snapshot: None,
             checkpoints: None,
             history: None,
+            ranks: None,
             until: None,
         };
         let coarse = run(&double, Arithmetic::Single(&single), &case, &mut outputs).unwrap();
@@ -158,6 +160,7 @@ fn conditions_that_the_solver_does_not_model_are_named() {
         snapshot: None,
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     let error =
@@ -174,6 +177,7 @@ fn an_extent_is_for_rings_only() {
         snapshot: None,
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     let error = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap_err();
@@ -197,6 +201,7 @@ fn frames_hold_what_the_row_measured() {
         snapshot: Some(&mut snapshot),
         checkpoints: None,
         history: None,
+        ranks: None,
         until: None,
     };
     let row = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap();

@@ -1,0 +1,126 @@
+//! The processes that mpirun started together, where it did.
+
+use std::io::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use mmsmith_verify::Ranks;
+
+use crate::arguments::Command;
+
+/// Variables in which launchers tell how many processes they started, and how many on this machine.
+const COUNTS: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
+const COUNTS_HERE: [&str; 3] =
+    ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_TASKS_PER_NODE"];
+
+/// The processes, as long as this one is one of several.
+static RANKS: Mutex<Option<Arc<dyn Ranks>>> = Mutex::new(None);
+
+fn number(names: &[&str]) -> Option<usize> {
+    let value = names.iter().find_map(|name| std::env::var(name).ok())?;
+    // Slurm writes 4(x2) for two machines of four each.
+    let digits = value.chars().take_while(char::is_ascii_digit).collect::<String>();
+    digits.parse().ok()
+}
+
+/// Whether the process was started alone, as far as launchers tell.
+fn is_alone() -> bool {
+    number(&COUNTS).is_none_or(|count| count <= 1)
+}
+
+/// Joins the other processes, if there are any: for the command's own program.
+///
+/// # Errors
+///
+/// Where the program cannot.
+pub(crate) fn join() -> Result<()> {
+    if is_alone() {
+        return Ok(());
+    }
+    *RANKS.lock().unwrap_or_else(PoisonError::into_inner) = Some(start()?);
+    Ok(())
+}
+
+#[cfg(feature = "mpi")]
+fn start() -> Result<Arc<dyn Ranks>> {
+    let Some(ranks) = mmsmith_ranks::message_passing::start() else {
+        bail!("mpirun: this MPI does not allow calls from several threads, one at a time");
+    };
+    Ok(ranks)
+}
+
+#[cfg(not(feature = "mpi"))]
+fn start() -> Result<Arc<dyn Ranks>> {
+    bail!(
+        "mpirun: this mms was built without MPI; build it with cargo build --release -p mmsmith-cli --features mpi, or start it once"
+    )
+}
+
+/// The processes; none where this one is alone.
+pub(crate) fn ranks() -> Option<Arc<dyn Ranks>> {
+    RANKS.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// Whether this process tells what all have done.
+pub(crate) fn is_first() -> bool {
+    ranks().is_none_or(|ranks| ranks.rank() == 0)
+}
+
+/// The number of threads of a process where nothing is said: its part of the cores here. Zero takes all.
+pub(crate) fn threads(said: Option<usize>) -> usize {
+    let part = || {
+        let here = number(&COUNTS_HERE).unwrap_or(1).max(1);
+        (crate::machine::cores() / here).max(1)
+    };
+    said.unwrap_or_else(|| if ranks().is_some() { part() } else { 0 })
+}
+
+/// Refuses what several processes cannot do together.
+pub(crate) fn admit(command: &Command) -> Result<()> {
+    let Some(ranks) = ranks() else { return Ok(()) };
+    let count = ranks.count();
+    let study = |name: &str| {
+        bail!(
+            "mpirun -n {count} mms {name}: the cases of a study need nothing of each other; start its shards alone instead, each with \
+             --out DIR --shard I/{count}"
+        )
+    };
+    match command {
+        Command::Run(options) => {
+            let alone = [
+                ("--checkpoint", options.checkpoint.is_some()),
+                ("--picture", options.picture.file.is_some()),
+            ];
+            match alone.iter().find(|(_, given)| *given) {
+                Some((option, _)) => bail!(
+                    "mpirun -n {count} mms run {option}: one process alone can write this; start one, or leave {option} out"
+                ),
+                None => Ok(()),
+            }
+        }
+        Command::Converge(_) => study("converge"),
+        Command::Stability(_) => study("stability"),
+        Command::Tradeoff(_) => study("tradeoff"),
+        _ => bail!("mpirun -n {count}: several processes do mms run together; start one for this"),
+    }
+}
+
+/// Leaves the other processes, at the end.
+pub(crate) fn leave() {
+    drop(RANKS.lock().unwrap_or_else(PoisonError::into_inner).take());
+}
+
+/// Ends all processes, since this one has failed with `message`: others may wait for it. Does nothing where it is alone.
+pub(crate) fn fail(message: &str, status: u8) {
+    let Some(ranks) = ranks() else { return };
+    if ranks.rank() > 0 {
+        // What has failed at all of them the first one has told by now, and ended all.
+        std::thread::sleep(Duration::from_secs(2));
+        let _ = writeln!(std::io::stderr(), "error: process {}: {message}", ranks.rank());
+    }
+    #[cfg(feature = "mpi")]
+    mmsmith_ranks::message_passing::abort(status);
+    #[cfg(not(feature = "mpi"))]
+    let _ = status;
+}

@@ -1,0 +1,110 @@
+//! Sums over the particles of several processes, to the bits of one.
+//!
+//! Sums go by groups of successive particle numbers. Each group has one process, its home, to which the others bring what they know of
+//! its particles. Groups mostly lie together in space, so nearly all particles are at home.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytemuck::Pod;
+use mmsmith_ranks::{Ranks, announce, exchange, gather, share};
+
+/// Particles in the largest group of any sum; smaller groups divide it.
+pub(crate) const GROUP: usize = 1024;
+
+/// Where the particles of this process have their homes, and which ones have it here.
+pub struct Homes {
+    ranks: Arc<dyn Ranks>,
+    /// Particles of all processes.
+    count: usize,
+    /// The numbers at home here.
+    here: Range<usize>,
+    /// The places of those that go to each process among this one's, and how many come from each.
+    out: Vec<Range<usize>>,
+    counts: Vec<usize>,
+    /// Among those that come, the place of each number at home here.
+    order: Vec<u32>,
+}
+
+impl Homes {
+    /// For a process that holds the particles `ids`, ascending; a call of all.
+    pub fn new(ranks: Arc<dyn Ranks>, ids: &[u64]) -> Self {
+        let mut count = [gather(&*ranks, &[ids.len() as u64]).iter().sum::<u64>()];
+        share(&*ranks, 0, &mut count);
+        let count = count[0] as usize;
+        let groups = count.div_ceil(GROUP);
+        let first = |rank: usize| (groups * rank / ranks.count() * GROUP).min(count);
+        let range = |rank: usize| first(rank)..first(rank + 1);
+        let place = |number: usize| ids.partition_point(|&id| id < number as u64);
+        let out: Vec<Range<usize>> = (0..ranks.count())
+            .map(|rank| place(range(rank).start)..place(range(rank).end))
+            .collect();
+        let lengths: Vec<usize> = out.iter().map(Range::len).collect();
+        let counts = announce(&*ranks, &lengths);
+        let here = range(ranks.rank());
+        let mut homes = Self { ranks, count, here, out, counts, order: Vec::new() };
+        let come = homes.exchange(ids);
+        homes.order = vec![0; come.len()];
+        for (place, id) in come.into_iter().enumerate() {
+            homes.order[id as usize - homes.here.start] = place as u32;
+        }
+        homes
+    }
+
+    /// Number of particles of all processes.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The numbers of the particles at home here.
+    pub fn here(&self) -> Range<usize> {
+        self.here.clone()
+    }
+
+    /// The processes.
+    pub fn ranks(&self) -> &dyn Ranks {
+        &*self.ranks
+    }
+
+    /// What the processes say of the particles at home here, in the order of their numbers, where `own` says it of this process's; a
+    /// call of all.
+    pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
+        let come = self.exchange(own);
+        self.order.iter().map(|&place| come[place as usize]).collect()
+    }
+
+    fn exchange<E: Pod>(&self, own: &[E]) -> Vec<E> {
+        let out: Vec<Vec<E>> = self.out.iter().map(|places| own[places.clone()].to_vec()).collect();
+        exchange(&*self.ranks, &out, &self.counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmsmith_ranks::in_process;
+
+    #[test]
+    fn every_particle_is_at_home_once_and_in_order() {
+        for (count, all) in [(1, 10), (2, 5000), (3, 1024), (4, 9000), (5, 3)] {
+            let found = in_process(count, |ranks| {
+                let own = ranks.rank() as u64;
+                // Some here, some there.
+                let ids: Vec<u64> =
+                    (0..all).filter(|id| id * 7 / 5 % count as u64 == own).collect();
+                let homes = Homes::new(ranks, &ids);
+                assert_eq!(homes.count(), all as usize);
+                let doubled: Vec<u64> = ids.iter().map(|id| 2 * id).collect();
+                (homes.here(), homes.bring(&doubled))
+            });
+            let mut next = 0;
+            for (here, values) in found {
+                assert_eq!((here.start, here.len()), (next, values.len()));
+                assert!(here.start % GROUP == 0 || here.is_empty());
+                next = here.end;
+                assert!(here.zip(values).all(|(id, value)| value == 2 * id as u64));
+            }
+            assert_eq!(next, all as usize);
+        }
+    }
+}

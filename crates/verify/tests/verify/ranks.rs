@@ -1,0 +1,111 @@
+//! Several processes measure what one does, to the bit.
+
+use crate::hand_coded;
+
+use hand_coded::{AxisAligned, Coded, CrossedShear, Plane, Ring};
+use mmsmith_ranks::in_process;
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify::{
+    Arithmetic, Case, Extent, GridPose, Outputs, Placement, Row, Scheme, Shape, Start, Status,
+    Stepping, Total, Transfer, Updated, run,
+};
+
+/// A row without what differs from run to run.
+fn timeless(row: Row) -> Row {
+    Row { wall_s: 0.0, cpu_s: 0.0, particle_steps_per_s: 0.0, ..row }
+}
+
+fn agrees<S: Plane + Clone>(solution: &S, case: &Case, counts: &[usize]) -> Row {
+    let exact = AnySolution::Two(Box::new(Coded(solution.clone())));
+    let what = |count: usize| format!("{count} processes, {case:?}");
+    let mut history = Vec::new();
+    let progress = &mut |_| ();
+    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(progress) };
+    let alone =
+        run(&exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run");
+    for &count in counts {
+        let found = in_process(count, |ranks| {
+            let mut history = Vec::new();
+            let progress = &mut |_| ();
+            let mut outputs = Outputs {
+                history: Some(&mut history),
+                ranks: Some(ranks),
+                ..Outputs::new(progress)
+            };
+            let row = run(&exact, Arithmetic::Double, case, &mut outputs);
+            (timeless(row.expect("a case that can be run")), history)
+        });
+        for (row, own) in found {
+            assert_eq!(row, timeless(alone.clone()), "{}", what(count));
+            // As text: what is not a number equals itself.
+            assert_eq!(format!("{own:?}"), format!("{history:?}"), "{}", what(count));
+        }
+    }
+    alone
+}
+
+fn updated(shape: Shape, stepping: Stepping, transfer: Transfer) -> Scheme {
+    let placement = Updated::default().placement;
+    Scheme::Updated(Updated { shape, stepping, transfer, placement })
+}
+
+const CD: Stepping = Stepping::Cd(Start::Halved);
+
+#[test]
+fn errors_and_histories_have_the_bits_of_one_process() {
+    let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(2)];
+    let shapes = [Shape::Gimp, Shape::Bspline2, Shape::Cpdi, Shape::Cpdi2, Shape::Linear];
+    let steppings = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl];
+    for (n, shape) in shapes.into_iter().enumerate() {
+        for (m, transfer) in transfers.into_iter().enumerate() {
+            let scheme = updated(shape, steppings[(n + m) % 4], transfer);
+            // 64 cells are 9 bins.
+            let case = Case { scheme, cells: 64, periods: 0.03, ..Case::default() };
+            agrees(&AxisAligned::default(), &case, &[2, 4]);
+            let is_fitted = matches!(shape, Shape::Cpdi | Shape::Cpdi2);
+            let fitted =
+                Updated { placement: Placement::BodyFitted, ..*scheme.updated().expect("it is") };
+            let scheme = if is_fitted { Scheme::Updated(fitted) } else { scheme };
+            let row = agrees(&Ring::default(), &Case { scheme, ..case }, &[3]);
+            assert!(row.errors.u.linf > 0.0, "{row:?}");
+        }
+    }
+    let scheme = updated(Shape::Gimp, CD, Transfer::Flip);
+    let case =
+        Case { scheme, cells: 64, periods: 0.1, extent: Some(Extent::Full), ..Case::default() };
+    agrees(&Ring::default(), &case, &[1, 7]);
+    agrees(&CrossedShear::default(), &Case { extent: None, ..case }, &[5]);
+}
+
+#[test]
+fn a_run_that_fails_is_told_alike_by_all() {
+    let scheme = updated(Shape::Linear, Stepping::Usl, Transfer::Flip);
+    let case = Case { scheme, cells: 64, cfl: 1.9, ..Case::default() };
+    let row = agrees(&AxisAligned::default(), &case, &[2, 6]);
+    assert!(matches!(row.status, Status::Stopped(_) | Status::Unstable { .. }), "{row:?}");
+}
+
+#[test]
+fn what_one_process_alone_can_do_is_refused_with_what_to_use() {
+    let clipped = Updated {
+        placement: Placement::Clipped { offset: 0.0, pose: GridPose::default() },
+        shape: Shape::Cpdi2,
+        ..Updated::default()
+    };
+    for (scheme, said) in [
+        (Scheme::Total(Total::of_degree(3)), "start one process"),
+        (Scheme::Updated(clipped), "start one, or leave out --layout clipped"),
+    ] {
+        let refusals = in_process(2, |ranks| {
+            let progress = &mut |_| ();
+            let mut outputs = Outputs { ranks: Some(ranks), ..Outputs::new(progress) };
+            let exact = AnySolution::Two(Box::new(Coded(AxisAligned::default())));
+            let case = Case { scheme, cells: 64, ..Case::default() };
+            run(&exact, Arithmetic::Double, &case, &mut outputs).map(timeless)
+        });
+        for refusal in refusals {
+            let error = refusal.expect_err("one process alone can do that").to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
+}
