@@ -64,6 +64,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // A diagnostic is laid out as a whole already.
             match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
+                _ if !processes::is_first() => {}
                 Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
                 None => terminal::error(format_args!("{error:#}")),
             }

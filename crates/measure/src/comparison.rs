@@ -78,17 +78,16 @@ impl<'a, const D: usize> Comparison<'a, D> {
         observed: (&Particles<T, D>, &Law<T, D>),
         times: (f64, f64),
     ) -> Vec<[f64; 4]> {
-        let count = observed.0.len();
-        let of_chunk = |chunk: usize| {
-            let first = chunk * CHUNK;
-            let count = CHUNK.min(count - first);
+        let mut all = vec![[0.0; 4]; observed.0.len()];
+        all.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, own)| {
             let mut rows = [[[0.0; BLOCK]; 4]; RUNS];
-            let rows = &mut rows[..count.div_ceil(BLOCK)];
-            self.magnitudes(observed, times, &mut Room::zero(), first, rows);
-            let of_particle = |k: usize| std::array::from_fn(|n| rows[k / BLOCK][n][k % BLOCK]);
-            (0..count).map(of_particle).collect::<Vec<[f64; 4]>>()
-        };
-        each_group(count.div_ceil(CHUNK), &of_chunk).concat()
+            let rows = &mut rows[..own.len().div_ceil(BLOCK)];
+            self.magnitudes(observed, times, &mut Room::zero(), chunk * CHUNK, rows);
+            for (k, own) in own.iter_mut().enumerate() {
+                *own = std::array::from_fn(|n| rows[k / BLOCK][n][k % BLOCK]);
+            }
+        });
+        all
     }
 
     /// As [`worst_particle`](Self::worst_particle) for one of several processes, of the particles `ids` here and those of all others.
@@ -376,24 +375,16 @@ pub fn over_particles<R, const N: usize>(
     joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
 }
 
-/// The norms of `N` magnitudes over the particles of all processes, where `own` has those of this one's; a call of all.
-fn over_homes<const N: usize>(homes: &Homes, own: &[[f64; N]]) -> [PerNorm<f64>; N] {
-    let flat = own.as_flattened();
-    let here: Vec<f64> = {
-        let columns = (0..N).map(|n| {
-            let column: Vec<f64> = flat.iter().skip(n).step_by(N).copied().collect();
-            homes.bring(&column)
-        });
-        columns.collect::<Vec<_>>().concat()
-    };
-    let count = homes.here().len();
+/// The norms of four magnitudes over the particles of all processes, where `own` has those of this one's; a call of all.
+fn over_homes(homes: &Homes, own: &[[f64; 4]]) -> [PerNorm<f64>; 4] {
+    let (at_home, count) = (homes.visit(own), homes.here().len());
     let groups = tallies(
         count,
         || (),
-        |(), first, rows: &mut [[Row<f64>; N]]| {
+        |(), first, rows: &mut [[Row<f64>; 4]]| {
             for (k, p) in (first..count.min(first + rows.len() * BLOCK)).enumerate() {
-                for n in 0..N {
-                    rows[k / BLOCK][n][k % BLOCK] = here[n * count + p];
+                for (row, value) in rows[k / BLOCK].iter_mut().zip(at_home.of(p)) {
+                    row[k % BLOCK] = *value;
                 }
             }
         },
@@ -405,8 +396,8 @@ fn over_homes<const N: usize>(homes: &Homes, own: &[[f64; N]]) -> [PerNorm<f64>;
         .chunks_exact(4)
         .map(|numbers| Tally::of_numbers(std::array::from_fn(|k| numbers[k])))
         .collect();
-    let groups: Vec<[Tally; N]> =
-        all.chunks_exact(N).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
+    let groups: Vec<[Tally; 4]> =
+        all.chunks_exact(4).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
     let norms = joined(groups.iter()).map(|tally| tally.norms(homes.count()));
     let mut numbers: Vec<f64> =
         norms.iter().flat_map(|PerNorm { linf, l2, l1 }| [*linf, *l2, *l1]).collect();

@@ -22,8 +22,24 @@ pub struct Homes {
     /// The places of those that go to each process among this one's, and how many come from each.
     out: Vec<Range<usize>>,
     counts: Vec<usize>,
-    /// Among those that come, the place of each number at home here.
+    /// Where each particle at home here is: among this process's, or behind them, among those that come from others.
     order: Vec<u32>,
+}
+
+/// What is known of the particles at home here.
+pub struct AtHome<'a, E> {
+    own: &'a [E],
+    others: Vec<E>,
+    order: &'a [u32],
+}
+
+impl<E> AtHome<'_, E> {
+    /// What is said of the particle of this place among those at home here.
+    #[must_use]
+    pub fn of(&self, place: usize) -> &E {
+        let place = self.order[place] as usize;
+        self.own.get(place).unwrap_or_else(|| &self.others[place - self.own.len()])
+    }
 }
 
 impl Homes {
@@ -43,9 +59,11 @@ impl Homes {
         let counts = announce(&*ranks, &lengths);
         let here = range(ranks.rank());
         let mut homes = Self { ranks, count, here, out, counts, order: Vec::new() };
-        let come = homes.exchange(ids);
-        homes.order = vec![0; come.len()];
-        for (place, id) in come.into_iter().enumerate() {
+        let others = homes.exchange(ids);
+        homes.order = vec![0; homes.here.len()];
+        let own = homes.out[homes.ranks.rank()].clone().map(|place| (place, ids[place]));
+        let others = others.into_iter().enumerate().map(|(place, id)| (ids.len() + place, id));
+        for (place, id) in own.chain(others) {
             homes.order[id as usize - homes.here.start] = place as u32;
         }
         homes
@@ -66,16 +84,25 @@ impl Homes {
         &*self.ranks
     }
 
-    /// What the processes say of the particles at home here, in the order of their numbers, where `own` says it of this process's; a
-    /// call of all.
-    pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
-        let come = self.exchange(own);
-        self.order.iter().map(|&place| come[place as usize]).collect()
+    /// What the processes say of the particles at home here, where `own` says it of this process's; a call of all.
+    pub fn visit<'a, E: Pod>(&'a self, own: &'a [E]) -> AtHome<'a, E> {
+        AtHome { own, others: self.exchange(own), order: &self.order }
     }
 
+    /// The same in the order of the particles' numbers.
+    pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
+        let at_home = self.visit(own);
+        (0..self.here.len()).map(|place| *at_home.of(place)).collect()
+    }
+
+    /// What other processes say of the particles at home here.
     fn exchange<E: Pod>(&self, own: &[E]) -> Vec<E> {
-        let out: Vec<Vec<E>> = self.out.iter().map(|places| own[places.clone()].to_vec()).collect();
-        exchange(&*self.ranks, &out, &self.counts)
+        let rank = self.ranks.rank();
+        let others = |to: usize| if to == rank { 0..0 } else { self.out[to].clone() };
+        let out: Vec<Vec<E>> = (0..self.out.len()).map(|to| own[others(to)].to_vec()).collect();
+        let mut counts = self.counts.clone();
+        counts[rank] = 0;
+        exchange(&*self.ranks, &out, &counts)
     }
 }
 

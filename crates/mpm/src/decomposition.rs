@@ -3,26 +3,16 @@
 //! Bins are what sums go by, whoever holds them, so results have the same bits for any number of processes. A sort gives each
 //! particle to the process of its bin. Bins are cut where their particles are many, by whole bins.
 
-use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::Arc;
 
-use bytemuck::{Pod, cast_slice};
-use mmsmith_ranks::{Ranks, announce, exchange, gather, share};
-use nalgebra::{RealField, SMatrix, SVector};
+use bytemuck::Pod;
+use mmsmith_ranks::{Ranks, exchange, share};
+use nalgebra::RealField;
 
-use crate::body::Mesh;
-use crate::domain::HalfEdges;
 use crate::error::{SetupError, StepError};
 use crate::grid::Layout;
 use crate::health::{Invalid, Outcome};
-use crate::node::Node;
 use crate::parallel::bins::BinRows;
-use crate::parallel::coloring::Held;
-use crate::particles::Particles;
-use crate::simd::Lanes;
-use crate::state::State;
-use crate::support::Support;
 
 /// The part of a body that one process begins with: any part, as long as each particle is in one.
 pub struct Share {
@@ -47,13 +37,13 @@ pub(crate) struct Part {
     pub(crate) ids: Vec<u64>,
     pub(crate) version: u64,
     /// The first bin of each process, and the number of bins.
-    cuts: Vec<usize>,
+    pub(crate) cuts: Vec<usize>,
     /// Whether particles have affine velocities yet.
     pub(crate) is_affine: bool,
 }
 
 /// A cut is moved where a process has more particles than this share of the mean.
-const UNEVEN: f64 = 1.1;
+pub(crate) const UNEVEN: f64 = 1.1;
 
 impl Part {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
@@ -114,7 +104,7 @@ pub(crate) fn most_ranks<const D: usize>(layout: &Layout<D>, rows: BinRows) -> u
 
 /// The first bin of each of `ranks` processes, and the number of bins: each has one at least, the last one two, and otherwise as
 /// many particles as the others.
-fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
+pub(crate) fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
     let bins = particles.len();
     let total: u64 = particles.iter().sum();
     let mut cuts = vec![0];
@@ -135,7 +125,7 @@ fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
 }
 
 /// The most particles of a process over their mean.
-fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
+pub(crate) fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
     let of = |cut: &[usize]| particles[cut[0]..cut[1]].iter().sum::<u64>();
     let most = cuts.windows(2).map(of).max().unwrap_or(0);
     let total: u64 = particles.iter().sum();
@@ -143,140 +133,31 @@ fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
 }
 
 /// Which elements go where, and in which order those that come are kept.
-struct Move<'a> {
-    ranks: &'a dyn Ranks,
-    /// The places of the elements that go to each process.
-    out: Vec<Vec<u32>>,
+pub(crate) struct Move<'a> {
+    pub(crate) ranks: &'a dyn Ranks,
+    /// The places of the elements that go to each other process.
+    pub(crate) out: Vec<Vec<u32>>,
     /// How many come from each.
-    counts: Vec<usize>,
-    /// Among those that come, one after the other, the place of each that is kept.
-    order: Vec<u32>,
+    pub(crate) counts: Vec<usize>,
+    /// The places of those that are here afterwards, in their order: among the elements here, and behind them among those that come.
+    pub(crate) order: Vec<u32>,
 }
 
 impl Move<'_> {
-    fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
+    pub(crate) fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
         let pick = |places: &Vec<u32>| places.iter().map(|&p| elements[p as usize]).collect();
         let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
-        let come = exchange(self.ranks, &out, &self.counts);
-        self.order.iter().map(|&place| come[place as usize]).collect()
+        let others = exchange(self.ranks, &out, &self.counts);
+        let of = |&place: &u32| {
+            let place = place as usize;
+            *elements.get(place).unwrap_or_else(|| &others[place - elements.len()])
+        };
+        self.order.iter().map(of).collect()
     }
 
-    fn replace<E: Pod>(&self, elements: &mut Vec<E>) {
+    pub(crate) fn replace<E: Pod>(&self, elements: &mut Vec<E>) {
         *elements = self.all(elements);
     }
-}
-
-impl<T: Lanes, const D: usize> State<T, D> {
-    /// Gives every particle to the process of its bin, `bin_of(particle)`.
-    pub(crate) fn redistribute(&mut self) {
-        let Self { particles, constants, layout, bins, support, part, .. } = self;
-        let Some(part) = part else { return };
-        let ranks = part.ranks.clone();
-        let rows = bins.rows();
-        let bin_of: Vec<usize> = {
-            let Particles { x, F, .. } = &*particles;
-            let first_node = |p| support.first_node(constants, p, &x[p], &F[p]);
-            (0..x.len()).map(|p| rows.bin_of(first_node(p) / layout.row())).collect()
-        };
-        let mut counts = vec![0_u64; rows.count()];
-        bin_of.iter().for_each(|&bin| counts[bin] += 1);
-        let all = gather(&*ranks, &counts);
-        let mut new: Vec<u64> = vec![0; ranks.count() + 1];
-        if ranks.rank() == 0 {
-            for (bin, count) in counts.iter_mut().enumerate() {
-                *count = all.iter().skip(bin).step_by(rows.count()).sum();
-            }
-            let cuts = match part.cuts.as_slice() {
-                [_, ..] if unevenness(&counts, &part.cuts) <= UNEVEN => part.cuts.clone(),
-                _ => cuts(&counts, ranks.count()),
-            };
-            new = cuts.into_iter().map(|cut| cut as u64).collect();
-        }
-        share(&*ranks, 0, &mut new);
-        part.cuts = new.into_iter().map(|cut| cut as usize).collect();
-        part.version += 1;
-
-        let mut out = vec![Vec::new(); ranks.count()];
-        for (p, &bin) in bin_of.iter().enumerate() {
-            out[part.cuts.partition_point(|&cut| cut <= bin) - 1].push(p as u32);
-        }
-        let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
-        let counts = announce(&*ranks, &lengths);
-        let order = (0..counts.iter().sum::<usize>() as u32).collect();
-        let mut moved = Move { ranks: &*ranks, out, counts, order };
-        let ids = moved.all(&part.ids);
-        moved.order.sort_unstable_by_key(|&place| ids[place as usize]);
-        moved.replace(&mut part.ids);
-        let Particles { X, x, v, F, mass, volume, half_size: _ } = particles;
-        [X, x, v].into_iter().for_each(|vectors| moved.replace(vectors));
-        moved.replace(F);
-        [&mut *mass, &mut *volume].into_iter().for_each(|numbers| moved.replace(numbers));
-        let count = x.len();
-        match support {
-            Support::Product(_) | Support::Polygons(_) => {}
-            Support::Cpdi { half_edges } => {
-                let each: Vec<_> = (0..bin_of.len()).map(|p| *half_edges.of(p)).collect();
-                *half_edges = HalfEdges::new(moved.all(&each));
-            }
-            Support::Cpdi2 { mesh, next } => {
-                *mesh = move_corners(mesh, &moved);
-                next.clone_from(&mesh.x);
-            }
-        }
-        if part.is_affine {
-            moved.replace(&mut self.affine);
-        }
-        if self.keeps_F_early {
-            self.F_early.resize(count, SMatrix::identity());
-        }
-        let (first_mass, first_volume) = (mass.first().copied(), volume.first().copied());
-        self.uniform = first_mass.zip(first_volume).filter(|(m, V)| {
-            mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
-        });
-
-        let own = part.cuts[ranks.rank()]..part.cuts[ranks.rank() + 1];
-        let held = Held { bands: own, all: rows.count() };
-        let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
-        self.bins.hold(held, count);
-        if rows != layout.rows() {
-            layout.hold(rows);
-            constants.nodes_before = (layout.first_row * layout.row()) as f64;
-            let resize = |nodes: &mut Vec<Node<T, D>>| {
-                if !nodes.is_empty() {
-                    *nodes = vec![Node::zero(); layout.nodes];
-                }
-            };
-            [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
-            if !self.filtered.is_empty() {
-                self.filtered = vec![SVector::zeros(); layout.nodes];
-            }
-        }
-    }
-}
-
-/// The corners of the particles that come; neighbours share them as before.
-fn move_corners<T: Lanes, const D: usize>(mesh: &Mesh<T, D>, moved: &Move<'_>) -> Mesh<T, D> {
-    let mut new = Mesh::default();
-    let count = moved.order.len();
-    new.corners = vec![[0; 8]; count];
-    // Corners are one where their reference positions are, which all processes have computed alike.
-    let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
-    for corner in 0..1 << D {
-        let of_particle = |positions: &[SVector<T, D>]| -> Vec<SVector<T, D>> {
-            mesh.corners.iter().map(|corners| positions[corners[corner] as usize]).collect()
-        };
-        let (X, x) = (moved.all(&of_particle(&mesh.X)), moved.all(&of_particle(&mesh.x)));
-        for (p, (X, x)) in X.into_iter().zip(x).enumerate() {
-            let key = cast_slice::<T, u8>(X.as_slice()).to_vec();
-            let place = *known.entry(key).or_insert_with(|| {
-                new.X.push(X);
-                new.x.push(x);
-                new.X.len() as u32 - 1
-            });
-            new.corners[p][corner] = place;
-        }
-    }
-    new
 }
 
 /// Whether a grid of these rows can be shared out among so many processes.

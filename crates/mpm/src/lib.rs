@@ -87,6 +87,7 @@ mod parallel;
 mod particles;
 mod polygons;
 mod prefetch;
+mod redistribute;
 mod scheme;
 mod shape_function;
 mod shared_corners;

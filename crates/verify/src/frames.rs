@@ -63,8 +63,17 @@ pub(crate) struct FrameWriter {
 }
 
 impl FrameWriter {
-    pub(crate) fn new(output: &FrameOutput, steps: u64, velocity_lag: f64) -> Result<Self, Error> {
-        let series = Series::create(&output.folder, &output.name)?;
+    /// `is_first` is said by the process that starts the series, where there are several.
+    pub(crate) fn new(
+        output: &FrameOutput,
+        steps: u64,
+        velocity_lag: f64,
+        is_first: bool,
+    ) -> Result<Self, Error> {
+        let series = match is_first {
+            true => Series::create(&output.folder, &output.name)?,
+            false => Series::of_pieces(&output.folder, &output.name)?,
+        };
         // More frames than states there are would repeat some.
         let count = output.count.clamp(2, steps + 1);
         let provenance = output.provenance.clone();

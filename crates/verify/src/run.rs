@@ -280,7 +280,10 @@ where
     let mut measurement = Measurement::new(exact, solver, outputs.ranks.as_ref());
     let count = measurement.count(solver);
     let mut frames = match outputs.frames {
-        Some(output) => Some(FrameWriter::new(output, steps.count, lag)?),
+        Some(output) => {
+            let is_first = outputs.ranks.as_ref().is_none_or(|ranks| ranks.rank() == 0);
+            Some(FrameWriter::new(output, steps.count, lag, is_first)?)
+        }
         None => None,
     };
     let mut recorder = match &mut outputs.history {

@@ -32,17 +32,27 @@ impl Series {
     /// Where the name is empty, begins with a dot, or holds a slash, a backslash or a control character; where the
     /// folder cannot be made, or nothing can be written there.
     pub fn create(folder: &Path, name: &str) -> Result<Self, Error> {
-        let misplaced = |c: char| c == '/' || c == '\\' || c.is_control();
-        if name.is_empty() || name.starts_with('.') || name.contains(misplaced) {
-            return Err(Error::SeriesName { name: name.to_owned() });
-        }
+        let series = Self::of_pieces(folder, name)?;
         fs::create_dir_all(folder).map_err(|cause| Error::FileSystem {
             action: "create the folder",
             path: folder.to_owned(),
             cause,
         })?;
+        whole_file::probe(&series.pvd)?;
+        Ok(series)
+    }
+
+    /// The same series for a process that writes [pieces](Self::write_piece) to it: another one starts it.
+    ///
+    /// # Errors
+    ///
+    /// Where the name is none, as for [`create`](Self::create).
+    pub fn of_pieces(folder: &Path, name: &str) -> Result<Self, Error> {
+        let misplaced = |c: char| c == '/' || c == '\\' || c.is_control();
+        if name.is_empty() || name.starts_with('.') || name.contains(misplaced) {
+            return Err(Error::SeriesName { name: name.to_owned() });
+        }
         let pvd = folder.join(format!("{name}.pvd"));
-        whole_file::probe(&pvd)?;
         Ok(Self { folder: folder.to_owned(), name: name.to_owned(), pvd, listed: vec![] })
     }
 

@@ -51,7 +51,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     };
     let [output, history, plot] = [&settled.json, &options.history, &options.plot].map(prepare);
     let (output, history, plot) = (output?, history?, plot?);
-    if let Some(folder) = &options.vtk {
+    if let Some(folder) = options.vtk.as_ref().filter(|_| processes::is_first()) {
         prepare_folder(folder).context("--vtk")?;
     }
     let mut picture = Picture::asked(&options.picture, case.periods)?;
