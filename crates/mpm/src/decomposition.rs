@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use mmsmith_ranks::{Ranks, exchange, share};
+use mmsmith_ranks::{Ranks, announce, exchange, share};
 use nalgebra::RealField;
 
 use crate::error::{SetupError, StepError};
@@ -133,26 +133,59 @@ pub(crate) fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
 }
 
 /// Which elements go where, and in which order those that come are kept.
-pub(crate) struct Move<'a> {
-    pub(crate) ranks: &'a dyn Ranks,
+pub(crate) struct Move {
+    /// None where one process has all.
+    ranks: Option<Arc<dyn Ranks>>,
     /// The places of the elements that go to each other process.
-    pub(crate) out: Vec<Vec<u32>>,
+    out: Vec<Vec<u32>>,
     /// How many come from each.
-    pub(crate) counts: Vec<usize>,
+    counts: Vec<usize>,
     /// The places of those that are here afterwards, in their order: among the elements here, and behind them among those that come.
-    pub(crate) order: Vec<u32>,
+    order: Vec<u32>,
 }
 
-impl Move<'_> {
+impl Move {
+    /// The move of particles `ids` to the processes `to(place)`, and the numbers of those that are here afterwards, ascending. A call of
+    /// all.
+    pub(crate) fn new(
+        ranks: Option<&Arc<dyn Ranks>>,
+        ids: &[u64],
+        to: impl Fn(usize) -> usize,
+    ) -> (Self, Vec<u64>) {
+        let mut out = vec![Vec::new(); ranks.map_or(1, |ranks| ranks.count())];
+        (0..ids.len()).for_each(|p| out[to(p)].push(p as u32));
+        let stay = std::mem::take(&mut out[ranks.map_or(0, |ranks| ranks.rank())]);
+        let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
+        let counts = ranks.map_or_else(|| vec![0], |ranks| announce(&**ranks, &lengths));
+        let first = ids.len() as u32;
+        let come = first..first + counts.iter().sum::<usize>() as u32;
+        let order = stay.into_iter().chain(come).collect();
+        let mut moved = Self { ranks: ranks.cloned(), out, counts, order };
+        let ids = moved.all(ids);
+        let mut by_id: Vec<u32> = (0..ids.len() as u32).collect();
+        by_id.sort_unstable_by_key(|&place| ids[place as usize]);
+        moved.order = by_id.iter().map(|&place| moved.order[place as usize]).collect();
+        let ids = by_id.iter().map(|&place| ids[place as usize]).collect();
+        (moved, ids)
+    }
+
     pub(crate) fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
         let pick = |places: &Vec<u32>| places.iter().map(|&p| elements[p as usize]).collect();
         let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
-        let others = exchange(self.ranks, &out, &self.counts);
+        let others = match &self.ranks {
+            Some(ranks) => exchange(&**ranks, &out, &self.counts),
+            None => Vec::new(),
+        };
         let of = |&place: &u32| {
             let place = place as usize;
             *elements.get(place).unwrap_or_else(|| &others[place - elements.len()])
         };
         self.order.iter().map(of).collect()
+    }
+
+    /// Number of particles here afterwards.
+    pub(crate) fn len(&self) -> usize {
+        self.order.len()
     }
 
     pub(crate) fn replace<E: Pod>(&self, elements: &mut Vec<E>) {

@@ -61,6 +61,7 @@
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
 //! - `grid`, `node`: memory layout, walls and ghost nodes. `parallel`: bins of particles and the two-colour schedule.
+//! - `decomposition`, `redistribute`: several processes. `saved_state`: what a run goes on from.
 //! - `simulation`: set-up and life cycle. `state`, `geometry`, `health`: data and checks that the stages share.
 
 mod body;
@@ -88,6 +89,7 @@ mod particles;
 mod polygons;
 mod prefetch;
 mod redistribute;
+mod saved_state;
 mod scheme;
 mod shape_function;
 mod shared_corners;
@@ -112,6 +114,7 @@ pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
 pub use particles::Particles;
 pub use polygons::{Faces, Load, Polygons};
+pub use saved_state::{SavedState, SavedStateError};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;
 pub use simulation::{Simulated, Simulation};

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use bytemuck::cast_slice;
-use mmsmith_ranks::{announce, gather, share};
+use mmsmith_ranks::{gather, share};
 use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
@@ -18,24 +18,32 @@ use crate::state::State;
 use crate::support::Support;
 
 impl<T: Lanes, const D: usize> State<T, D> {
-    /// Gives every particle to the process of its bin, `bin_of(particle)`.
+    /// Gives every particle to the process of the bin that it is in now.
     pub(crate) fn redistribute(&mut self) {
-        let Self { particles, constants, layout, bins, support, part, .. } = self;
-        let Some(part) = part else { return };
-        let ranks = part.ranks.clone();
+        if self.part.is_none() {
+            return;
+        }
+        let Self { particles: Particles { x, F, .. }, constants, layout, bins, support, .. } = self;
         let rows = bins.rows();
-        let bin_of: Vec<usize> = {
-            let Particles { x, F, .. } = &*particles;
-            let first_node = |p| support.first_node(constants, p, &x[p], &F[p]);
-            (0..x.len()).map(|p| rows.bin_of(first_node(p) / layout.row())).collect()
-        };
-        let mut counts = vec![0_u64; rows.count()];
+        let first_node = |p| support.first_node(constants, p, &x[p], &F[p]);
+        let bin_of: Vec<usize> =
+            (0..x.len()).map(|p| rows.bin_of(first_node(p) / layout.row())).collect();
+        self.give_to_bins(&bin_of);
+    }
+
+    /// Gives every particle to the process of its bin `bin_of[particle]`, and tells how they move. Does nothing where this process has
+    /// all.
+    pub(crate) fn give_to_bins(&mut self, bin_of: &[usize]) -> Option<Move> {
+        let part = self.part.as_mut()?;
+        let ranks = part.ranks.clone();
+        let bins = self.bins.rows().count();
+        let mut counts = vec![0_u64; bins];
         bin_of.iter().for_each(|&bin| counts[bin] += 1);
         let all = gather(&*ranks, &counts);
         let mut new: Vec<u64> = vec![0; ranks.count() + 1];
         if ranks.rank() == 0 {
             for (bin, count) in counts.iter_mut().enumerate() {
-                *count = all.iter().skip(bin).step_by(rows.count()).sum();
+                *count = all.iter().skip(bin).step_by(bins).sum();
             }
             let cuts = match part.cuts.as_slice() {
                 [_, ..] if unevenness(&counts, &part.cuts) <= UNEVEN => part.cuts.clone(),
@@ -44,35 +52,28 @@ impl<T: Lanes, const D: usize> State<T, D> {
             new = cuts.into_iter().map(|cut| cut as u64).collect();
         }
         share(&*ranks, 0, &mut new);
-        part.cuts = new.into_iter().map(|cut| cut as usize).collect();
-        part.version += 1;
+        let cuts: Vec<usize> = new.into_iter().map(|cut| cut as usize).collect();
+        part.cuts.clone_from(&cuts);
+        let moved = self.give(|p| cuts.partition_point(|&cut| cut <= bin_of[p]) - 1);
+        self.hold(cuts[ranks.rank()]..cuts[ranks.rank() + 1]);
+        moved
+    }
 
-        let mut out = vec![Vec::new(); ranks.count()];
-        for (p, &bin) in bin_of.iter().enumerate() {
-            out[part.cuts.partition_point(|&cut| cut <= bin) - 1].push(p as u32);
-        }
-        let stay = std::mem::take(&mut out[ranks.rank()]);
-        let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
-        let counts = announce(&*ranks, &lengths);
-        let first = bin_of.len() as u32;
-        let come = first..first + counts.iter().sum::<usize>() as u32;
-        let order = stay.into_iter().chain(come).collect();
-        let mut moved = Move { ranks: &*ranks, out, counts, order };
-        let ids = moved.all(&part.ids);
-        let mut by_id: Vec<u32> = (0..ids.len() as u32).collect();
-        by_id.sort_unstable_by_key(|&place| ids[place as usize]);
-        moved.order = by_id.iter().map(|&place| moved.order[place as usize]).collect();
-        part.ids = by_id.iter().map(|&place| ids[place as usize]).collect();
-        drop((ids, by_id));
+    /// Gives every particle to the process `to(particle)`, and tells how they move.
+    pub(crate) fn give(&mut self, to: impl Fn(usize) -> usize) -> Option<Move> {
+        let Self { particles, support, part, .. } = self;
+        let part = part.as_mut()?;
+        let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
+        part.version += 1;
+        let before = std::mem::replace(&mut part.ids, ids).len();
         let Particles { X, x, v, F, mass, volume, half_size: _ } = particles;
         [X, x, v].into_iter().for_each(|vectors| moved.replace(vectors));
         moved.replace(F);
         [&mut *mass, &mut *volume].into_iter().for_each(|numbers| moved.replace(numbers));
-        let count = x.len();
         match support {
             Support::Product(_) | Support::Polygons(_) => {}
             Support::Cpdi { half_edges } => {
-                let each: Vec<_> = (0..bin_of.len()).map(|p| *half_edges.of(p)).collect();
+                let each: Vec<_> = (0..before).map(|p| *half_edges.of(p)).collect();
                 *half_edges = HalfEdges::new(moved.all(&each));
             }
             Support::Cpdi2 { mesh, next } => {
@@ -84,38 +85,42 @@ impl<T: Lanes, const D: usize> State<T, D> {
             moved.replace(&mut self.affine);
         }
         if self.keeps_F_early {
-            self.F_early.resize(count, SMatrix::identity());
+            self.F_early.resize(x.len(), SMatrix::identity());
         }
         let (first_mass, first_volume) = (mass.first().copied(), volume.first().copied());
         self.uniform = first_mass.zip(first_volume).filter(|(m, V)| {
             mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
         });
+        Some(moved)
+    }
 
-        let own = part.cuts[ranks.rank()]..part.cuts[ranks.rank() + 1];
+    /// Makes room for the bins `own` with the particles that are here, and for the rows that those reach.
+    fn hold(&mut self, own: Range<usize>) {
+        let Self { particles, constants, layout, bins, .. } = self;
+        let rows = bins.rows();
         let held = Held { bands: own, all: rows.count() };
         let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
-        self.bins.hold(held, count);
-        if rows != layout.rows() {
-            layout.hold(rows);
-            constants.nodes_before = (layout.first_row * layout.row()) as f64;
-            let resize = |nodes: &mut Vec<Node<T, D>>| {
-                if !nodes.is_empty() {
-                    *nodes = vec![Node::zero(); layout.nodes];
-                }
-            };
-            [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
-            if !self.filtered.is_empty() {
-                self.filtered = vec![SVector::zeros(); layout.nodes];
+        bins.hold(held, particles.len());
+        if rows == layout.rows() {
+            return;
+        }
+        layout.hold(rows);
+        constants.nodes_before = (layout.first_row * layout.row()) as f64;
+        let resize = |nodes: &mut Vec<Node<T, D>>| {
+            if !nodes.is_empty() {
+                *nodes = vec![Node::zero(); layout.nodes];
             }
+        };
+        [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
+        if !self.filtered.is_empty() {
+            self.filtered = vec![SVector::zeros(); layout.nodes];
         }
     }
 }
 
 /// The corners of the particles that come; neighbours share them as before.
-fn move_corners<T: Lanes, const D: usize>(mesh: &Mesh<T, D>, moved: &Move<'_>) -> Mesh<T, D> {
-    let mut new = Mesh::default();
-    let count = moved.order.len();
-    new.corners = vec![[0; 8]; count];
+fn move_corners<T: Lanes, const D: usize>(mesh: &Mesh<T, D>, moved: &Move) -> Mesh<T, D> {
+    let mut new = Mesh { corners: vec![[0; 8]; moved.len()], ..Mesh::default() };
     // Corners are one where their reference positions are, which all processes have computed alike.
     let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
     for corner in 0..1 << D {

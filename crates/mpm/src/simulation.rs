@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use bytemuck::{bytes_of_mut, cast_slice_mut};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::{Body, Mesh};
@@ -34,9 +33,9 @@ pub struct Simulation<T, const D: usize> {
     grid: Grid<T, D>,
     law: Law<T, D>,
     settings: Settings<T>,
-    state: State<T, D>,
-    steps_done: usize,
-    failed: Option<StepError>,
+    pub(crate) state: State<T, D>,
+    pub(crate) steps_done: usize,
+    pub(crate) failed: Option<StepError>,
 }
 
 /// Numbers whose steps are compiled with this crate: `f64` and `f32`.
@@ -252,29 +251,6 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         } else {
             T::zero()
         }
-    }
-}
-
-impl<T: Lanes, const D: usize> Simulation<T, D> {
-    /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
-    ///
-    /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
-    pub fn state(&mut self) -> Vec<&mut [u8]> {
-        // The caller may overwrite the particles, and the grid no longer belongs to them.
-        self.state.is_ahead = false;
-        let State { particles, affine, support, bins, .. } = &mut self.state;
-        let Particles { x, v, F, .. } = particles;
-        let mut state = vec![cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)];
-        state.push(cast_slice_mut(affine));
-        match support {
-            Support::Cpdi2 { mesh, .. } => state.push(cast_slice_mut(&mut mesh.x)),
-            Support::Polygons(corners) => state.push(cast_slice_mut(corners.positions())),
-            Support::Product(_) | Support::Cpdi { .. } => {}
-        }
-        // The order of the last sort decides the order of sums over particles.
-        state.extend(bins.state());
-        state.push(bytes_of_mut(&mut self.steps_done));
-        state
     }
 }
 

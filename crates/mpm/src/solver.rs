@@ -7,6 +7,7 @@ use crate::decomposition::Arrangement;
 use crate::error::{SetupError, StepError};
 use crate::material::Law;
 use crate::particles::Particles;
+use crate::saved_state::{SavedState, SavedStateError};
 use crate::simulation::{Simulated, Simulation};
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
@@ -29,7 +30,14 @@ pub trait Solver<T, const D: usize> {
     fn velocity_lag(&self) -> T;
 
     /// The state between two steps, see [`Simulation::state`].
-    fn state(&mut self) -> Vec<&mut [u8]>;
+    fn state(&self) -> Vec<&[u8]>;
+
+    /// Goes on from such a state, see [`Simulation::take_up`].
+    ///
+    /// # Errors
+    ///
+    /// Where it is not one of this set-up.
+    fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError>;
 }
 
 impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
@@ -49,8 +57,12 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
         Simulation::velocity_lag(self)
     }
 
-    fn state(&mut self) -> Vec<&mut [u8]> {
+    fn state(&self) -> Vec<&[u8]> {
         Simulation::state(self)
+    }
+
+    fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        Simulation::take_up(self, parts)
     }
 }
 
@@ -141,8 +153,12 @@ macro_rules! driven {
                 0.0
             }
 
-            fn state(&mut self) -> Vec<&mut [u8]> {
+            fn state(&self) -> Vec<&[u8]> {
                 self.body.state()
+            }
+
+            fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+                self.body.take_up(&parts)
             }
         })*
     };

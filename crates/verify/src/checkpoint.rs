@@ -3,12 +3,17 @@
 //! A checkpoint holds the solver's numbers and what was measured so far, in this machine's byte order, and ends with the
 //! SHA-256 of all before. It is written beside the last one and takes its name once it is on the disk: a kill at any
 //! moment leaves one that is whole. Its folder is locked for as long as the run lives.
+//!
+//! Where several processes run, each writes a file with its part of the solver's numbers. The first one's is the checkpoint: it takes
+//! its name after all others are on the disk, and lists their checksums. Any number of processes goes on with it.
 
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use mmsmith_measure::norms::{PerField, PerNorm};
+use mmsmith_mpm::{SavedState, SavedStateError};
+use mmsmith_ranks::{Ranks, gather, share};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
@@ -16,7 +21,7 @@ use crate::history::{Moment, Sums};
 use crate::whole_file::WholeFile;
 
 /// How every checkpoint begins.
-const MAGIC: &[u8; 24] = b"mmsmith checkpoint 3\n\0\0\0";
+const MAGIC: &[u8; 24] = b"mmsmith checkpoint 4\n\0\0\0";
 const FILE: &str = "checkpoint";
 const LOCK: &str = "lock";
 
@@ -26,8 +31,8 @@ const LOCK: &str = "lock";
 #[derive(Debug)]
 pub struct CheckpointFolder {
     path: PathBuf,
-    /// Closing it gives the lock back.
-    _lock: File,
+    /// Closing it gives the lock back. The first of several processes has it.
+    _lock: Option<File>,
 }
 
 impl CheckpointFolder {
@@ -53,7 +58,13 @@ impl CheckpointFolder {
             Err(TryLockError::Error(cause)) => return Err(fail(cause)),
         }
         WholeFile::sweep(&folder.join(FILE));
-        Ok(Self { path: folder.to_owned(), _lock: file })
+        Ok(Self { path: folder.to_owned(), _lock: Some(file) })
+    }
+
+    /// The folder, for one of several processes that run together, of which the first locks it.
+    #[must_use]
+    pub fn of_first(folder: &Path) -> Self {
+        Self { path: folder.to_owned(), _lock: None }
     }
 
     /// Where it is.
@@ -110,6 +121,20 @@ pub enum CheckpointError {
         /// What is wrong.
         what: &'static str,
     },
+    /// The solver cannot go on from it.
+    #[error("{path}: the checkpoint is not one of this run: {cause}", path = path.display())]
+    State {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: SavedStateError,
+    },
+    /// Another process could not write or read its part.
+    #[error("{message}")]
+    Elsewhere {
+        /// The error there.
+        message: String,
+    },
     /// It belongs to another run.
     #[error(
         "{path}: the checkpoint belongs to another run: resume with the version of mmsmith, the specification and the \
@@ -155,11 +180,12 @@ impl Reached {
     }
 }
 
-/// What a run has come to: how far it is, and its history until then.
+/// What a run has come to: how far it is, its history until then, and the parts of the solver's state that this process has read.
 #[derive(Debug)]
 pub(crate) struct TakenUp {
     pub(crate) reached: Reached,
     pub(crate) history: Vec<Moment>,
+    pub(crate) parts: Vec<SavedState>,
 }
 
 /// A history as numbers: how many axes there are, and what each moment has.
@@ -197,95 +223,235 @@ fn history_of_numbers(numbers: &[u64]) -> Option<Vec<Moment>> {
     moments.collect()
 }
 
+/// The SHA-256 at the end of a file, as four numbers.
+type Checksum = [u64; 4];
+
+/// The content of one process's file.
+struct Part {
+    /// In the first one's, how far the run is, and its history. In the others', nothing.
+    numbers: Vec<u64>,
+    /// In the first one's, the checksums of the other processes' files.
+    others: Vec<Checksum>,
+    state: SavedState,
+}
+
 impl Checkpoints {
     fn path(&self) -> PathBuf {
         self.folder.path.join(FILE)
     }
 
-    /// Writes a checkpoint in place of the last one.
+    /// The file of another process than the first one, of the checkpoint after `step`.
+    fn path_of(&self, step: u64, rank: usize) -> PathBuf {
+        self.folder.path.join(format!("{FILE}-{step}-{rank}"))
+    }
+
+    /// The checkpoint could not be gone on from.
+    pub(crate) fn refusal(&self, cause: SavedStateError) -> CheckpointError {
+        CheckpointError::State { path: self.path(), cause }
+    }
+
+    /// Writes a checkpoint in place of the last one; a call of all processes.
     pub(crate) fn write(
         &self,
+        ranks: Option<&dyn Ranks>,
         reached: &Reached,
         history: &[Moment],
-        state: &[&mut [u8]],
+        state: &[&[u8]],
     ) -> Result<(), CheckpointError> {
-        let path = self.path();
+        let rank = ranks.map_or(0, Ranks::rank);
+        let mut others = Vec::new();
+        if let Some(ranks) = ranks {
+            let own = match rank {
+                0 => Ok(None),
+                _ => self.write_part(&self.path_of(reached.step, rank), &[], &[], state).map(Some),
+            };
+            let own: Vec<Checksum> = agree(Some(ranks), own)?.into_iter().collect();
+            others = gather(ranks, &own);
+        }
+        let written = match rank {
+            0 => {
+                let numbers = [reached.numbers(), numbers_of_history(history)].concat();
+                self.write_part(&self.path(), &numbers, &others, state).map(drop)
+            }
+            _ => Ok(()),
+        };
+        agree(ranks, written)?;
+        if rank == 0 {
+            self.sweep(reached.step);
+        }
+        Ok(())
+    }
+
+    fn write_part(
+        &self,
+        path: &Path,
+        numbers: &[u64],
+        others: &[Checksum],
+        state: &[&[u8]],
+    ) -> Result<Checksum, CheckpointError> {
         let written = (|| {
-            let file = WholeFile::create(&path)?;
+            let file = WholeFile::create(path)?;
             let mut out = Hashing { inner: BufWriter::new(file), hash: Sha256::new() };
             out.write_all(MAGIC)?;
             out.write_all(&self.identity)?;
-            let numbers = [reached.numbers(), numbers_of_history(history)].concat();
             let lengths = state.iter().map(|array| array.len() as u64);
             let counts = [numbers.len() as u64, state.len() as u64];
-            for number in counts.into_iter().chain(numbers).chain(lengths) {
+            let others =
+                std::iter::once(others.len() as u64).chain(others.iter().copied().flatten());
+            for number in
+                counts.into_iter().chain(numbers.iter().copied()).chain(lengths).chain(others)
+            {
                 out.write_all(&number.to_le_bytes())?;
             }
             state.iter().try_for_each(|array| out.write_all(array))?;
             let Hashing { mut inner, hash } = out;
-            inner.write_all(&hash.finalize())?;
-            inner.into_inner().map_err(io::IntoInnerError::into_error)?.finish()
+            let hash: [u8; 32] = hash.finalize().into();
+            inner.write_all(&hash)?;
+            inner.into_inner().map_err(io::IntoInnerError::into_error)?.finish()?;
+            Ok(as_numbers(hash))
         })();
+        let path = path.to_owned();
         written.map_err(|cause| CheckpointError::FileSystem { action: "write", path, cause })
     }
 
-    /// Puts the checkpoint's numbers in place of `state`, and tells how far the run was; nothing where there is no checkpoint.
-    pub(crate) fn read(&self, state: &mut [&mut [u8]]) -> Result<Option<TakenUp>, CheckpointError> {
-        let path = self.path();
+    /// Removes what is left of other checkpoints than that after `step`. What cannot be looked at or removed stays.
+    fn sweep(&self, step: u64) {
+        let (start, current) = (format!("{FILE}-"), format!("{FILE}-{step}-"));
+        for entry in fs::read_dir(&self.folder.path).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let Some(name) = name.to_str() else { continue };
+            if name.starts_with(&start) && !name.starts_with(&current) {
+                let _ = fs::remove_file(entry.path());
+            }
+            // One that a killed process was writing.
+            let under_way = name.strip_prefix('.').filter(|name| name.starts_with(&start));
+            if let Some((name, _)) = under_way.and_then(|name| name.split_once(".mms-")) {
+                WholeFile::sweep(&self.folder.path.join(name));
+            }
+        }
+    }
+
+    /// How far the run was, and the solver's state; nothing where there is no checkpoint. A call of all processes, each of which reads
+    /// some of the parts.
+    pub(crate) fn read(
+        &self,
+        ranks: Option<&dyn Ranks>,
+    ) -> Result<Option<TakenUp>, CheckpointError> {
+        let (rank, count) = ranks.map_or((0, 1), |ranks| (ranks.rank(), ranks.count()));
+        let damaged = |path: PathBuf, what| CheckpointError::Damaged { path, what };
+        let first = agree(ranks, if rank == 0 { self.read_part(&self.path()) } else { Ok(None) })?;
+        // The first one tells the others how far the run is and of which files it consists.
+        let (mut numbers, mut others, mut parts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut lengths = [0_u64; 2];
+        if let Some((part, _)) = first {
+            (numbers, others) = (part.numbers, part.others);
+            lengths = [numbers.len() as u64, others.len() as u64];
+            parts.push(part.state);
+        }
+        if let Some(ranks) = ranks {
+            share(ranks, 0, &mut lengths);
+            numbers.resize(lengths[0] as usize, 0);
+            others.resize(lengths[1] as usize, Checksum::default());
+            share(ranks, 0, &mut numbers);
+            share(ranks, 0, &mut others);
+        }
+        if numbers.is_empty() {
+            return Ok(None);
+        }
+        let reached = numbers.split_at_checked(Reached::NUMBERS).and_then(|(reached, history)| {
+            Some((Reached::from_numbers(reached)?, history_of_numbers(history)?))
+        });
+        let (reached, history) =
+            reached.ok_or_else(|| damaged(self.path(), "errors or moments are missing"))?;
+        let own = (1..=others.len()).filter(|part| part % count == rank).try_for_each(|part| {
+            let path = self.path_of(reached.step, part);
+            match self.read_part(&path)? {
+                Some((found, checksum)) if checksum == others[part - 1] => {
+                    parts.push(found.state);
+                    Ok(())
+                }
+                Some(_) => Err(damaged(path, "it is of another moment than the first one")),
+                None => Err(damaged(path, "it is missing")),
+            }
+        });
+        agree(ranks, own)?;
+        Ok(Some(TakenUp { reached, history, parts }))
+    }
+
+    /// The content of one process's file, if it is there, and its checksum.
+    fn read_part(&self, path: &Path) -> Result<Option<(Part, Checksum)>, CheckpointError> {
         let fail =
-            |cause| CheckpointError::FileSystem { action: "read", path: path.clone(), cause };
-        let damaged = |what| CheckpointError::Damaged { path: path.clone(), what };
+            |cause| CheckpointError::FileSystem { action: "read", path: path.to_owned(), cause };
+        let damaged = |what| CheckpointError::Damaged { path: path.to_owned(), what };
         // Whole before anything is taken from it.
-        match is_whole(&path) {
-            Ok(true) => {}
-            Ok(false) => return Err(damaged("its checksum does not match")),
+        let (mut file, checksum) = match whole(path) {
+            Ok(Some((file, checksum))) => (BufReader::new(file), checksum),
+            Ok(None) => return Err(damaged("its checksum does not match")),
             Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(cause) => return Err(fail(cause)),
-        }
-        let mut file = BufReader::new(File::open(&path).map_err(fail)?);
+        };
         let mut take = |bytes: &mut [u8]| file.read_exact(bytes).map_err(fail);
         let mut magic = [0; MAGIC.len()];
         take(&mut magic)?;
         let mut identity = [0; 32];
         take(&mut identity)?;
         if magic != *MAGIC || identity != self.identity {
-            return Err(CheckpointError::OtherRun { path: path.clone() });
+            return Err(CheckpointError::OtherRun { path: path.to_owned() });
         }
         let mut number = || {
             let mut bytes = [0; 8];
             take(&mut bytes).map(|()| u64::from_le_bytes(bytes))
         };
         let (numbers, arrays) = (number()?, number()?);
-        if arrays != state.len() as u64 {
-            return Err(damaged("it holds another number of arrays than this run has"));
-        }
-        let numbers = (0..numbers).map(|_| number()).collect::<Result<Vec<_>, _>>()?;
-        for array in &*state {
-            if number()? != array.len() as u64 {
-                return Err(damaged("an array is not as long as this run's"));
-            }
-        }
-        let taken_up = numbers.split_at_checked(Reached::NUMBERS).and_then(|(reached, history)| {
-            let (reached, history) =
-                (Reached::from_numbers(reached)?, history_of_numbers(history)?);
-            Some(TakenUp { reached, history })
+        let mut some = |count: u64| (0..count).map(|_| number()).collect::<Result<Vec<_>, _>>();
+        let (numbers, lengths) = (some(numbers)?, some(arrays)?);
+        let others = some(1)?[0];
+        let others = some(4 * others)?;
+        let others = others.as_chunks().0.to_vec();
+        let state = lengths.into_iter().map(|length| {
+            let mut array = vec![0; length as usize];
+            take(&mut array).map(|()| array)
         });
-        let taken_up = taken_up.ok_or_else(|| damaged("errors or moments are missing"))?;
-        state.iter_mut().try_for_each(|array| take(array))?;
-        Ok(Some(taken_up))
+        let state = state.collect::<Result<_, _>>()?;
+        Ok(Some((Part { numbers, others, state }, checksum)))
     }
 }
 
-/// Whether a file ends with the SHA-256 of all before.
-fn is_whole(path: &Path) -> io::Result<bool> {
+/// The result of this process where all others have one as well, and otherwise the error of one of them; a call of all.
+fn agree<R>(
+    ranks: Option<&dyn Ranks>,
+    own: Result<R, CheckpointError>,
+) -> Result<R, CheckpointError> {
+    let Some(ranks) = ranks else { return own };
+    let failed = ranks.largest(if own.is_err() { 1 + ranks.rank() as u64 } else { 0 });
+    let Some(failed) = failed.checked_sub(1) else { return own };
+    let mut message = own.err().map(|error| error.to_string()).unwrap_or_default().into_bytes();
+    let mut length = [message.len() as u64];
+    share(ranks, failed as usize, &mut length);
+    message.resize(length[0] as usize, 0);
+    share(ranks, failed as usize, &mut message);
+    Err(CheckpointError::Elsewhere { message: String::from_utf8_lossy(&message).into_owned() })
+}
+
+fn as_numbers(checksum: [u8; 32]) -> Checksum {
+    let (numbers, _) = checksum.as_chunks();
+    std::array::from_fn(|n| u64::from_le_bytes(numbers[n]))
+}
+
+/// The file at its beginning, and the SHA-256 at its end; nothing where that is not the one of all before.
+fn whole(path: &Path) -> io::Result<Option<(File, Checksum)>> {
     let mut file = File::open(path)?;
-    let Some(length) = file.metadata()?.len().checked_sub(32) else { return Ok(false) };
+    let Some(length) = file.metadata()?.len().checked_sub(32) else { return Ok(None) };
     let mut hash = Sha256::new();
     let mut body = Read::by_ref(&mut file).take(length);
     io::copy(&mut body, &mut hash)?;
     let mut expected = [0; 32];
     file.read_exact(&mut expected)?;
-    Ok(hash.finalize()[..] == expected)
+    if hash.finalize()[..] != expected {
+        return Ok(None);
+    }
+    file.rewind()?;
+    Ok(Some((file, as_numbers(expected))))
 }
 
 /// A writer that hashes what passes through.
@@ -309,7 +475,7 @@ impl<W: Write> Write for Hashing<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use mmsmith_ranks::in_process;
 
     fn checkpoints(folder: &Path) -> Checkpoints {
         let folder = CheckpointFolder::lock(folder).unwrap();
@@ -343,41 +509,149 @@ mod tests {
     fn what_was_written_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let checkpoints = checkpoints(folder.path());
-        let (mut a, mut b) = ([1, 2, 3], []);
-        assert!(checkpoints.read(&mut [&mut a[..]]).unwrap().is_none());
+        assert!(checkpoints.read(None).unwrap().is_none());
         for history in [vec![], history(1), history(3)] {
-            checkpoints.write(&reached(), &history, &[&mut a[..], &mut b[..]]).unwrap();
-            let mut c = [0; 3];
-            let found = checkpoints.read(&mut [&mut c[..], &mut b[..]]).unwrap().unwrap();
-            assert_eq!((c, found.reached.numbers()), (a, reached().numbers()));
+            checkpoints.write(None, &reached(), &history, &[&[1, 2, 3], &[]]).unwrap();
+            let found = checkpoints.read(None).unwrap().unwrap();
+            assert_eq!(found.reached.numbers(), reached().numbers());
             assert_eq!(numbers_of_history(&found.history), numbers_of_history(&history));
+            assert_eq!(found.parts, [[vec![1, 2, 3], vec![]]]);
         }
     }
 
     #[test]
-    fn any_damage_is_noticed_before_the_state_is_touched() {
+    fn any_damage_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let mut checkpoints = checkpoints(folder.path());
-        let mut a = [9; 40];
-        checkpoints.write(&reached(), &history(2), &[&mut a[..]]).unwrap();
+        checkpoints.write(None, &reached(), &history(2), &[&[9; 40]]).unwrap();
         let whole = fs::read(checkpoints.path()).unwrap();
         for at in 0..whole.len() {
             let mut bytes = whole.clone();
             bytes[at] ^= 1;
             fs::write(checkpoints.path(), &bytes).unwrap();
-            let mut b = [0; 40];
-            assert!(checkpoints.read(&mut [&mut b[..]]).is_err(), "byte {at}");
+            assert!(checkpoints.read(None).is_err(), "byte {at}");
             fs::write(checkpoints.path(), &whole[..at]).unwrap();
-            assert!(checkpoints.read(&mut [&mut b[..]]).is_err(), "cut at {at}");
-            assert_eq!(b, [0; 40]);
+            assert!(checkpoints.read(None).is_err(), "cut at {at}");
         }
         fs::write(checkpoints.path(), &whole).unwrap();
-        let mut short = [0; 39];
-        let error = checkpoints.read(&mut [&mut short[..]]).unwrap_err();
-        assert!(error.to_string().contains("not as long"), "{error}");
         checkpoints.identity = [8; 32];
-        let error = checkpoints.read(&mut [&mut a[..]]).unwrap_err();
+        let error = checkpoints.read(None).unwrap_err();
         assert!(matches!(error, CheckpointError::OtherRun { .. }));
+    }
+
+    /// Writes the checkpoint of a step by some processes, each of whose part has its number.
+    fn write_together(folder: &Path, count: usize, step: u64) {
+        in_process(count, |ranks| {
+            let reached = Reached { step, ..reached() };
+            let state = [vec![ranks.rank() as u8; 3], vec![count as u8]];
+            let state = state.each_ref().map(|array| array.as_slice());
+            checkpoints_of(folder, &*ranks).write(Some(&*ranks), &reached, &history(2), &state)
+        })
+        .into_iter()
+        .for_each(|written| written.unwrap());
+    }
+
+    fn checkpoints_of(folder: &Path, ranks: &dyn Ranks) -> Checkpoints {
+        match ranks.rank() {
+            0 => checkpoints(folder),
+            _ => {
+                let folder = CheckpointFolder::of_first(folder);
+                Checkpoints { folder, every: 1, identity: [7; 32], resume: true }
+            }
+        }
+    }
+
+    fn read_together(folder: &Path, count: usize) -> Vec<Result<Option<TakenUp>, CheckpointError>> {
+        in_process(count, |ranks| checkpoints_of(folder, &*ranks).read(Some(&*ranks)))
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_several_processes_wrote_any_number_reads() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        assert!(read_together(folder, 2).into_iter().all(|found| found.unwrap().is_none()));
+        for (step, writers) in [(3, 4), (5, 1), (9, 3)] {
+            write_together(folder, writers, step);
+            let left = (1..writers).map(|rank| format!("checkpoint-{step}-{rank}"));
+            let expected: Vec<String> =
+                ["checkpoint".to_owned()].into_iter().chain(left).chain(["lock".into()]).collect();
+            assert_eq!(names(folder), expected);
+            for readers in 1..=5 {
+                let mut seen = Vec::new();
+                for found in read_together(folder, readers) {
+                    let found = found.unwrap().unwrap();
+                    assert_eq!(found.reached.step, step);
+                    assert_eq!(numbers_of_history(&found.history), numbers_of_history(&history(2)));
+                    assert!(found.parts.iter().all(|part| part[1] == [writers as u8]));
+                    seen.extend(found.parts.into_iter().map(|part| part[0].clone()));
+                }
+                seen.sort();
+                let all: Vec<_> = (0..writers).map(|rank| vec![rank as u8; 3]).collect();
+                assert_eq!(seen, all);
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_that_is_damaged_missing_or_of_another_moment_is_named_at_all_processes() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let part = folder.join("checkpoint-3-2");
+        let refused = |said: &str| {
+            for readers in 1..=4 {
+                for found in read_together(folder, readers) {
+                    let error = found.unwrap_err().to_string();
+                    assert!(error.contains("checkpoint-3-2") && error.contains(said), "{error}");
+                }
+            }
+        };
+        write_together(folder, 3, 3);
+        let earlier = fs::read(&part).unwrap();
+        write_together(folder, 4, 3);
+        fs::write(&part, &earlier).unwrap();
+        refused("of another moment");
+        fs::write(&part, &earlier[1..]).unwrap();
+        refused("checksum does not match");
+        fs::remove_file(&part).unwrap();
+        refused("it is missing");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_with_the_next_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write_together(folder, 3, 3);
+        // Killed after one of two had written its part of the next, and while the other did.
+        fs::write(folder.join("checkpoint-6-1"), "whole").unwrap();
+        fs::write(folder.join(".checkpoint-6-2.mms-0123456789.tmp"), "part").unwrap();
+        assert_eq!(read_together(folder, 1)[0].as_ref().unwrap().as_ref().unwrap().reached.step, 3);
+        write_together(folder, 2, 4);
+        assert_eq!(names(folder), ["checkpoint", "checkpoint-4-1", "lock"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_process_that_cannot_write_its_part_fails_all_with_its_message() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write_together(folder, 2, 3);
+        fs::create_dir(folder.join("checkpoint-5-1")).unwrap();
+        let errors = in_process(2, |ranks| {
+            let checkpoints = checkpoints_of(folder, &*ranks);
+            let reached = Reached { step: 5, ..reached() };
+            checkpoints.write(Some(&*ranks), &reached, &[], &[&[1]]).unwrap_err().to_string()
+        });
+        assert_eq!(errors[0], errors[1]);
+        assert!(errors[0].contains("checkpoint-5-1: cannot write the checkpoint"), "{}", errors[0]);
+        assert!(read_together(folder, 2).into_iter().all(|found| found.is_ok()));
     }
 
     #[test]
@@ -402,7 +676,7 @@ mod tests {
         for name in ["checkpoint.tmp", "checkpoint"] {
             std::os::unix::fs::symlink(&target, folder.path().join(name)).unwrap();
         }
-        checkpoints(folder.path()).write(&reached(), &[], &[]).unwrap();
+        checkpoints(folder.path()).write(None, &reached(), &[], &[]).unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"mine");
     }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{AtTime, BodyForce, Solver, StepError};
+use mmsmith_mpm::{AtTime, BodyForce, SavedState, SavedStateError, Solver, StepError};
 use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
@@ -92,6 +92,13 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
 }
 
 impl<T: Real, const D: usize> Driven<'_, T, D> {
+    /// Goes on from a state that was saved, of which this process has read some parts; a call of all processes.
+    pub(crate) fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        self.solver.take_up(parts)?;
+        self.body_force.follow(self.solver.as_mut());
+        Ok(())
+    }
+
     /// Does the steps of these numbers, and lets the observer look on after each.
     ///
     /// # Errors

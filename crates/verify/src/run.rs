@@ -275,13 +275,26 @@ where
     f64: Precision<D>,
 {
     let dt = driven.dt;
+    let ranks = outputs.ranks.clone();
+    let ranks = ranks.as_deref();
+    // What is kept of particles is of those that are here then.
+    let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
+        Some(checkpoints) => match checkpoints.read(ranks)? {
+            Some(TakenUp { reached, history, parts }) => {
+                driven.take_up(parts).map_err(|cause| checkpoints.refusal(cause))?;
+                Some((reached, history))
+            }
+            None => None,
+        },
+        None => None,
+    };
     let solver = driven.solver.as_mut();
     let lag = solver.velocity_lag().to_f64();
     let mut measurement = Measurement::new(exact, solver, outputs.ranks.as_ref());
     let count = measurement.count(solver);
     let mut frames = match outputs.frames {
         Some(output) => {
-            let is_first = outputs.ranks.as_ref().is_none_or(|ranks| ranks.rank() == 0);
+            let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
             Some(FrameWriter::new(output, steps.count, lag, is_first)?)
         }
         None => None,
@@ -290,12 +303,8 @@ where
         Some(moments) => Some(Recorder::new(moments, exact, law(exact.law())?, steps.count)),
         None => None,
     };
-    let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
-        Some(checkpoints) => checkpoints.read(&mut solver.state())?,
-        None => None,
-    };
     let Reached { step: mut done, mut wall_s, mut cpu_s, mut errors } =
-        if let Some(TakenUp { reached, history }) = resumed {
+        if let Some((reached, history)) = resumed {
             if let Some(recorder) = &mut recorder {
                 recorder.take_up(history);
             }
@@ -369,7 +378,7 @@ where
         {
             let history = recorder.as_ref().map_or(&[][..], Recorder::moments);
             let reached = Reached { step, wall_s, cpu_s, errors };
-            checkpoints.write(&reached, history, &solver.state())?;
+            checkpoints.write(ranks, &reached, history, &solver.state())?;
         }
         Ok(ControlFlow::Continue(()))
     })?;

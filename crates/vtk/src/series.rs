@@ -57,13 +57,27 @@ impl Series {
     }
 
     /// Takes the frames that an earlier run wrote to this folder into the list, one for each time; the next frame comes after
-    /// them. They were written whole before the state that a run goes on from.
+    /// them. They were written whole before the state that a run goes on from, by one process or by several.
     pub fn take_up(&mut self, times: &[f64]) {
-        self.listed = times.iter().enumerate().map(|(n, &time)| (time, self.file(n))).collect();
+        let written = |n: usize| {
+            let joined = self.joined(n);
+            if self.folder.join(&joined).exists() { joined } else { self.file(n) }
+        };
+        self.listed = times.iter().enumerate().map(|(n, &time)| (time, written(n))).collect();
     }
 
     fn file(&self, number: usize) -> String {
         format!("{}-{number:06}.vtu", self.name)
+    }
+
+    /// The file that joins the pieces of a frame.
+    fn joined(&self, number: usize) -> String {
+        format!("{}-{number:06}.pvtu", self.name)
+    }
+
+    /// Removes the file that an earlier run has written for the next frame in another form. One that stays is not listed.
+    fn remove(&self, file: &str) {
+        let _ = fs::remove_file(self.folder.join(file));
     }
 
     /// Writes the next frame and adds it to the list; returns the path of the frame's file.
@@ -78,6 +92,7 @@ impl Series {
         let file = self.file(self.listed.len());
         let path = self.folder.join(&file);
         whole_file::replace(&path, &to_bytes(frame)?)?;
+        self.remove(&self.joined(self.listed.len()));
 
         self.listed.push((frame.time, file));
         if let Err(error) = whole_file::replace(&self.pvd, self.list().as_bytes()) {
@@ -105,11 +120,12 @@ impl Series {
     /// Where the file system refuses, as [`write`](Self::write).
     pub fn join(&mut self, like: &Frame, pieces: &[usize]) -> Result<PathBuf, Error> {
         let number = self.listed.len();
-        let file = format!("{}-{number:06}.pvtu", self.name);
+        let file = self.joined(number);
         let path = self.folder.join(&file);
         let sources = pieces.iter().map(|&process| escape(&self.piece(number, process)));
-        let text = joined(like, sources);
+        let text = text_of_joined(like, sources);
         whole_file::replace(&path, text.as_bytes())?;
+        self.remove(&self.file(number));
         self.listed.push((like.time, file));
         if let Err(error) = whole_file::replace(&self.pvd, self.list().as_bytes()) {
             self.listed.pop();
@@ -142,7 +158,7 @@ impl Series {
 }
 
 /// The file of a frame in pieces.
-fn joined(like: &Frame, sources: impl Iterator<Item = String>) -> String {
+fn text_of_joined(like: &Frame, sources: impl Iterator<Item = String>) -> String {
     let array = |name: &str, number: &str, components: usize| {
         format!(
             "<PDataArray type=\"{number}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>\n"

@@ -7,13 +7,12 @@
 //! threads. The grid update of a row follows its last contribution, while the row lies in the cache.
 //!
 //! A band has more rows than a bin and its stencils need. Particles may thus drift for some steps before the next sort. The
-//! order of the last sort decides the order of all sums: it belongs to the state of a run, and a run that continues to
-//! the same bits restores it.
+//! order of the last sort decides the order of all sums. It follows from the sub-bin that each particle was in then, which belongs
+//! to the state of a run: a run that continues to the same bits restores it.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytemuck::cast_slice_mut;
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
@@ -105,7 +104,7 @@ pub(crate) struct Bins {
     sub_bins: usize,
     /// Buffer of the sort: particles in each sub-bin, later the place of the next of them.
     counts: Vec<u32>,
-    /// Buffer of the sort: sub-bin of every particle.
+    /// Sub-bin of every particle at the last sort, among those of the whole grid.
     keys: Vec<u32>,
 }
 
@@ -188,17 +187,28 @@ impl Bins {
         &self.bin_of
     }
 
-    /// Whether each particle is in exactly one bin: false before the first sort, and after [`state`](Self::state) was
-    /// overwritten by an order that no sort gives.
+    /// Whether each particle is in exactly one bin: false before the first sort.
     pub(crate) fn is_sorted(&mut self) -> bool {
         self.order.is_whole()
     }
 
-    /// The result of the last sort, as bytes: the bin of every particle, the order of the particles, the start of each bin.
-    pub(crate) fn state(&mut self) -> [&mut [u8]; 3] {
-        let Self { bin_of, order, .. } = self;
-        let (order, starts) = order.arrange();
-        [cast_slice_mut(bin_of), cast_slice_mut(order), cast_slice_mut(starts)]
+    /// The result of the last sort: the sub-bin of every particle.
+    pub(crate) fn keys(&self) -> &[u32] {
+        &self.keys
+    }
+
+    /// The bin of a sub-bin, if the grid has such.
+    pub(crate) fn bin_of_key(&self, key: u32) -> Option<usize> {
+        Some(key as usize / self.sub_bins).filter(|bin| *bin < self.rows.bins)
+    }
+
+    /// Sorts all particles as they were sorted where [`keys`](Self::keys) had these values, of bins that are held here.
+    pub(crate) fn sort_as(&mut self, keys: &[u32]) {
+        self.keys.copy_from_slice(keys);
+        for (bin_of, key) in self.bin_of.iter_mut().zip(keys) {
+            *bin_of = key / self.sub_bins as u32;
+        }
+        self.arrange();
     }
 
     /// Sorts all particles by the sub-bin of the first node of their stencils, `first_node(particle)`, in the numbers of the whole
@@ -209,19 +219,26 @@ impl Bins {
         first_node: &(dyn Fn(usize) -> usize + Sync),
     ) {
         let Self { rows, sub_bins, .. } = *self;
-        let (row, line, first) = (layout.row(), layout.dims[0], self.held.bands.start);
+        let (row, line) = (layout.row(), layout.dims[0]);
         self.keys.par_iter_mut().zip(&mut self.bin_of).enumerate().for_each(
             |(p, (key, bin_of))| {
                 let node = first_node(p);
                 let bin = rows.bin_of(node / row);
                 let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
                 *bin_of = bin as u32;
-                *key = ((bin - first) * sub_bins + sub_bin) as u32;
+                *key = (bin * sub_bins + sub_bin) as u32;
             },
         );
+        self.arrange();
+    }
+
+    /// Brings the particles into the order of their sub-bins.
+    fn arrange(&mut self) {
+        let Self { sub_bins, ref held, .. } = *self;
+        let first = held.bands.start * sub_bins;
         self.counts.fill(0);
         for &key in &self.keys {
-            self.counts[key as usize + 1] += 1;
+            self.counts[key as usize - first + 1] += 1;
         }
         for sub_bin in 1..self.counts.len() {
             self.counts[sub_bin] += self.counts[sub_bin - 1];
@@ -231,7 +248,7 @@ impl Bins {
             *start = *first as usize;
         }
         for (p, &key) in self.keys.iter().enumerate() {
-            let place = &mut self.counts[key as usize];
+            let place = &mut self.counts[key as usize - first];
             order[*place as usize] = p as u32;
             *place += 1;
         }

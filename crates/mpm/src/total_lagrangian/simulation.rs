@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::{array, mem};
 
-use bytemuck::{bytes_of_mut, cast_slice_mut};
+use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};
@@ -26,6 +26,7 @@ use crate::material::{
 };
 use crate::parallel::chunks::{each, each_chunk};
 use crate::particles::Particles;
+use crate::saved_state::{SavedState, SavedStateError, replace_whole};
 use crate::tensor::determinant;
 
 /// A tensor-product grid that covers the body, with the particles in it.
@@ -381,15 +382,26 @@ impl<const D: usize> TotalLagrangian<D> {
         &self.particles
     }
 
-    /// The state between two steps, as slices of bytes in this machine's order; their number and lengths follow from the set-up.
+    /// The state between two steps: arrays as bytes in this machine's order.
+    pub fn state(&self) -> Vec<&[u8]> {
+        let Self { components, steps_done, .. } = self;
+        let coefficients = components.iter().flat_map(|Component { u, v, a, .. }| [u, v, a]);
+        let mut state: Vec<&[u8]> = coefficients.map(|c| cast_slice(c)).collect();
+        state.push(bytes_of(steps_done));
+        state
+    }
+
+    /// Goes on from a state that was saved, of a simulation with the same set-up, to the bits of that one.
     ///
-    /// A copy of these bytes, written over the state of a simulation with the same set-up, continues the run to the same bits.
-    pub fn state(&mut self) -> Vec<&mut [u8]> {
+    /// # Errors
+    ///
+    /// Where the state is not one of this set-up; nothing is changed then.
+    pub fn take_up(&mut self, parts: &[SavedState]) -> Result<(), SavedStateError> {
         let Self { components, steps_done, .. } = self;
         let coefficients = components.iter_mut().flat_map(|Component { u, v, a, .. }| [u, v, a]);
         let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
         state.push(bytes_of_mut(steps_done));
-        state
+        replace_whole(&mut state, parts)
     }
 
     /// Number of completed steps.

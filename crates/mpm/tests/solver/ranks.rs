@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_mpm::{
-    Body, Grid, Integrator, Material, Scalar, Settings, SetupError, Shape, Share, Simulation,
-    StepError, Transfer,
+    Body, Grid, Integrator, Material, SavedState, SavedStateError, Scalar, Settings, SetupError,
+    Shape, Share, Simulation, StepError, Transfer,
 };
 use mmsmith_ranks::{Ranks, in_process};
 use nalgebra::{SMatrix, SVector};
@@ -248,4 +248,83 @@ fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
             }
         }
     }
+}
+
+/// What `count` processes save after some steps, each its part, and what they come to in some more.
+fn save_and_go_on<const D: usize>(
+    (whole, settings): (&Body<f64, D>, Settings<f64>),
+    count: usize,
+    taken_up: Option<&[SavedState]>,
+) -> (Vec<SavedState>, Vec<Of<D>>)
+where
+    f64: Scalar<D>,
+{
+    let found = in_process(count, |ranks| {
+        let rank = ranks.rank();
+        let (body, ids) = share(whole, &*ranks);
+        let share = Share { ranks, ids };
+        let mut part = Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+        match taken_up {
+            // What continues has gone another way before.
+            Some(parts) => {
+                fly(&mut part, 2);
+                let own = parts.iter().skip(rank).step_by(count).cloned().collect();
+                part.take_up(own).unwrap();
+            }
+            None => assert_eq!(fly(&mut part, 7).1, None),
+        }
+        let saved: SavedState = part.state().iter().map(|array| array.to_vec()).collect();
+        let (flown, error, _) = fly(&mut part, 8);
+        assert_eq!(error, None);
+        (saved, flown)
+    });
+    let (saved, flown): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let mut flown = flown.concat();
+    flown.sort_by_key(|of| of.0);
+    (saved, flown)
+}
+
+#[test]
+fn what_any_number_of_processes_saved_any_other_goes_on_with() {
+    for (n, settings) in schemes::schemes().map(flying).enumerate() {
+        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
+        let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
+        let (one, expected) = save_and_go_on((&whole, settings), 1, None);
+        let (many, _) = save_and_go_on((&whole, settings), 2 + n % 3, None);
+        for (saved, count) in [(&one, 3), (&many, 1), (&many, 2), (&many, 5)] {
+            let (again, found) = save_and_go_on((&whole, settings), count, Some(saved));
+            let other = found.iter().zip(&expected).find(|(a, b)| a != b);
+            let what = format!("{} to {count} processes, {settings:?}", saved.len());
+            assert_eq!((found.len(), other), (expected.len(), None), "{what}");
+            // What was taken up is what was saved.
+            let bytes = |parts: &[SavedState], array: usize| -> usize {
+                parts.iter().map(|part| part[array].len()).sum()
+            };
+            assert!((1..7).all(|array| bytes(&again, array) == bytes(saved, array)), "{what}");
+        }
+    }
+}
+
+#[test]
+fn one_process_goes_on_with_what_several_saved() {
+    let settings = flying(schemes::schemes().next().unwrap());
+    let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
+    let whole = body::<3>(-14.0, true);
+    let (saved, expected) = save_and_go_on((&whole, settings), 3, None);
+    let mut alone = Simulation::new(grid::<3>(), whole.clone(), law(), settings).unwrap();
+    alone.take_up(saved).unwrap();
+    fly(&mut alone, 8);
+    assert_eq!(state(&alone), expected);
+    // A part is missing, or is there twice.
+    let (saved, _) = save_and_go_on((&whole, settings), 3, None);
+    assert_eq!(alone.take_up(saved[1..].to_vec()), Err(SavedStateError::Particles));
+    let refused = in_process(2, |ranks| {
+        let rank = ranks.rank();
+        let (body, ids) = share(&whole, &*ranks);
+        let share = Share { ranks, ids };
+        let mut part = Simulation::shared_out(grid::<3>(), body, share, law(), settings).unwrap();
+        let own = if rank == 0 { vec![saved[0].clone()] } else { saved[..2].to_vec() };
+        part.take_up(own)
+    });
+    assert!(refused.iter().all(Result::is_err), "{refused:?}");
 }

@@ -7,8 +7,8 @@ use mmsmith_mpm::total_lagrangian::{
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::{
-    AtTime, Body, BodyForce, Grid, Integrator, Law, Material, NoBodyForce, Particles, Scalar,
-    Settings, Shape, Simulation, Transfer,
+    AtTime, Body, BodyForce, Grid, Integrator, Law, Material, NoBodyForce, Particles, SavedState,
+    SavedStateError, Scalar, Settings, Shape, Simulation, Transfer,
 };
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -109,25 +109,31 @@ fn body<const D: usize>() -> Body<f64, D> {
 fn is_continued<S>(
     [mut one, mut two]: [S; 2],
     step: impl Fn(&mut S),
-    state: impl Fn(&mut S) -> Vec<&mut [u8]>,
+    state: impl Fn(&S) -> Vec<&[u8]>,
+    take_up: impl Fn(&mut S, SavedState) -> Result<(), SavedStateError>,
     what: &str,
 ) {
-    let read = |simulation: &mut S| -> Vec<Vec<u8>> {
+    let read = |simulation: &S| -> SavedState {
         state(simulation).iter().map(|part| part.to_vec()).collect()
     };
-    let start = read(&mut one);
+    let start = read(&one);
     (0..4).for_each(|_| step(&mut one));
-    let written = read(&mut one);
+    let written = read(&one);
     assert!(written.iter().zip(&start).filter(|(now, then)| now != then).count() > 3, "{what}");
     // What continues has gone another way before.
     (0..2).for_each(|_| step(&mut two));
-    let parts = state(&mut two);
-    assert_eq!(parts.len(), written.len());
-    parts.into_iter().zip(&written).for_each(|(part, written)| part.copy_from_slice(written));
+    let expected = Err(SavedStateError::Arrays { found: 1, expected: written.len() });
+    assert_eq!(take_up(&mut two, vec![written[0].clone()]), expected, "{what}");
+    for n in (0..written.len()).filter(|&n| !written[n].is_empty()) {
+        let mut shorter = written.clone();
+        shorter[n].pop();
+        assert!(take_up(&mut two, shorter).is_err(), "{what}: array {n}");
+    }
+    take_up(&mut two, written.clone()).unwrap();
     (0..4).for_each(|_| step(&mut one));
     (0..4).for_each(|_| step(&mut two));
-    assert!(read(&mut one) == read(&mut two), "{what}");
-    assert!(read(&mut one) != written, "{what}");
+    assert!(read(&one) == read(&two), "{what}");
+    assert!(read(&one) != written, "{what}");
 }
 
 /// Every scheme, centred differences from velocities at time 0.
@@ -198,7 +204,13 @@ fn runs_continue_from_their_state_to_the_same_bits() {
         for settings in updated_schemes() {
             let two = [simulation(settings), simulation(settings)];
             let what = format!("{D} {settings:?}");
-            is_continued(two, |s| s.step(&force).unwrap(), Simulation::state, &what);
+            is_continued(
+                two,
+                |s| s.step(&force).unwrap(),
+                Simulation::state,
+                |s, saved| s.take_up(vec![saved]),
+                &what,
+            );
         }
     }
     check::<1>();
@@ -208,7 +220,13 @@ fn runs_continue_from_their_state_to_the_same_bits() {
     for scene in total_scenes() {
         let two = [total_scene(ONE, scene), total_scene(ONE, scene)];
         let what = format!("{scene:?}");
-        is_continued(two, |s| s.step(&force).unwrap(), TotalLagrangian::state, &what);
+        is_continued(
+            two,
+            |s| s.step(&force).unwrap(),
+            TotalLagrangian::state,
+            |s, saved| s.take_up(&[saved]),
+            &what,
+        );
     }
 }
 
@@ -229,33 +247,39 @@ fn runs_in_single_precision_continue_from_their_state_to_the_same_bits() {
             Simulation::new(grid, single(&body::<2>()), material, settings).unwrap()
         };
         let what = format!("{settings:?}");
-        is_continued([new(), new()], |s| s.step(&force).unwrap(), Simulation::state, &what);
+        is_continued(
+            [new(), new()],
+            |s| s.step(&force).unwrap(),
+            Simulation::state,
+            |s, saved| s.take_up(vec![saved]),
+            &what,
+        );
     }
 }
 
-/// What a step that looks first whether its particles are sorted does with an order that no sort can give.
 #[test]
-fn particles_in_an_order_that_cannot_be_are_sorted_anew() {
-    let force = ONE.body_force::<2>();
+fn states_that_cannot_be_are_refused() {
     for settings in updated_schemes() {
-        let [mut one, mut two] = [simulation::<2>(settings), simulation(settings)];
-        for simulation in [&mut one, &mut two] {
-            (0..3).for_each(|_| simulation.step(&force).unwrap());
+        let mut run = simulation::<2>(settings);
+        let saved: SavedState = run.state().iter().map(|part| part.to_vec()).collect();
+        let with = |array: usize, bytes: Vec<u8>| {
+            let mut saved = saved.clone();
+            saved[array] = bytes;
+            vec![saved]
+        };
+        // Bins, and the same particle twice.
+        let far = saved[2].iter().map(|_| 255).collect();
+        assert_eq!(run.take_up(with(2, far)), Err(SavedStateError::Particles), "{settings:?}");
+        let twice = vec![0; 2 * saved[2].len()];
+        assert_eq!(run.take_up(with(1, twice)), Err(SavedStateError::Particles), "{settings:?}");
+        assert_eq!(run.take_up(vec![]), Err(SavedStateError::Particles), "{settings:?}");
+        let both = vec![saved.clone(), saved.clone()];
+        assert_eq!(run.take_up(both), Err(SavedStateError::Particles), "{settings:?}");
+        if settings.shape == Shape::Cpdi2 {
+            let far = saved[8].iter().map(|_| 255).collect();
+            assert_eq!(run.take_up(with(8, far)), Err(SavedStateError::Place), "{settings:?}");
         }
-        // Positions, velocities, deformations, affine velocities and corners come first, and last the number of steps.
-        let first = if settings.shape == Shape::Cpdi2 { 5 } else { 4 };
-        let mut parts = two.state();
-        let order = parts.len() - 1;
-        assert_eq!(order, first + 3);
-        parts[first..order].iter_mut().for_each(|part| part.fill(1));
-        for simulation in [&mut one, &mut two] {
-            (0..3).for_each(|_| simulation.step(&force).unwrap());
-        }
-        let (one, two) = (one.particles(), two.particles());
-        for p in 0..one.len() {
-            assert!((one.x[p] - two.x[p]).amax() < 1e-13, "{settings:?}");
-            assert!((one.v[p] - two.v[p]).amax() < 1e-12, "{settings:?}");
-        }
+        assert_eq!(run.take_up(vec![saved.clone()]), Ok(()));
     }
 }
 

@@ -1,0 +1,298 @@
+//! The state of a simulation between two steps, as bytes, and simulations that go on from it.
+//!
+//! A process saves the particles that it holds. Any number of processes goes on with them: first each particle goes to a process that
+//! follows from its number, where its state is put in place, then to the process of the bin that it was sorted into before the state was
+//! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
+
+use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
+use mmsmith_ranks::{gather, share};
+use nalgebra::{SMatrix, SVector};
+use thiserror::Error;
+
+use crate::decomposition::Move;
+use crate::particles::Particles;
+use crate::simd::Lanes;
+use crate::simulation::Simulation;
+use crate::state::State;
+use crate::support::Support;
+
+/// The arrays that one process saved, in this machine's byte order.
+pub type SavedState = Vec<Vec<u8>>;
+
+/// A saved state that a simulation cannot go on from.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum SavedStateError {
+    /// Another number of arrays.
+    #[error("it has {found} arrays where this run has {expected}")]
+    Arrays {
+        /// The number of arrays saved.
+        found: usize,
+        /// The number of this run's.
+        expected: usize,
+    },
+    /// An array of another length.
+    #[error("an array has {found} bytes where this run's has {expected}")]
+    Length {
+        /// Bytes saved.
+        found: usize,
+        /// Bytes of this run's.
+        expected: usize,
+    },
+    /// Not each of the particles once.
+    #[error("it has other particles than this run")]
+    Particles,
+    /// Numbers that do not belong together.
+    #[error("it has a corner or a bin that this run does not have")]
+    Place,
+    /// Saved by several processes, for a scheme that one simulates.
+    #[error("it is in {found} parts where this run has one")]
+    Parts {
+        /// The number of parts.
+        found: usize,
+    },
+    /// Found by another process.
+    #[error("another process has found it to be of another run")]
+    Elsewhere,
+}
+
+/// Puts saved arrays in place of those of a state that one process has as a whole.
+pub(crate) fn replace_whole(
+    state: &mut [&mut [u8]],
+    saved: &[SavedState],
+) -> Result<(), SavedStateError> {
+    let [saved] = saved else { return Err(SavedStateError::Parts { found: saved.len() }) };
+    let (found, expected) = (saved.len(), state.len());
+    if found != expected {
+        return Err(SavedStateError::Arrays { found, expected });
+    }
+    for (array, saved) in state.iter().zip(saved) {
+        let (found, expected) = (saved.len(), array.len());
+        if found != expected {
+            return Err(SavedStateError::Length { found, expected });
+        }
+    }
+    state.iter_mut().zip(saved).for_each(|(array, saved)| array.copy_from_slice(saved));
+    Ok(())
+}
+
+/// The state of some particles, each array in the same order.
+struct Saved<T, const D: usize> {
+    kind: Kind,
+    steps_done: usize,
+    ids: Vec<u64>,
+    /// The sub-bin of each at the last sort.
+    keys: Vec<u32>,
+    x: Vec<SVector<T, D>>,
+    v: Vec<SVector<T, D>>,
+    F: Vec<SMatrix<T, D, D>>,
+    affine: Vec<SMatrix<T, D, D>>,
+    /// The first, second, ... corner of each particle.
+    corners: Vec<Vec<SVector<T, D>>>,
+}
+
+/// What the particles of a scheme have.
+#[derive(Clone, Copy)]
+struct Kind {
+    is_affine: bool,
+    has_corners: bool,
+}
+
+/// The elements of a saved array, which are as many as `count`.
+fn elements<E: Pod>(bytes: Vec<u8>, count: usize) -> Result<Vec<E>, SavedStateError> {
+    let (found, expected) = (bytes.len(), count * size_of::<E>());
+    if found != expected {
+        return Err(SavedStateError::Length { found, expected });
+    }
+    let mut elements = vec![E::zeroed(); count];
+    cast_slice_mut(&mut elements).copy_from_slice(&bytes);
+    Ok(elements)
+}
+
+impl<T: Lanes, const D: usize> Saved<T, D> {
+    fn of_parts(parts: Vec<SavedState>, kind: Kind) -> Result<Self, SavedStateError> {
+        let mut saved = Self {
+            kind,
+            steps_done: 0,
+            ids: Vec::new(),
+            keys: Vec::new(),
+            x: Vec::new(),
+            v: Vec::new(),
+            F: Vec::new(),
+            affine: Vec::new(),
+            corners: vec![Vec::new(); 1 << D],
+        };
+        parts.into_iter().try_for_each(|part| saved.add(part))?;
+        Ok(saved)
+    }
+
+    fn add(&mut self, part: SavedState) -> Result<(), SavedStateError> {
+        let Kind { is_affine, has_corners } = self.kind;
+        let (found, expected) = (part.len(), if has_corners { 9 } else { 7 });
+        if found != expected {
+            return Err(SavedStateError::Arrays { found, expected });
+        }
+        let mut arrays = part.into_iter();
+        let mut next = || arrays.next().unwrap_or_default();
+        self.steps_done = elements(next(), 1)?[0];
+        let (ids, keys) = (next(), next());
+        let count = keys.len() / size_of::<u32>();
+        // Where one process had all, numbers are places.
+        let ids = if ids.is_empty() { (0..count as u64).collect() } else { elements(ids, count)? };
+        self.ids.extend(ids);
+        self.keys.extend(elements::<u32>(keys, count)?);
+        self.x.extend(elements::<SVector<T, D>>(next(), count)?);
+        self.v.extend(elements::<SVector<T, D>>(next(), count)?);
+        self.F.extend(elements::<SMatrix<T, D, D>>(next(), count)?);
+        let affine = if is_affine { count } else { 0 };
+        self.affine.extend(elements::<SMatrix<T, D, D>>(next(), affine)?);
+        if has_corners {
+            let x = next();
+            let corners = x.len() / size_of::<SVector<T, D>>();
+            let x: Vec<SVector<T, D>> = elements(x, corners)?;
+            let of_particles: Vec<[u32; 8]> = elements(next(), count)?;
+            for (corner, positions) in self.corners.iter_mut().enumerate() {
+                for own in &of_particles {
+                    positions.push(*x.get(own[corner] as usize).ok_or(SavedStateError::Place)?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Those that are here after a move.
+    fn follow(&mut self, moved: &Move) {
+        moved.replace(&mut self.keys);
+        [&mut self.x, &mut self.v].into_iter().for_each(|vectors| moved.replace(vectors));
+        moved.replace(&mut self.F);
+        if self.kind.is_affine {
+            moved.replace(&mut self.affine);
+        }
+        if self.kind.has_corners {
+            self.corners.iter_mut().for_each(|positions| moved.replace(positions));
+        }
+    }
+}
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// The arrays of the particles here, but for the number of steps.
+    fn arrays(&self) -> Vec<&[u8]> {
+        let Self { particles, affine, support, bins, part, .. } = self;
+        let Particles { x, v, F, .. } = particles;
+        let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
+        let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
+        arrays.extend([cast_slice(x), cast_slice(v), cast_slice(F), cast_slice(affine)]);
+        match support {
+            Support::Cpdi2 { mesh, .. } => {
+                arrays.extend([cast_slice(&mesh.x), cast_slice(&mesh.corners)]);
+            }
+            Support::Polygons(corners) => arrays.push(cast_slice(&corners.polygons.x)),
+            Support::Product(_) | Support::Cpdi { .. } => {}
+        }
+        arrays
+    }
+
+    /// Whether this holds, for all processes.
+    fn agreed<R>(&self, here: Result<R, SavedStateError>) -> Result<R, SavedStateError> {
+        let is_elsewhere =
+            self.part.as_ref().is_some_and(|part| part.ranks.largest(here.is_err().into()) > 0);
+        here.and_then(|here| if is_elsewhere { Err(SavedStateError::Elsewhere) } else { Ok(here) })
+    }
+
+    /// Puts the saved state of all particles in place, of which this process has read some parts. Gives the number of steps.
+    fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
+        let kind = Kind {
+            is_affine: self.transfer.is_affine(),
+            has_corners: matches!(self.support, Support::Cpdi2 { .. }),
+        };
+        let mut saved = self.agreed(Saved::of_parts(parts, kind))?;
+        // No process knows where another one keeps a particle, and all know where it goes for the time being.
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let (processes, all) = match &ranks {
+            Some(ranks) => {
+                let mut all =
+                    [gather(&**ranks, &[self.particles.len() as u64]).iter().sum::<u64>()];
+                share(&**ranks, 0, &mut all);
+                (ranks.count(), all[0])
+            }
+            None => (1, self.particles.len() as u64),
+        };
+        let is_known = saved.ids.iter().all(|&id| id < all)
+            && saved.keys.iter().all(|&key| self.bins.bin_of_key(key).is_some());
+        self.agreed(if is_known { Ok(()) } else { Err(SavedStateError::Particles) })?;
+        let per_process = all.div_ceil(processes as u64).max(1);
+        let home = |id: u64| (id / per_process) as usize;
+        if let Some(part) = &self.part {
+            let ids = part.ids.clone();
+            self.give(|p| home(ids[p]));
+        }
+        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, |p| home(saved.ids[p]));
+        saved.follow(&moved);
+        let is_whole = match &self.part {
+            Some(part) => ids == part.ids,
+            None => ids.iter().copied().eq(0..all),
+        };
+        self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
+
+        let Saved { steps_done, mut keys, x, v, F, affine, corners, .. } = saved;
+        (self.particles.x, self.particles.v, self.particles.F) = (x, v, F);
+        self.affine = affine;
+        if let Support::Cpdi2 { mesh, next } = &mut self.support {
+            for (corner, positions) in corners.iter().enumerate() {
+                for (own, x) in mesh.corners.iter().zip(positions) {
+                    mesh.x[own[corner] as usize] = *x;
+                }
+            }
+            next.clone_from(&mesh.x);
+        }
+        let bin_of = |key| self.bins.bin_of_key(key).unwrap_or(0);
+        let bins: Vec<usize> = keys.iter().map(|&key| bin_of(key)).collect();
+        if let Some(moved) = self.give_to_bins(&bins) {
+            moved.replace(&mut keys);
+        }
+        self.bins.sort_as(&keys);
+        // Those that have read no part do not know it.
+        Ok(ranks.map_or(steps_done, |ranks| ranks.largest(steps_done as u64) as usize))
+    }
+
+    /// The same for polygons, which one process has as a whole.
+    fn take_up_polygons(&mut self, parts: &[SavedState]) -> Result<usize, SavedStateError> {
+        let Support::Polygons(corners) = &mut self.support else { return Ok(0) };
+        let Self { particles: Particles { x, v, F, .. }, affine, bins, .. } = self;
+        let (mut steps_done, mut keys) = ([0_usize], bins.keys().to_vec());
+        let mut state = vec![cast_slice_mut(&mut steps_done), &mut [], cast_slice_mut(&mut keys)];
+        state.extend([cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)]);
+        state.extend([cast_slice_mut(affine), cast_slice_mut(corners.positions())]);
+        replace_whole(&mut state, parts)?;
+        if keys.iter().any(|&key| bins.bin_of_key(key).is_none()) {
+            return Err(SavedStateError::Place);
+        }
+        bins.sort_as(&keys);
+        Ok(steps_done[0])
+    }
+}
+
+impl<T: Lanes, const D: usize> Simulation<T, D> {
+    /// The state between two steps of the particles here: arrays as bytes in this machine's order.
+    pub fn state(&self) -> Vec<&[u8]> {
+        let mut state = vec![bytes_of(&self.steps_done)];
+        state.extend(self.state.arrays());
+        state
+    }
+
+    /// Goes on from a state that was saved, of a simulation with the same set-up on any number of processes, to the bits of that one. Each
+    /// process gives the parts that it has read; a call of all.
+    ///
+    /// # Errors
+    ///
+    /// Where the state is not one of this set-up. The particles then may be those of any time.
+    pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        // The grid no longer belongs to the particles.
+        self.state.is_ahead = false;
+        self.steps_done = match self.state.support {
+            Support::Polygons(_) => self.state.take_up_polygons(&parts)?,
+            _ => self.state.take_up(parts)?,
+        };
+        self.failed = None;
+        Ok(())
+    }
+}
