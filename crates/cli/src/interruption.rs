@@ -3,6 +3,8 @@
 use anyhow::Error;
 use mmsmith_verify::{CaseError, StudyError};
 
+use crate::processes;
+
 /// The exit status of an interrupted command, as of any program that a shell interrupts.
 pub(crate) const INTERRUPTED: u8 = 130;
 
@@ -16,6 +18,7 @@ pub fn end_on_signals() {
         if std::mem::replace(&mut asked, true) || !mmsmith_verify::interrupt() {
             std::process::exit(INTERRUPTED.into());
         }
+        processes::tell_last_checkpoint();
     });
     // A process without a handler is ended by the signal itself, as ever.
     drop(handled);

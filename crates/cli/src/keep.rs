@@ -277,7 +277,9 @@ fn refused(error: LedgerError, folder: &Path, solution: &str) -> anyhow::Error {
 /// The settings that results depend on: all but the number of threads.
 pub(crate) fn decisive(settings: &Value) -> Value {
     let mut settings = settings.clone();
-    settings.as_object_mut().and_then(|settings| settings.remove("threads"));
+    if let Some(settings) = settings.as_object_mut() {
+        settings.retain(|key, _| !["threads", "ranks"].contains(&key.as_str()));
+    }
     settings
 }
 

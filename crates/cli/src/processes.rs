@@ -1,18 +1,23 @@
 //! The processes that mpirun started together, where it did.
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::{Result, bail};
-use mmsmith_verify::Ranks;
+use mmsmith_verify::{CheckpointFolder, Ranks, RunTraffic, gather};
 
 use crate::arguments::Command;
+use crate::terminal;
 
 /// Variables in which launchers tell how many processes they started, and how many on this machine.
 const COUNTS: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
 const COUNTS_HERE: [&str; 3] =
     ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_TASKS_PER_NODE"];
+
+/// Sooner than whatever started the processes kills those that do not end when asked to.
+const SOON: Duration = Duration::from_millis(300);
 
 /// The processes, as long as this one is one of several.
 static RANKS: Mutex<Option<Arc<dyn Ranks>>> = Mutex::new(None);
@@ -88,22 +93,80 @@ pub(crate) fn admit(command: &Command) -> Result<()> {
     };
     match command {
         Command::Run(options) => {
-            let alone = [
-                ("--checkpoint", options.checkpoint.is_some()),
-                ("--picture", options.picture.file.is_some()),
-            ];
-            match alone.iter().find(|(_, given)| *given) {
-                Some((option, _)) => bail!(
-                    "mpirun -n {count} mms run {option}: one process alone can write this; start one, or leave {option} out"
-                ),
-                None => Ok(()),
+            if options.picture.file.is_some() {
+                bail!(
+                    "mpirun -n {count} mms run --picture: one process alone draws; start one, or write particle files with --vtk DIR"
+                );
             }
+            Ok(())
         }
+        Command::Resume(_) => Ok(()),
         Command::Converge(_) => study("converge"),
         Command::Stability(_) => study("stability"),
         Command::Tradeoff(_) => study("tradeoff"),
-        _ => bail!("mpirun -n {count}: several processes do mms run together; start one for this"),
+        _ => bail!(
+            "mpirun -n {count}: several processes do mms run and mms resume together; start one for this"
+        ),
     }
+}
+
+/// Says how much the processes sent in a step, for users who want to know; a call of all.
+pub(crate) fn tell_traffic(traffic: &RunTraffic) {
+    let Some(ranks) = ranks() else { return };
+    let RunTraffic { stepping, measuring, steps } = traffic;
+    let own = [stepping.messages, stepping.bytes, measuring.messages, measuring.bytes];
+    let all = gather(&*ranks, &own);
+    let (each, _) = all.as_chunks::<4>();
+    if each.is_empty() || *steps == 0 {
+        return;
+    }
+    let a_step = |which: usize, most: bool| {
+        let of_each = each.iter().map(|own| own[which]);
+        let number = if most { of_each.max().unwrap_or(0) } else { of_each.sum() };
+        number as f64 / *steps as f64
+    };
+    for (what, which) in [("stepping", 0), ("measuring and writing", 2)] {
+        terminal::detail(format_args!(
+            "  {what}: {:.1} messages of {:.0} bytes a step, all {} processes together; {:.0} bytes of the one that sends most",
+            a_step(which, false),
+            a_step(which + 1, false),
+            each.len(),
+            a_step(which + 1, true)
+        ));
+    }
+}
+
+/// Where the run that is under way keeps its state.
+static KEPT: Mutex<Option<PathBuf>> = Mutex::new(None);
+
+/// The run that begins keeps its state in this folder.
+pub(crate) fn keep_in(folder: &Path) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(folder.to_owned());
+}
+
+/// Says from where the run can go on, soon after all processes were asked to end, should this one still wait for another one then: what
+/// started them asks them to where one of them was killed.
+pub(crate) fn tell_last_checkpoint() {
+    let Some(ranks) = ranks() else { return };
+    let Some(folder) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).clone() else { return };
+    std::thread::spawn(move || {
+        std::thread::sleep(SOON);
+        // The first process holds the lock of the folder. If it is the one that is gone, one of the others gets it.
+        let lock = if ranks.rank() == 0 { None } else { CheckpointFolder::lock(&folder).ok() };
+        if ranks.rank() > 0 && lock.is_none() {
+            return;
+        }
+        let (shown, reached) = (folder.display(), CheckpointFolder::reached(&folder));
+        let from = reached.map_or_else(
+            || format!("no checkpoint is in {shown} yet: delete it and start the run anew"),
+            |step| format!("its last whole checkpoint is of step {step}: mms resume {shown} goes on from there, on any number of processes"),
+        );
+        terminal::complain(&format!(
+            "the run was asked to end, as it is where a process of it is killed; {from}\n"
+        ));
+        // Until the process ends, so that no other one says it as well.
+        std::mem::forget(lock);
+    });
 }
 
 /// Leaves the other processes, at the end.

@@ -14,7 +14,7 @@ mod traffic;
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, cast_slice_mut};
 
 pub use in_process::in_process;
-pub use traffic::{Traffic, counted};
+pub use traffic::{Sent, Traffic, counted};
 
 /// One of the processes of a run.
 ///
@@ -154,6 +154,6 @@ mod tests {
             }
             traffic.sent()
         });
-        assert_eq!(found, [(2, 4), (0, 0)]);
+        assert_eq!(found, [Sent { messages: 2, bytes: 4 }, Sent::default()]);
     }
 }

@@ -1,5 +1,6 @@
 //! How much goes over the wire.
 
+use std::ops::Sub;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,9 +14,29 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// The number of messages, and of bytes in them.
-    pub fn sent(&self) -> (u64, u64) {
-        (self.messages.load(Ordering::Relaxed), self.bytes.load(Ordering::Relaxed))
+    /// What was sent until now.
+    pub fn sent(&self) -> Sent {
+        Sent {
+            messages: self.messages.load(Ordering::Relaxed),
+            bytes: self.bytes.load(Ordering::Relaxed),
+        }
+    }
+}
+
+/// Messages, and the bytes in them. What all processes agree upon by [`Ranks::largest`] is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// Number of messages.
+    pub messages: u64,
+    /// Number of bytes in all of them.
+    pub bytes: u64,
+}
+
+impl Sub for Sent {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        Self { messages: self.messages - before.messages, bytes: self.bytes - before.bytes }
     }
 }
 

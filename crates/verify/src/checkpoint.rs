@@ -67,6 +67,16 @@ impl CheckpointFolder {
         Self { path: folder.to_owned(), _lock: None }
     }
 
+    /// The step after which the last checkpoint of a folder was written, as far as its beginning tells.
+    #[must_use]
+    pub fn reached(folder: &Path) -> Option<u64> {
+        let mut file = File::open(folder.join(FILE)).ok()?;
+        // How it begins, what run it is of, two counts, and the step.
+        let mut head = [0; MAGIC.len() + 32 + 3 * 8];
+        file.read_exact(&mut head).ok()?;
+        head.last_chunk().map(|step| u64::from_le_bytes(*step))
+    }
+
     /// Where it is.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -510,12 +520,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let checkpoints = checkpoints(folder.path());
         assert!(checkpoints.read(None).unwrap().is_none());
+        assert_eq!(CheckpointFolder::reached(folder.path()), None);
         for history in [vec![], history(1), history(3)] {
             checkpoints.write(None, &reached(), &history, &[&[1, 2, 3], &[]]).unwrap();
             let found = checkpoints.read(None).unwrap().unwrap();
             assert_eq!(found.reached.numbers(), reached().numbers());
             assert_eq!(numbers_of_history(&found.history), numbers_of_history(&history));
             assert_eq!(found.parts, [[vec![1, 2, 3], vec![]]]);
+            assert_eq!(CheckpointFolder::reached(folder.path()), Some(12));
         }
     }
 

@@ -68,12 +68,12 @@ pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};
-pub use mmsmith_ranks::Ranks;
+pub use mmsmith_ranks::{Ranks, Sent, gather};
 pub use mmsmith_vtk::Provenance;
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
-pub use run::{Outputs, Progress, Row, Status, run};
+pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
 pub use scene::{loaded_instead, needs_total_frame};
 pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{

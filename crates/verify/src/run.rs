@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
 use mmsmith_mpm::StepError;
-use mmsmith_ranks::Ranks;
+use mmsmith_ranks::{Ranks, Sent, Traffic, counted};
 use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
@@ -54,6 +54,8 @@ pub struct Outputs<'a> {
     /// The processes that simulate it together, where there are several. All of them call [`run`] alike; files other than
     /// particle files and checkpoints are those of rank 0.
     pub ranks: Option<Arc<dyn Ranks>>,
+    /// Where it is said what this process sent to the others, if that is wanted.
+    pub traffic: Option<&'a mut RunTraffic>,
     /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
     pub until: Option<Instant>,
 }
@@ -68,9 +70,27 @@ impl<'a> Outputs<'a> {
             checkpoints: None,
             history: None,
             ranks: None,
+            traffic: None,
             until: None,
         }
     }
+}
+
+/// What one of several processes sent to the others, from the first step to the last one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunTraffic {
+    /// In the steps: nodes that bands of two processes share, and particles that go to another process.
+    pub stepping: Sent,
+    /// After them: what is measured, written and agreed upon.
+    pub measuring: Sent,
+    /// Steps done.
+    pub steps: u64,
+}
+
+/// What this process has sent, by what for.
+struct Counters {
+    stepping: Arc<Traffic>,
+    measuring: Arc<Traffic>,
 }
 
 /// How a run ended.
@@ -226,8 +246,15 @@ where
     f64: Precision<D>,
 {
     let Prepared { scene, steps, .. } = prepare(exact, case)?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, outputs.ranks.as_ref())?;
-    let mut row = follow(&mut driven, exact, case, &scene, steps, outputs)?;
+    let mut counters = None;
+    let mut of_steps = None;
+    if let Some(ranks) = outputs.ranks.take() {
+        let (stepping, measuring) = (counted(ranks.clone()), counted(ranks));
+        counters = Some(Counters { stepping: stepping.1, measuring: measuring.1 });
+        (of_steps, outputs.ranks) = (Some(stepping.0), Some(measuring.0));
+    }
+    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, of_steps.as_ref())?;
+    let mut row = follow(&mut driven, exact, case, &scene, steps, outputs, counters.as_ref())?;
     if row.status == Status::Ok {
         let unit = T::default_epsilon().to_f64() / 2.0;
         let end = steps.count as f64 * driven.dt;
@@ -270,6 +297,7 @@ fn follow<T: Precision<D>, const D: usize>(
     scene: &Scene<D>,
     steps: Steps,
     outputs: &mut Outputs<'_>,
+    counters: Option<&Counters>,
 ) -> Result<Row, CaseError>
 where
     f64: Precision<D>,
@@ -338,6 +366,9 @@ where
                 errors: PerField { v: PerNorm::default(), ..at_start },
             }
         };
+    let before = done;
+    let sent = |Counters { stepping, measuring }: &Counters| (stepping.sent(), measuring.sent());
+    let sent_before = counters.map(sent);
     let outcome = driven.advance(done + 1..=steps.count, &mut |stepped| {
         let Stepped { step, time, solver, wall_s: of_step, cpu_s: cpu_of_step, is_interrupted } =
             stepped;
@@ -382,6 +413,15 @@ where
         }
         Ok(ControlFlow::Continue(()))
     })?;
+    if let (Some(traffic), Some((stepping, measuring)), Some(before_them)) =
+        (&mut outputs.traffic, counters.map(sent), sent_before)
+    {
+        **traffic = RunTraffic {
+            stepping: stepping - before_them.0,
+            measuring: measuring - before_them.1,
+            steps: done - before,
+        };
+    }
     let status = match outcome {
         Outcome::Done => Status::Ok,
         Outcome::Stopped(error) => Status::Stopped(error),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
-use mmsmith_verify::{CheckpointFolder, Checkpoints};
+use mmsmith_verify::{CheckpointError, CheckpointFolder, Checkpoints};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -15,6 +15,7 @@ use super::run::{self, Origin};
 use crate::arguments::{Arguments, Command, ResumeOptions, RunOptions};
 use crate::json::{self, Output};
 use crate::keep;
+use crate::processes;
 use crate::terminal;
 
 /// What a run leaves in its folder before its first step.
@@ -77,7 +78,7 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
     let start = recall(&options.folder)?;
     let path = options.folder.join(FILE);
     let shown = path.display();
-    let folder = CheckpointFolder::lock(&fs::canonicalize(&options.folder)?)?;
+    let folder = take(&fs::canonicalize(&options.folder)?)?;
     let line = ["mms".to_owned()].into_iter().chain(start.arguments);
     let arguments = Arguments::try_parse_from(line).map_err(|refusal| {
         let refusal = refusal.to_string();
@@ -94,6 +95,15 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
     run::follow(&run, Origin::Checkpoint(Place { folder, resume: true }))
 }
 
+/// The folder, for this run alone: the first of its processes locks it.
+fn take(folder: &Path) -> Result<CheckpointFolder, CheckpointError> {
+    if processes::is_first() {
+        CheckpointFolder::lock(folder)
+    } else {
+        Ok(CheckpointFolder::of_first(folder))
+    }
+}
+
 /// Where a run keeps its state, and whether it goes on from there.
 pub(super) struct Place {
     folder: CheckpointFolder,
@@ -102,6 +112,9 @@ pub(super) struct Place {
 
 /// Takes the folder for this run, and writes down how it was started: by the words of this command line.
 pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
+    if !processes::is_first() {
+        return Ok(Place { folder: CheckpointFolder::of_first(folder), resume: false });
+    }
     let path = folder.join(FILE);
     if path.exists() {
         let shown = folder.display();
@@ -112,7 +125,7 @@ pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
     }
     fs::create_dir_all(folder)
         .with_context(|| format!("--checkpoint: cannot create {}", folder.display()))?;
-    let locked = CheckpointFolder::lock(folder).context("--checkpoint")?;
+    let locked = take(folder).context("--checkpoint")?;
     // Another run may have come and gone since.
     if path.exists() {
         bail!("--checkpoint: {} holds a run already", folder.display());
@@ -144,6 +157,7 @@ pub(super) fn checkpoints(
     let (settings, origin) = (keep::decisive(settings), keep::origin(&options.name)?);
     let identity = Sha256::digest(format!("{settings}{origin}")).into();
     let Place { folder, resume } = place;
+    processes::keep_in(folder.path());
     Ok(Checkpoints { folder, every: options.every, identity, resume })
 }
 

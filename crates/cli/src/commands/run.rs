@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, Scheme, Status, energy_drift,
-    run as simulate,
+    Case, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, RunTraffic, Scheme, Status,
+    energy_drift, run as simulate,
 };
 use serde_json::{Value, json};
 
@@ -69,6 +69,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
         (Origin::Line(_), None) => None,
         (Origin::Checkpoint(place), _) => Some(place),
     };
+    let mut traffic = RunTraffic::default();
     let checkpoints = match place {
         Some(place) => Some(resume::checkpoints(place, options, &settings())?),
         None => None,
@@ -85,6 +86,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 history: moments.as_mut(),
                 snapshot: picture.as_mut().map(Picture::snapshot),
                 ranks: processes::ranks(),
+                traffic: Some(&mut traffic),
                 ..Outputs::new(show)
             };
             let row = simulate(&model.exact, model.arithmetic(), &case, &mut outputs);
@@ -97,6 +99,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 _ => row?,
             }
         };
+        processes::tell_traffic(&traffic);
         terminal::say(&(settled.choice() + &caption(&selection, settled, extent) + &text(&row)))?;
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));

@@ -6,7 +6,7 @@ use mmsmith_mpm::{
     Body, Grid, Integrator, Material, SavedState, SavedStateError, Scalar, Settings, SetupError,
     Shape, Share, Simulation, StepError, Transfer,
 };
-use mmsmith_ranks::{Ranks, in_process};
+use mmsmith_ranks::{Ranks, counted, in_process};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -327,4 +327,111 @@ fn one_process_goes_on_with_what_several_saved() {
         part.take_up(own)
     });
     assert!(refused.iter().all(Result::is_err), "{refused:?}");
+}
+
+/// Passes of particles over the grid in a step, each of which exchanges the nodes at each cut.
+fn passes(settings: &Settings<f64>, is_first: bool) -> u64 {
+    let of_filter = match settings.transfer {
+        Transfer::Xpic(order) => u64::from(order) - 1,
+        _ => 0,
+    };
+    let is_product = !matches!(settings.shape, Shape::Cpdi | Shape::Cpdi2);
+    match settings.integrator {
+        // Momentum and force apart.
+        Integrator::Usf | Integrator::Usavg => 2 + of_filter,
+        // Velocities are projected from the updated particles.
+        Integrator::Musl => 2 + of_filter,
+        // One pass in all, but for the first of its kind.
+        Integrator::Usl | Integrator::Cd
+            if settings.transfer == Transfer::Flip && is_product && is_first =>
+        {
+            2
+        }
+        Integrator::Usl | Integrator::Cd => 1 + of_filter,
+    }
+}
+
+/// Bytes of a particle that goes to another process.
+fn record<const D: usize>(settings: &Settings<f64>) -> u64 {
+    let matrix = D * D;
+    let of_domain = match settings.shape {
+        Shape::Cpdi => matrix,
+        Shape::Cpdi2 => (1 << D) * 2 * D,
+        _ => 0,
+    };
+    let of_transfer = if settings.transfer == Transfer::Apic { matrix } else { 0 };
+    // Number; X, x, v; F; mass and volume.
+    (8 * (1 + 3 * D + matrix + 2 + of_domain + of_transfer)) as u64
+}
+
+/// Enough for particles to come into other bins.
+const STEPS: usize = 30;
+
+fn sends_what_the_formula_says<const D: usize>(settings: Settings<f64>, count: usize)
+where
+    f64: Scalar<D>,
+{
+    let mut whole = body::<D>(-30.0, false);
+    // Fast and as good as rigid, so that it lasts.
+    let p = &mut whole.particles;
+    p.v.iter_mut().for_each(|v| *v = SVector::from_fn(|a, _| if a == D - 1 { -30.0 } else { 0.0 }));
+    p.F.fill(SMatrix::identity());
+    let found = in_process(count, |ranks| {
+        let (ranks, traffic) = counted(ranks);
+        let (body, ids) = share(&whole, &*ranks);
+        let share = Share { ranks, ids };
+        let mut part = Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+        let step = |_| {
+            let (before, arrangement) = (traffic.sent(), part.arrangement().unwrap());
+            let (version, ids) = (arrangement.version, arrangement.ids.to_vec());
+            part.step(&body_force::<D>).unwrap();
+            let after = part.arrangement().unwrap();
+            let is_sorted = after.version != version;
+            let left = ids.iter().filter(|id| after.ids.binary_search(id).is_err()).count();
+            (traffic.sent() - before, is_sorted, left as u64)
+        };
+        (0..STEPS).map(step).collect::<Vec<_>>()
+    });
+    let cells = grid::<D>().cells;
+    // Rows of a bin, of a grid with three layers of nodes below its cells and six above.
+    let height: u64 = if D == 1 { 256 } else { 8 };
+    let nodes: u64 = cells[..D - 1].iter().map(|&cells| cells as u64 + 9).product();
+    let bins = (cells[D - 1] as u64 + 9) / height;
+    let (others, cuts) = (count as u64 - 1, count as u64 - 1);
+    let halo = 2 * cuts * height * nodes * (2 * D as u64 + 1) * 8;
+    let (mut is_first, mut moved) = (true, 0);
+    for step in 0..STEPS {
+        let of = |n: usize| found[n][step];
+        let bytes: u64 = (0..count).map(|n| of(n).0.bytes).sum();
+        let left: u64 = (0..count).map(|n| of(n).2).sum();
+        let mut expected = passes(&settings, is_first) * halo;
+        if of(0).1 {
+            // The first process hears how many particles are in each bin, after how long that is, and tells the cuts; all tell each
+            // other how many particles they send.
+            let counts = others * count as u64 * 8 + others * bins * 8;
+            let lengths = others * count as u64 * 8;
+            expected += counts + others * (count as u64 + 1) * 8 + lengths;
+            expected += left * record::<D>(&settings);
+        } else {
+            assert_eq!(left, 0, "{settings:?}");
+        }
+        assert_eq!(bytes, expected, "{D}D, step {step}, {left} of it moved, {settings:?}");
+        is_first = of(0).1;
+        moved += left;
+    }
+    assert!(moved > 0, "{settings:?}: nothing has moved");
+}
+
+#[test]
+fn messages_have_the_bytes_that_the_formula_says() {
+    for settings in schemes::schemes().map(flying) {
+        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
+        sends_what_the_formula_says::<2>(settings, 4);
+    }
+    for shape in [Shape::Gimp, Shape::Cpdi2] {
+        let settings = flying(schemes::settings(shape, Integrator::Cd, Transfer::Flip));
+        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
+        sends_what_the_formula_says::<1>(settings, 3);
+        sends_what_the_formula_says::<3>(settings, 3);
+    }
 }

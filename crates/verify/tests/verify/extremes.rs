@@ -25,6 +25,7 @@ fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     run(exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -38,6 +39,7 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     run(exact, Arithmetic::Single(single), case, &mut outputs).expect("a case that can be run")

@@ -28,6 +28,7 @@ fn history<S: Plane>(solution: S, case: &Case) -> (Row, Vec<Moment>) {
         checkpoints: None,
         history: Some(&mut moments),
         ranks: None,
+        traffic: None,
         until: None,
     };
     let row = run(&exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run");

@@ -25,6 +25,7 @@ fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     run(solution, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -132,6 +133,7 @@ fn single_precision_has_the_same_particles_and_nearly_the_same_error() {
             checkpoints: None,
             history: None,
             ranks: None,
+            traffic: None,
             until: None,
         };
         let coarse = run(&double, Arithmetic::Single(&single), &case, &mut outputs).unwrap();
@@ -161,6 +163,7 @@ fn conditions_that_the_solver_does_not_model_are_named() {
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     let error =
@@ -178,6 +181,7 @@ fn an_extent_is_for_rings_only() {
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     let error = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap_err();
@@ -202,6 +206,7 @@ fn frames_hold_what_the_row_measured() {
         checkpoints: None,
         history: None,
         ranks: None,
+        traffic: None,
         until: None,
     };
     let row = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap();
