@@ -1,11 +1,17 @@
 """Runs that several processes simulate together, against the same runs of one process: results, histories and particle files to the bit.
+So end runs of which a process is killed, once they go on.
 
     check.py MMS FOLDER MPIRUN...    such as: check.py target/mpi/release/mms target/mpi/runs mpirun --oversubscribe
 """
 
 import json
+import os
+import random
+import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import meshio
@@ -81,8 +87,92 @@ def check_files():
         assert np.array_equal(joined["displacement"][order], whole["displacement"])
 
 
+KILLS = 20
+# Each as it is started, and as often as it takes until its kills are used up.
+KILLED = [
+    "axis-aligned --cells 64 --periods 0.5 --every 3",
+    "ring --cells 64 --periods 0.4 --shape cpdi2 --layout body-fitted --every 5",
+    "swirl --cells 64 --periods 0.4 --transfer apic --integrator musl --every 7",
+]
+
+
+def launched(count):
+    return [] if count is None else [*MPIRUN, "-n", str(count)]
+
+
+def processes(folder):
+    """The processes of a run that keeps its state in a folder, by their ranks."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+            environment = (entry / "environ").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if words[0] == str(MMS).encode() and str(folder).encode() in words:
+            names = (b"OMPI_COMM_WORLD_RANK=", b"PMI_RANK=")
+            ranks = [int(line.split(b"=")[1]) for line in environment if line.startswith(names)]
+            found[ranks[0] if ranks else 0] = int(entry.name)
+    return found
+
+
+def kill(case, counts, rng):
+    """Starts a run, kills a process of it at a random moment, and goes on so with other numbers of processes until the kills are used up."""
+    kept, result, plain = FOLDER / "kept", FOLDER / "killed.json", FOLDER / "result.json"
+    shutil.rmtree(kept, ignore_errors=True)
+    undisturbed = case.split(" --every")[0].split()
+    started = time.monotonic()
+    subprocess.run([str(MMS), "run", *undisturbed, "--json", str(plain), "--threads", "1"], check=True, stdout=subprocess.DEVNULL)
+    whole = time.monotonic() - started
+    first = ["run", *case.split(), "--json", str(result), "--checkpoint", str(kept), "--threads", "1"]
+    arguments, told = first, 0
+    for number, count in enumerate(counts):
+        is_last = number == len(counts) - 1
+        call = [*launched(count), str(MMS), *arguments]
+        run = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        if not is_last:
+            time.sleep(rng.uniform(0.1, 0.5 * whole + 0.3))
+            found = processes(kept)
+            rank = rng.choice(sorted(found)) if found else None
+            if rank is not None:
+                os.kill(found[rank], signal.SIGKILL)
+        killed = time.monotonic()
+        said = run.communicate(timeout=600)[1]
+        took = time.monotonic() - killed
+        if is_last:
+            assert run.returncode == 0, said
+        elif rank is not None and run.returncode != 0:
+            assert took < 10, f"{took} s after process {rank} of {count} was killed: {case}"
+            told += "last whole checkpoint is of step" in said or "no checkpoint is in" in said
+            left = processes(kept)
+            assert not left, f"{left} are left after process {rank} of {count} was killed: {case}"
+        # Without a first checkpoint it starts anew.
+        if (kept / "checkpoint").exists():
+            arguments = ["resume", str(kept), "--threads", "1"]
+        else:
+            shutil.rmtree(kept, ignore_errors=True)
+            arguments = first
+    results = [lasting(json.loads(path.read_text())) for path in (plain, result)]
+    assert results[0] == results[1], case
+    left = sorted(path.name for path in kept.iterdir())
+    step = int.from_bytes((kept / "checkpoint").read_bytes()[72:80], "little")
+    others = [f"checkpoint-{step}-{rank}" for rank in range(1, counts[-1] or 1)]
+    assert left == sorted(["checkpoint", *others, "lock", "run.json"]), left
+    return told
+
+
+def check_kills():
+    rng = random.Random(27)
+    for case in KILLED:
+        counts = [rng.choice([2, 3, 4]) for _ in range(KILLS // len(KILLED) + 1)] + [rng.choice([None, 2, 5])]
+        told = kill(case, counts, rng)
+        print(f"killed {len(counts) - 1} times, told {told} times from where it goes on, same bits: {case}", flush=True)
+
+
 FOLDER.mkdir(parents=True, exist_ok=True)
+FOLDER = FOLDER.resolve()
 check_files()
+check_kills()
 for number, case in enumerate(CASES):
     alone = run(None, case)
     assert run(None, case, threads=2) == alone, case

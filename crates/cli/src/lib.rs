@@ -46,13 +46,21 @@ pub use interruption::end_on_signals;
 #[must_use]
 pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<_> = given.into_iter().collect();
-    let arguments = read(&given).unwrap_or_else(|refusal| refusal.exit());
-    terminal::settle(arguments.talk.verbosity(), arguments.talk.color);
-    terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
+    // Of several processes the first one speaks.
     let joined = processes::join();
-    if !processes::is_first() {
+    let arguments = read(&given).unwrap_or_else(|refusal| {
+        if processes::is_first() {
+            let _ = refusal.print();
+        }
+        processes::leave();
+        std::process::exit(refusal.exit_code())
+    });
+    if processes::is_first() {
+        terminal::settle(arguments.talk.verbosity(), arguments.talk.color);
+    } else {
         terminal::silence();
     }
+    terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
     let outcome = joined
         .and_then(|()| processes::admit(&arguments.command))
         .and_then(|()| perform(&arguments, &given));

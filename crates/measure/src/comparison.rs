@@ -9,7 +9,7 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::homes::{GROUP, Homes};
+use crate::homes::{GROUP, Holder, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
 /// Runs of particles for which what depends on the time alone is computed once.
@@ -59,8 +59,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         time: f64,
         lag: f64,
     ) -> PerField<PerNorm<f64>> {
-        let [u, v, F, P] = over_homes(homes, &T::magnitudes(self, observed, (time, time - lag)));
-        PerField { u, v, F, P }
+        T::errors_of_all(self, homes, observed, (time, time - lag))
     }
 
     /// The particle of largest position error at `time`, the first one without a number if there is such.
@@ -69,25 +68,71 @@ impl<'a, const D: usize> Comparison<'a, D> {
         observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
     ) -> usize {
-        T::worst_particle(self, observed, time)
+        T::worst_particle(self, observed, time).1
     }
 
-    /// The magnitudes of the errors of u, v, F and P of every particle.
+    /// The errors of the particles of all processes. Those at home here are compared here if they are here, group by group, and by
+    /// whoever holds them otherwise.
+    fn errors_of_all<T: Compared<D>>(
+        &self,
+        homes: &Homes,
+        observed: (&Particles<T, D>, &Law<T, D>),
+        times: (f64, f64),
+    ) -> PerField<PerNorm<f64>> {
+        let others = homes.hear(|places| self.each(observed, times, &places));
+        let count = homes.here().len();
+        let room = || (Room::zero(), [[[0.0; BLOCK]; 4]; RUNS + 1]);
+        let groups = tallies(count, room, |(room, here), first, rows: &mut [[Row<f64>; 4]]| {
+            let places = first..count.min(first + rows.len() * BLOCK);
+            // Both have the order of the numbers, so those that are here follow each other.
+            let own = places.clone().filter_map(|place| match homes.holder(place) {
+                Holder::Here(p) => Some(p),
+                Holder::Other(_) => None,
+            });
+            let (mut start, mut end) = (0, 0);
+            for p in own {
+                start = if end == 0 { p / BLOCK * BLOCK } else { start };
+                end = p + 1;
+            }
+            let here = &mut here[..(end - start).div_ceil(BLOCK)];
+            for (n, runs) in here.chunks_mut(RUNS).enumerate() {
+                self.magnitudes(observed, times, room, start + n * CHUNK, runs);
+            }
+            for (k, place) in places.enumerate() {
+                for (n, row) in rows[k / BLOCK].iter_mut().enumerate() {
+                    row[k % BLOCK] = match homes.holder(place) {
+                        Holder::Here(p) => here[(p - start) / BLOCK][n][(p - start) % BLOCK],
+                        Holder::Other(place) => others[place][n],
+                    };
+                }
+            }
+        });
+        let [u, v, F, P] = over_homes(homes, &groups);
+        PerField { u, v, F, P }
+    }
+
+    /// The magnitudes of the errors of u, v, F and P of the particles at some places.
     fn each<T: Compared<D>>(
         &self,
         observed: (&Particles<T, D>, &Law<T, D>),
         times: (f64, f64),
+        places: &Range<usize>,
     ) -> Vec<[f64; 4]> {
-        let mut all = vec![[0.0; 4]; observed.0.len()];
-        all.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, own)| {
+        if places.is_empty() {
+            return Vec::new();
+        }
+        let chunks = places.start / CHUNK..places.end.div_ceil(CHUNK);
+        let chunks = each_group(chunks.len(), &|n| {
+            let first = (chunks.start + n) * CHUNK;
+            let wanted = places.start.max(first)..places.end.min(first + CHUNK);
             let mut rows = [[[0.0; BLOCK]; 4]; RUNS];
-            let rows = &mut rows[..own.len().div_ceil(BLOCK)];
-            self.magnitudes(observed, times, &mut Room::zero(), chunk * CHUNK, rows);
-            for (k, own) in own.iter_mut().enumerate() {
-                *own = std::array::from_fn(|n| rows[k / BLOCK][n][k % BLOCK]);
-            }
+            let rows = &mut rows[..(wanted.end - first).div_ceil(BLOCK)];
+            self.magnitudes(observed, times, &mut Room::zero(), first, rows);
+            let of = |p: usize| (p - first) / BLOCK;
+            let of = |p: usize| std::array::from_fn(|n| rows[of(p)][n][(p - first) % BLOCK]);
+            wanted.map(of).collect::<Vec<[f64; 4]>>()
         });
-        all
+        chunks.concat()
     }
 
     /// As [`worst_particle`](Self::worst_particle) for one of several processes, of the particles `ids` here and those of all others.
@@ -98,24 +143,26 @@ impl<'a, const D: usize> Comparison<'a, D> {
         observed: (&Particles<T, D>, &Law<T, D>),
         time: f64,
     ) -> usize {
-        let errors = T::magnitudes(self, observed, (time, time));
-        let worst = errors.iter().zip(ids).fold((0.0, 0), |worst, (of, &id)| {
-            let error = of[0];
-            let is_worse = error > worst.0 || (error.is_nan() && !f64::is_nan(worst.0));
-            if is_worse { (error, id) } else { worst }
-        });
+        let (error, place) = T::worst_particle(self, observed, time);
         // Not numbers first, then the largest, then the first one.
         let rank = |error: f64| if error.is_nan() { u64::MAX } else { error.to_bits() };
-        let largest = homes.ranks().largest(rank(worst.0));
-        let own = if rank(worst.0) == largest { worst.1 } else { u64::MAX };
+        let largest = homes.ranks().largest(rank(error));
+        // A process without particles has none that is worst.
+        let id = ids.get(place).copied().unwrap_or(u64::MAX);
+        let own = if rank(error) == largest { id } else { u64::MAX };
         !homes.ranks().largest(!own) as usize
     }
 
-    fn worst<T: Compared<D>>(&self, observed: (&Particles<T, D>, &Law<T, D>), time: f64) -> usize {
+    /// The largest position error and its particle.
+    fn worst<T: Compared<D>>(
+        &self,
+        observed: (&Particles<T, D>, &Law<T, D>),
+        time: f64,
+    ) -> (f64, usize) {
         let count = observed.0.len();
         let mut room = Room::zero();
         let mut magnitudes = [[[0.0; BLOCK]; 4]];
-        let mut worst = (0.0, 0);
+        let mut worst = (0.0_f64, 0);
         for first in (0..count).step_by(BLOCK) {
             self.magnitudes(observed, (time, time), &mut room, first, &mut magnitudes);
             for (p, &error) in (first..count).zip(&magnitudes[0][0]) {
@@ -124,7 +171,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
                 }
             }
         }
-        worst.1
+        worst
     }
 
     /// The magnitudes of the errors of u, v, F and P, for runs of particles from number `first` on; `times` are those of
@@ -160,19 +207,20 @@ pub trait Compared<const D: usize>: Real + Stressed<D> {
         times: (f64, f64),
     ) -> PerField<PerNorm<f64>>;
 
-    /// The magnitudes of the errors of u, v, F and P of every particle.
-    fn magnitudes(
+    /// The same of the particles of all processes.
+    fn errors_of_all(
         comparison: &Comparison<'_, D>,
+        homes: &Homes,
         observed: (&Particles<Self, D>, &Law<Self, D>),
         times: (f64, f64),
-    ) -> Vec<[f64; 4]>;
+    ) -> PerField<PerNorm<f64>>;
 
-    /// The particle of largest position error at `time`.
+    /// The largest position error at `time`, and its particle.
     fn worst_particle(
         comparison: &Comparison<'_, D>,
         observed: (&Particles<Self, D>, &Law<Self, D>),
         time: f64,
-    ) -> usize;
+    ) -> (f64, usize);
 }
 
 macro_rules! compared {
@@ -186,19 +234,20 @@ macro_rules! compared {
                 comparison.errors(observed, times)
             }
 
-            fn magnitudes(
+            fn errors_of_all(
                 comparison: &Comparison<'_, $D>,
+                homes: &Homes,
                 observed: (&Particles<Self, $D>, &Law<Self, $D>),
                 times: (f64, f64),
-            ) -> Vec<[f64; 4]> {
-                comparison.each(observed, times)
+            ) -> PerField<PerNorm<f64>> {
+                comparison.errors_of_all(homes, observed, times)
             }
 
             fn worst_particle(
                 comparison: &Comparison<'_, $D>,
                 observed: (&Particles<Self, $D>, &Law<Self, $D>),
                 time: f64,
-            ) -> usize {
+            ) -> (f64, usize) {
                 comparison.worst(observed, time)
             }
         })*)*
@@ -375,20 +424,8 @@ pub fn over_particles<R, const N: usize>(
     joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
 }
 
-/// The norms of four magnitudes over the particles of all processes, where `own` has those of this one's; a call of all.
-fn over_homes(homes: &Homes, own: &[[f64; 4]]) -> [PerNorm<f64>; 4] {
-    let (at_home, count) = (homes.visit(own), homes.here().len());
-    let groups = tallies(
-        count,
-        || (),
-        |(), first, rows: &mut [[Row<f64>; 4]]| {
-            for (k, p) in (first..count.min(first + rows.len() * BLOCK)).enumerate() {
-                for (row, value) in rows[k / BLOCK].iter_mut().zip(at_home.of(p)) {
-                    row[k % BLOCK] = *value;
-                }
-            }
-        },
-    );
+/// The norms of four magnitudes over the particles of all processes, where `groups` has the tallies of those at home here; a call of all.
+fn over_homes(homes: &Homes, groups: &[[Tally; 4]]) -> [PerNorm<f64>; 4] {
     let numbers: Vec<[f64; 4]> =
         groups.iter().flatten().map(|tally: &Tally| tally.numbers()).collect();
     let all = gather(homes.ranks(), numbers.as_flattened());

@@ -22,24 +22,18 @@ pub struct Homes {
     /// The places of those that go to each process among this one's, and how many come from each.
     out: Vec<Range<usize>>,
     counts: Vec<usize>,
+    /// Number of particles of this process.
+    own: usize,
     /// Where each particle at home here is: among this process's, or behind them, among those that come from others.
     order: Vec<u32>,
 }
 
-/// What is known of the particles at home here.
-pub struct AtHome<'a, E> {
-    own: &'a [E],
-    others: Vec<E>,
-    order: &'a [u32],
-}
-
-impl<E> AtHome<'_, E> {
-    /// What is said of the particle of this place among those at home here.
-    #[must_use]
-    pub fn of(&self, place: usize) -> &E {
-        let place = self.order[place] as usize;
-        self.own.get(place).unwrap_or_else(|| &self.others[place - self.own.len()])
-    }
+/// Which process holds a particle that has its home here.
+pub enum Holder {
+    /// This one, at this place among its particles.
+    Here(usize),
+    /// Another one; what it says of the particle has this place among all that others [say](Homes::hear).
+    Other(usize),
 }
 
 impl Homes {
@@ -58,8 +52,9 @@ impl Homes {
         let lengths: Vec<usize> = out.iter().map(Range::len).collect();
         let counts = announce(&*ranks, &lengths);
         let here = range(ranks.rank());
-        let mut homes = Self { ranks, count, here, out, counts, order: Vec::new() };
-        let others = homes.exchange(ids);
+        let own = ids.len();
+        let mut homes = Self { ranks, count, here, out, counts, own, order: Vec::new() };
+        let others = homes.hear(|places| ids[places].to_vec());
         homes.order = vec![0; homes.here.len()];
         let own = homes.out[homes.ranks.rank()].clone().map(|place| (place, ids[place]));
         let others = others.into_iter().enumerate().map(|(place, id)| (ids.len() + place, id));
@@ -84,25 +79,33 @@ impl Homes {
         &*self.ranks
     }
 
-    /// What the processes say of the particles at home here, where `own` says it of this process's; a call of all.
-    pub fn visit<'a, E: Pod>(&'a self, own: &'a [E]) -> AtHome<'a, E> {
-        AtHome { own, others: self.exchange(own), order: &self.order }
+    /// Who holds the particle of this place among those at home here.
+    #[must_use]
+    pub fn holder(&self, place: usize) -> Holder {
+        let place = self.order[place] as usize;
+        place.checked_sub(self.own).map_or(Holder::Here(place), Holder::Other)
     }
 
-    /// The same in the order of the particles' numbers.
-    pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
-        let at_home = self.visit(own);
-        (0..self.here.len()).map(|place| *at_home.of(place)).collect()
-    }
-
-    /// What other processes say of the particles at home here.
-    fn exchange<E: Pod>(&self, own: &[E]) -> Vec<E> {
+    /// What other processes say of the particles at home here, where `say` tells it of this process's that have their home elsewhere, by
+    /// their places; a call of all.
+    pub fn hear<E: Pod>(&self, say: impl Fn(Range<usize>) -> Vec<E>) -> Vec<E> {
         let rank = self.ranks.rank();
-        let others = |to: usize| if to == rank { 0..0 } else { self.out[to].clone() };
-        let out: Vec<Vec<E>> = (0..self.out.len()).map(|to| own[others(to)].to_vec()).collect();
+        let of = |to: usize| if to == rank { Vec::new() } else { say(self.out[to].clone()) };
+        let out: Vec<Vec<E>> = (0..self.out.len()).map(of).collect();
         let mut counts = self.counts.clone();
         counts[rank] = 0;
         exchange(&*self.ranks, &out, &counts)
+    }
+
+    /// What all processes say of the particles at home here in the order of their numbers, where `own` says it of this process's; a call
+    /// of all.
+    pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
+        let others = self.hear(|places| own[places].to_vec());
+        let of = |place| match self.holder(place) {
+            Holder::Here(place) => own[place],
+            Holder::Other(place) => others[place],
+        };
+        (0..self.here.len()).map(of).collect()
     }
 }
 

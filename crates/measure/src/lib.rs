@@ -8,4 +8,4 @@ mod homes;
 pub mod norms;
 
 pub use comparison::{Compared, Comparison, RUNS, Row, each_group, over_particles};
-pub use homes::Homes;
+pub use homes::{Holder, Homes};

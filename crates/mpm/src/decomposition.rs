@@ -26,7 +26,7 @@ pub struct Share {
 #[derive(Clone, Copy, Debug)]
 pub struct Arrangement<'a> {
     /// Their numbers in the whole body, ascending.
-    pub ids: &'a [u64],
+    pub ids: &'a Arc<Vec<u64>>,
     /// Another number each time that they are others.
     pub version: u64,
 }
@@ -34,7 +34,7 @@ pub struct Arrangement<'a> {
 /// What a process knows of its part.
 pub(crate) struct Part {
     pub(crate) ranks: Arc<dyn Ranks>,
-    pub(crate) ids: Vec<u64>,
+    pub(crate) ids: Arc<Vec<u64>>,
     pub(crate) version: u64,
     /// The first bin of each process, and the number of bins.
     pub(crate) cuts: Vec<usize>,
@@ -47,7 +47,7 @@ pub(crate) const UNEVEN: f64 = 1.1;
 
 impl Part {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
-        Self { ranks, ids, version: 0, cuts: Vec::new(), is_affine: false }
+        Self { ranks, ids: Arc::new(ids), version: 0, cuts: Vec::new(), is_affine: false }
     }
 
     pub(crate) fn arrangement(&self) -> Arrangement<'_> {

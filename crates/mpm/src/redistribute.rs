@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::cast_slice;
 use mmsmith_ranks::{gather, share};
@@ -65,7 +66,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let part = part.as_mut()?;
         let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
         part.version += 1;
-        let before = std::mem::replace(&mut part.ids, ids).len();
+        let before = std::mem::replace(&mut part.ids, Arc::new(ids)).len();
         let Particles { X, x, v, F, mass, volume, half_size: _ } = particles;
         [X, x, v].into_iter().for_each(|vectors| moved.replace(vectors));
         moved.replace(F);

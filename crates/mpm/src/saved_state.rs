@@ -228,7 +228,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, |p| home(saved.ids[p]));
         saved.follow(&moved);
         let is_whole = match &self.part {
-            Some(part) => ids == part.ids,
+            Some(part) => ids == *part.ids,
             None => ids.iter().copied().eq(0..all),
         };
         self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;

@@ -29,14 +29,14 @@ pub(crate) struct Held<'a> {
 struct Shared {
     ranks: Arc<dyn Ranks>,
     homes: Homes,
-    ids: Vec<u64>,
+    ids: Arc<Vec<u64>>,
     version: u64,
 }
 
 impl Shared {
     fn new(ranks: Arc<dyn Ranks>, arrangement: Arrangement<'_>) -> Self {
         let Arrangement { ids, version } = arrangement;
-        Self { homes: Homes::new(ranks.clone(), ids), ranks, ids: ids.to_vec(), version }
+        Self { homes: Homes::new(ranks.clone(), ids), ranks, ids: ids.clone(), version }
     }
 }
 
