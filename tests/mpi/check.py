@@ -87,12 +87,11 @@ def check_files():
         assert np.array_equal(joined["displacement"][order], whole["displacement"])
 
 
-KILLS = 20
-# Each as it is started, and as often as it takes until its kills are used up.
+# Runs that are killed so often, each time at a random moment, and go on with other numbers of processes.
 KILLED = [
-    "axis-aligned --cells 64 --periods 0.5 --every 3",
-    "ring --cells 64 --periods 0.4 --shape cpdi2 --layout body-fitted --every 5",
-    "swirl --cells 64 --periods 0.4 --transfer apic --integrator musl --every 7",
+    (7, "axis-aligned --cells 64 --periods 4 --every 3"),
+    (7, "ring --cells 64 --periods 2 --shape cpdi2 --layout body-fitted --every 5"),
+    (6, "swirl --cells 64 --periods 2 --transfer apic --integrator musl --every 7"),
 ]
 
 
@@ -101,8 +100,8 @@ def launched(count):
 
 
 def processes(folder):
-    """The processes of a run that keeps its state in a folder, by their ranks."""
-    found = {}
+    """The processes of a run that keeps its state in a folder, by their ranks, and whether OpenMPI has started them."""
+    found, is_openmpi = {}, False
     for entry in Path("/proc").iterdir():
         try:
             words = (entry / "cmdline").read_bytes().split(b"\0")
@@ -113,60 +112,58 @@ def processes(folder):
             names = (b"OMPI_COMM_WORLD_RANK=", b"PMI_RANK=")
             ranks = [int(line.split(b"=")[1]) for line in environment if line.startswith(names)]
             found[ranks[0] if ranks else 0] = int(entry.name)
-    return found
+            is_openmpi |= any(line.startswith(b"OMPI_") for line in environment)
+    return found, is_openmpi
 
 
-def kill(case, counts, rng):
-    """Starts a run, kills a process of it at a random moment, and goes on so with other numbers of processes until the kills are used up."""
+def kill(case, kills, rng):
+    """Kills a process of a run so often, and compares its end with that of an undisturbed run; gives how often the last checkpoint was named."""
     kept, result, plain = FOLDER / "kept", FOLDER / "killed.json", FOLDER / "result.json"
     shutil.rmtree(kept, ignore_errors=True)
-    undisturbed = case.split(" --every")[0].split()
     started = time.monotonic()
-    subprocess.run([str(MMS), "run", *undisturbed, "--json", str(plain), "--threads", "1"], check=True, stdout=subprocess.DEVNULL)
+    undisturbed = [str(MMS), "run", *case.split(" --every")[0].split(), "--json", str(plain), "--threads", "1"]
+    subprocess.run(undisturbed, check=True, stdout=subprocess.DEVNULL)
     whole = time.monotonic() - started
     first = ["run", *case.split(), "--json", str(result), "--checkpoint", str(kept), "--threads", "1"]
-    arguments, told = first, 0
-    for number, count in enumerate(counts):
-        is_last = number == len(counts) - 1
-        call = [*launched(count), str(MMS), *arguments]
-        run = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        if not is_last:
-            time.sleep(rng.uniform(0.1, 0.5 * whole + 0.3))
-            found = processes(kept)
-            rank = rng.choice(sorted(found)) if found else None
-            if rank is not None:
-                os.kill(found[rank], signal.SIGKILL)
-        killed = time.monotonic()
+    arguments, told, killed, counts = first, 0, 0, []
+    while killed < kills:
+        counts.append(rng.choice([2, 3, 4]))
+        run = subprocess.Popen([*launched(counts[-1]), str(MMS), *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        # Until it steps.
+        reached = (kept / "checkpoint").stat().st_mtime if (kept / "checkpoint").exists() else 0
+        while run.poll() is None and not ((kept / "checkpoint").exists() and (kept / "checkpoint").stat().st_mtime > reached):
+            time.sleep(0.002)
+        time.sleep(rng.uniform(0, whole / kills))
+        found, asks = processes(kept)
+        rank = rng.choice(sorted(found)) if found else None
+        assert rank is not None, f"it ended before it was killed {kills} times: {case}\n{run.communicate()[1]}"
+        os.kill(found[rank], signal.SIGKILL)
+        moment = time.monotonic()
         said = run.communicate(timeout=600)[1]
-        took = time.monotonic() - killed
-        if is_last:
-            assert run.returncode == 0, said
-        elif rank is not None and run.returncode != 0:
-            assert took < 10, f"{took} s after process {rank} of {count} was killed: {case}"
-            told += "last whole checkpoint is of step" in said or "no checkpoint is in" in said
-            left = processes(kept)
-            assert not left, f"{left} are left after process {rank} of {count} was killed: {case}"
-        # Without a first checkpoint it starts anew.
-        if (kept / "checkpoint").exists():
-            arguments = ["resume", str(kept), "--threads", "1"]
-        else:
-            shutil.rmtree(kept, ignore_errors=True)
-            arguments = first
+        took = time.monotonic() - moment
+        assert run.returncode != 0 and took < 10, f"{took} s after process {rank} of {counts[-1]} was killed: {case}\n{said}"
+        assert not processes(kept)[0], f"some are left after process {rank} of {counts[-1]} was killed: {case}"
+        is_told = "last whole checkpoint is of step" in said
+        # Not every launcher asks the others to end before it kills them.
+        assert is_told or not asks, said
+        killed, told = killed + 1, told + is_told
+        arguments = ["resume", str(kept), "--threads", "1"]
+    counts.append(rng.choice([None, 2, 5]))
+    subprocess.run([*launched(counts[-1]), str(MMS), *arguments], check=True, stdout=subprocess.DEVNULL)
     results = [lasting(json.loads(path.read_text())) for path in (plain, result)]
     assert results[0] == results[1], case
     left = sorted(path.name for path in kept.iterdir())
     step = int.from_bytes((kept / "checkpoint").read_bytes()[72:80], "little")
     others = [f"checkpoint-{step}-{rank}" for rank in range(1, counts[-1] or 1)]
     assert left == sorted(["checkpoint", *others, "lock", "run.json"]), left
-    return told
+    return told, counts
 
 
 def check_kills():
     rng = random.Random(27)
-    for case in KILLED:
-        counts = [rng.choice([2, 3, 4]) for _ in range(KILLS // len(KILLED) + 1)] + [rng.choice([None, 2, 5])]
-        told = kill(case, counts, rng)
-        print(f"killed {len(counts) - 1} times, told {told} times from where it goes on, same bits: {case}", flush=True)
+    for kills, case in KILLED:
+        told, counts = kill(case, kills, rng)
+        print(f"killed {kills} times, {told} of them the last checkpoint was named, with {counts} processes, same bits: {case}", flush=True)
 
 
 FOLDER.mkdir(parents=True, exist_ok=True)

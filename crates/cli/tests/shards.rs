@@ -182,6 +182,7 @@ fn what_no_shard_can_do_is_refused_with_the_line_to_use() {
     refused("batch slurm -- check ring", &["mms batch slurm -- converge"]);
     refused("batch slurm -- tradeoff ring --out study", &["--cells 16,32,64"]);
     refused("batch slurm -- converge ring --cell 8", &["--cells"]);
+    refused("batch slurm --ranks 4 -- converge ring --out study", &["--shards 4"]);
 }
 
 #[test]
@@ -221,4 +222,38 @@ fn the_script_of_an_array_prints_the_table_of_one_process() {
     assert_eq!(alone.status, 0, "{}", alone.stderr);
     let [alone, table] = ["alone.json", "table.json"].map(|name| read_json(&place.join(name)));
     assert_eq!(lasting(&alone), lasting(&table));
+}
+
+/// The launcher is a script that says how it was called and starts one process.
+#[test]
+fn the_script_of_a_run_goes_on_from_its_checkpoint() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let script = mms(
+        place,
+        "batch slurm --ranks 4 --cores 2 -- run bar --cells 8 --checkpoint kept --every 1 --json a.json",
+    );
+    assert_eq!((script.status, script.stderr.as_str()), (0, ""));
+    std::fs::write(place.join("run.sh"), &script.stdout).expect("a file");
+    for line in ["#SBATCH --ntasks=4", "#SBATCH --cpus-per-task=2"] {
+        assert!(script.stdout.lines().any(|known| known == line), "{}", script.stdout);
+    }
+    let launcher = "#!/bin/sh\necho \"$1 $2 $4\" >> started\nshift 2\nexec \"$@\"\n";
+    std::fs::write(place.join("mpirun"), launcher).expect("a file");
+    let executable = Command::new("chmod").args(["+x", "mpirun"]).current_dir(place).status();
+    assert!(executable.expect("a program").success());
+    let folder = Path::new(env!("CARGO_BIN_EXE_mms")).parent().expect("a folder");
+    let (here, path) = (place.display(), std::env::var("PATH").unwrap_or_default());
+    let path = format!("{here}:{}:{path}", folder.display());
+    for _ in 0..2 {
+        let status = Command::new("bash")
+            .current_dir(place)
+            .arg("run.sh")
+            .envs([("SLURM_NTASKS", "4"), ("SLURM_CPUS_PER_TASK", "2"), ("PATH", &path)])
+            .stdout(Stdio::null())
+            .status();
+        assert!(status.expect("a shell").success());
+    }
+    let started = std::fs::read_to_string(place.join("started")).expect("a file");
+    assert_eq!(started, "-n 4 run\n-n 4 resume\n");
 }

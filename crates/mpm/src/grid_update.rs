@@ -244,7 +244,8 @@ where
             false => ranks.rank() + 1,
         };
         let send = |shared, nodes: &[Node<T, D>]| {
-            let numbers: Vec<T> = nodes.iter().flat_map(|node| node.numbers().to_vec()).collect();
+            let mut numbers = Vec::with_capacity(nodes.len() * (2 * D + 1));
+            nodes.iter().for_each(|node| numbers.extend_from_slice(node.numbers()));
             ranks.send(neighbour(shared), cast_slice(&numbers));
         };
         let receive = |shared, nodes: &mut [Node<T, D>]| {

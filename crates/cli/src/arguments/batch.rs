@@ -12,7 +12,10 @@ pub(crate) struct BatchOptions {
     /// Number of shards of a study
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = thread_count)]
     pub(crate) shards: usize,
-    /// Cores of each task
+    /// Number of processes of a run, which mpirun starts; more than one need an mms that was built with --features mpi
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = thread_count)]
+    pub(crate) ranks: usize,
+    /// Cores of each task, of a run those of each process
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = thread_count)]
     pub(crate) cores: usize,
     /// The command, after --: a study with --out DIR, or a run

@@ -1,5 +1,7 @@
 //! `mms batch`: job scripts for clusters.
 
+use std::path::Path;
+
 use anyhow::{Result, bail};
 use clap::FromArgMatches;
 
@@ -48,6 +50,7 @@ pub(crate) fn batch(options: &BatchOptions) -> Result<bool> {
         words,
         cores: options.cores,
     };
+    let ranks = options.ranks;
     let kept = match &command {
         Command::Converge(options) => Some(&options.kept),
         Command::Stability(options) => Some(&options.kept),
@@ -56,7 +59,16 @@ pub(crate) fn batch(options: &BatchOptions) -> Result<bool> {
     };
     let BatchSystem::Slurm = options.system;
     let script = match kept {
-        None => job.run(),
+        None => {
+            let folder = match &command {
+                Command::Run(run) => run.checkpoint.as_deref(),
+                _ => None,
+            };
+            job.run(ranks, folder)
+        }
+        Some(_) if ranks > 1 => bail!(
+            "--ranks {ranks}: several processes do one run together; a study is shared out with --shards {ranks}"
+        ),
         Some(KeepOptions { out: Some(_), shard: None }) => {
             if let Command::Tradeoff(tradeoff) = &command
                 && tradeoff.cells.is_empty()
@@ -90,17 +102,30 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// One process.
-    fn run(&self) -> String {
+    /// One run by some processes, which goes on where it keeps checkpoints in a folder.
+    fn run(&self, ranks: usize, folder: Option<&Path>) -> String {
         let Self { name, words, cores } = self;
+        let start = if ranks > 1 { "exec mpirun -n \"$SLURM_NTASKS\" mms" } else { "exec mms" };
+        let threads = "--threads \"$SLURM_CPUS_PER_TASK\"";
+        let mut note = String::new();
+        let mut resume = String::new();
+        if let Some(folder) = folder {
+            let kept = quoted(&[&folder.to_string_lossy()]);
+            note = "# Submitted again, it goes on from its last checkpoint, on as many processes as it then has.\n".into();
+            resume = format!(
+                "if [ -e {kept}/run.json ]; then\n    {start} resume {kept} {threads}\nfi\n"
+            );
+        }
         format!(
             "#!/bin/bash\n\
              # One run. Submit it with sbatch; limits such as --time and --partition may stand on that line.\n\
+             {note}\
              #SBATCH --job-name={name}\n\
-             #SBATCH --ntasks=1\n\
+             #SBATCH --ntasks={ranks}\n\
              #SBATCH --cpus-per-task={cores}\n\
              set -eu\n\
-             exec mms {} --threads \"$SLURM_CPUS_PER_TASK\"\n",
+             {resume}\
+             {start} {} {threads}\n",
             quoted(&without(words, &["--threads"]))
         )
     }

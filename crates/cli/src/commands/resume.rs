@@ -92,6 +92,11 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
         format!("cannot enter {}, where the run was started", start.folder.display())
     })?;
     run.scheme.threads = options.threads.or(run.scheme.threads);
+    let given = options.folder.display();
+    match CheckpointFolder::reached(folder.path()) {
+        Some(step) => terminal::note(format_args!("{given}: the run goes on after step {step}")),
+        None => terminal::note(format_args!("{given}: no checkpoint yet, the run begins anew")),
+    }
     run::follow(&run, Origin::Checkpoint(Place { folder, resume: true }))
 }
 
