@@ -182,7 +182,7 @@ fn what_no_shard_can_do_is_refused_with_the_line_to_use() {
     refused("batch slurm -- check ring", &["mms batch slurm -- converge"]);
     refused("batch slurm -- tradeoff ring --out study", &["--cells 16,32,64"]);
     refused("batch slurm -- converge ring --cell 8", &["--cells"]);
-    refused("batch slurm --ranks 4 -- converge ring --out study", &["--shards 4"]);
+    refused("batch slurm --ranks 4 -- converge ring --cells 8 --out study", &["--shards 4"]);
 }
 
 #[test]

@@ -26,6 +26,8 @@ enum Form {
     /// A table for each command with two lists `{a,b}`: rows for the first list, columns for the second, and in each cell the
     /// nanoseconds that a step of a particle takes in that run, and how many times those of `gimp` with `flip` that is.
     Pairs,
+    /// A column for each run of a square or a cube: what a billion particles of it would take on many cores.
+    Billion,
     /// What a build into an empty folder takes, and a row for each crate that takes long.
     Build,
     /// The picture that the command writes to its last word, a path of the repository.
@@ -42,11 +44,12 @@ impl Form {
             "displacement" => Self::Displacement,
             "speed" => Self::Speed,
             "pairs" => Self::Pairs,
+            "billion" => Self::Billion,
             "build" => Self::Build,
             "picture" => Self::Picture,
             other => {
                 return Err(format!(
-                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed, pairs, build and picture"
+                    "the form '{other}' is not known; known are exact, tables, orders, displacement, speed, pairs, billion, build and picture"
                 ));
             }
         })
@@ -59,9 +62,13 @@ impl Form {
             }
             Self::Displacement => &["L_inf of u (m)", "orders", "million particle-steps/s"],
             Self::Speed => &["particles", "steps", "stepping (s)", "million particle-steps/s"],
-            Self::Text | Self::Exact | Self::Tables | Self::Pairs | Self::Build | Self::Picture => {
-                &[]
-            }
+            Self::Text
+            | Self::Exact
+            | Self::Tables
+            | Self::Pairs
+            | Self::Billion
+            | Self::Build
+            | Self::Picture => &[],
         }
     }
 }
@@ -69,7 +76,7 @@ impl Form {
 /// The lines that a section must have in this order, whatever its commands measure.
 fn skeleton(form: Form, section: &Section) -> Vec<String> {
     match form {
-        Form::Text | Form::Tables | Form::Pairs | Form::Build => {
+        Form::Text | Form::Tables | Form::Pairs | Form::Billion | Form::Build => {
             section.commands.iter().map(|command| shown(command)).collect()
         }
         Form::Exact => Vec::new(),
@@ -270,6 +277,22 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
                 parts.push(pairs(command, place)?);
             }
         }
+        Form::Billion => {
+            let columns = section.commands.iter().map(|command| {
+                succeed(place, &format!("{command} --json OUT.json"))?;
+                let document: Value = serde_json::from_str(&place.read("OUT.json")?)
+                    .with_context(|| format!("the JSON of {command}"))?;
+                billion(&document).with_context(|| format!("the JSON of '{command}' lacks a row"))
+            });
+            let columns = columns.collect::<anyhow::Result<Vec<_>>>()?;
+            parts.push(format!("| | `{}` |", section.commands.join("` | `")));
+            parts.push(format!("|---|{}", "---:|".repeat(columns.len())));
+            for (row, what) in OF_A_BILLION.iter().enumerate() {
+                let cells = columns.iter().map(|column| column[row].as_str());
+                parts.push(format!("| {what} | {} |", cells.collect::<Vec<_>>().join(" | ")));
+            }
+            parts.push(String::new());
+        }
         Form::Build => {
             for command in &section.commands {
                 parts.push(build(command, place)?);
@@ -414,6 +437,50 @@ fn speed(document: &Value) -> Option<Vec<String>> {
     let count = |name: &str| row[name].as_u64().map_or("-".to_owned(), |count| count.to_string());
     let seconds = row["wall_s"].as_f64().map_or("-".to_owned(), |seconds| format!("{seconds:.2}"));
     Some(vec![count("particles"), count("steps"), seconds, rate(row)])
+}
+
+/// The rows of a table of the form [`Form::Billion`].
+const OF_A_BILLION: [&str; 10] = [
+    "measured: million particle-steps/s of a core",
+    "cells",
+    "bins",
+    "cores of use",
+    "million particles of a core",
+    "a step's work (s)",
+    "MB sent at a cut in a step",
+    "the same at 10 GB/s (s)",
+    "steps in a period",
+    "hours for a period",
+];
+
+/// What 10^9 particles of a square or a cube would take, from the rate of a smaller one on one core, in the order of [`OF_A_BILLION`].
+/// Bins, rows and messages are those of the solver, which a test of it counts.
+fn billion(document: &Value) -> Option<Vec<String>> {
+    const PARTICLES: f64 = 1e9;
+    let (settings, row) = (&document["settings"], &document["result"]);
+    let (cells, per_cell) = (settings["cells"].as_f64()?, settings["ppc"].as_f64()?);
+    let dimension = (row["particles"].as_f64()?.ln() / (cells * per_cell).ln()).round();
+    let rate = row["particle_steps_per_s"].as_f64()?;
+    let large = (PARTICLES.powf(1.0 / dimension) / per_cell).round();
+    let bins = ((large + 9.0) / 8.0).floor();
+    // Bins of one colour work while those of the other one wait.
+    let cores = (bins / 2.0).floor();
+    let work = PARTICLES / cores / rate;
+    let sent = 2.0 * 8.0 * (large + 9.0).powf(dimension - 1.0) * (2.0 * dimension + 1.0) * 8.0;
+    let steps = row["steps"].as_f64()? / settings["periods"].as_f64()? * large / cells;
+    let hours = steps * (work + sent / 1e10) / 3600.0;
+    Some(vec![
+        format!("{:.1}", rate / 1e6),
+        format!("{large:.0}^{dimension:.0}"),
+        format!("{bins:.0}"),
+        format!("{cores:.0}"),
+        format!("{:.1}", PARTICLES / cores / 1e6),
+        format!("{work:.3}"),
+        format!("{:.1}", sent / 1e6),
+        format!("{:.4}", sent / 1e10),
+        format!("{steps:.0}"),
+        format!("{hours:.1}"),
+    ])
 }
 
 fn rate(row: &Value) -> String {
