@@ -76,7 +76,8 @@ impl Form {
 /// The lines that a section must have in this order, whatever its commands measure.
 fn skeleton(form: Form, section: &Section) -> Vec<String> {
     match form {
-        Form::Text | Form::Tables | Form::Pairs | Form::Billion | Form::Build => {
+        Form::Billion => vec![section.commands.join("` | `")],
+        Form::Text | Form::Tables | Form::Pairs | Form::Build => {
             section.commands.iter().map(|command| shown(command)).collect()
         }
         Form::Exact => Vec::new(),
