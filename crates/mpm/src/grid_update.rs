@@ -257,7 +257,19 @@ where
             }
         };
         let finish = |nodes: &mut [_]| self.finish(nodes);
-        let halo = Some(Halo { send: &send, receive: &receive, finish: &finish });
+        let has_arrived = |shared| ranks.has_arrived(neighbour(shared));
+        // Rows of an edge are updated with all of it.
+        let is_updated = |rows: Range<usize>| {
+            let is_apart = |edge: &Edge| rows.end <= edge.rows.start || edge.rows.end <= rows.start;
+            self.edges.iter().all(is_apart)
+        };
+        let halo = Some(Halo {
+            send: &send,
+            receive: &receive,
+            has_arrived: &has_arrived,
+            is_updated: &is_updated,
+            finish: &finish,
+        });
         add(nodes, NodeHooks { before: &before, after: &after, halo });
     }
 

@@ -1,7 +1,7 @@
 //! Ranks that are threads of one process.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::Ranks;
 
@@ -10,7 +10,14 @@ type Message = Vec<u8>;
 struct InProcess {
     rank: usize,
     to: Vec<Mutex<Sender<Message>>>,
-    from: Vec<Mutex<Receiver<Message>>>,
+    from: Vec<Mutex<Incoming>>,
+}
+
+/// The messages of one rank.
+struct Incoming {
+    receiver: Receiver<Message>,
+    /// The one that was looked at.
+    next: Option<Message>,
 }
 
 /// Calls `work` on as many threads as ranks, and gives what each makes, in the order of the ranks.
@@ -25,7 +32,7 @@ pub fn in_process<R: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> R + Sy
         for receivers in &mut from {
             let (send, receive) = channel();
             sender.push(Mutex::new(send));
-            receivers.push(Mutex::new(receive));
+            receivers.push(Mutex::new(Incoming { receiver: receive, next: None }));
         }
     }
     let ranks = to.into_iter().zip(from).enumerate();
@@ -49,15 +56,25 @@ impl Ranks for InProcess {
     }
 
     fn send(&self, to: usize, bytes: &[u8]) {
-        let sender = self.to[to].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let sender = self.to[to].lock().unwrap_or_else(PoisonError::into_inner);
         // Who no longer listens has panicked, which its thread tells.
         let _ = sender.send(bytes.to_vec());
     }
 
     fn receive(&self, from: usize, bytes: &mut [u8]) {
-        let receiver = self.from[from].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let Ok(message) = receiver.recv() else { panic!("rank {from} has ended") };
+        let mut from_it = self.from[from].lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(message) = from_it.next.take().or_else(|| from_it.receiver.recv().ok()) else {
+            panic!("rank {from} has ended")
+        };
         bytes.copy_from_slice(&message);
+    }
+
+    fn has_arrived(&self, from: usize) -> bool {
+        let mut from_it = self.from[from].lock().unwrap_or_else(PoisonError::into_inner);
+        if from_it.next.is_none() {
+            from_it.next = from_it.receiver.try_recv().ok();
+        }
+        from_it.next.is_some()
     }
 
     fn largest(&self, value: u64) -> u64 {

@@ -33,6 +33,9 @@ pub trait Ranks: Send + Sync {
     /// Waits for the next message of another rank, which has just the length of `bytes`.
     fn receive(&self, from: usize, bytes: &mut [u8]);
 
+    /// Whether a message of another rank has arrived that [`receive`](Self::receive) would not wait for.
+    fn has_arrived(&self, from: usize) -> bool;
+
     /// The largest of the numbers of all ranks; a call of all.
     fn largest(&self, value: u64) -> u64;
 }
@@ -122,6 +125,15 @@ mod tests {
                 let counts = announce(ranks, &lengths);
                 let all = exchange(ranks, &out, &counts);
                 let gathered = gather(ranks, &all);
+                // In its own time.
+                ranks.send((own + 1) % count, &[own as u8]);
+                let before = (own + count - 1) % count;
+                while !ranks.has_arrived(before) {
+                    std::thread::yield_now();
+                }
+                let mut sender = [0];
+                ranks.receive(before, &mut sender);
+                assert_eq!(sender[0] as usize, before);
                 let mut shared = [all.len() as u64, own as u64];
                 share(ranks, count - 1, &mut shared);
                 (all, gathered, shared, ranks.largest(own as u64))

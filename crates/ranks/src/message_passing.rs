@@ -146,6 +146,22 @@ impl Ranks for Mpi {
         }
     }
 
+    fn has_arrived(&self, from: usize) -> bool {
+        let inner = self.inner();
+        let mut has_arrived = 0;
+        // SAFETY: the communicator is a live one, the flag is exclusive, and no status is asked for.
+        unsafe {
+            ffi::MPI_Iprobe(
+                from as i32,
+                TAG,
+                inner.world.as_raw(),
+                &mut has_arrived,
+                ffi::RSMPI_STATUS_IGNORE,
+            );
+        }
+        has_arrived != 0
+    }
+
     fn largest(&self, value: u64) -> u64 {
         let mut largest = 0;
         self.inner().world.all_reduce_into(&value, &mut largest, SystemOperation::max());

@@ -70,6 +70,10 @@ impl Ranks for Counted {
         self.ranks.receive(from, bytes);
     }
 
+    fn has_arrived(&self, from: usize) -> bool {
+        self.ranks.has_arrived(from)
+    }
+
     fn largest(&self, value: u64) -> u64 {
         self.ranks.largest(value)
     }

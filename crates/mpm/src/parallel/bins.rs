@@ -12,6 +12,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
@@ -135,6 +136,10 @@ pub(crate) struct Halo<'a, N> {
     pub(crate) send: &'a (dyn Fn(Shared, &[N]) + Sync),
     /// Receives them.
     pub(crate) receive: &'a (dyn Fn(Shared, &mut [N]) + Sync),
+    /// Whether that would not wait.
+    pub(crate) has_arrived: &'a (dyn Fn(Shared) -> bool + Sync),
+    /// Whether these rows of the grid are updated right after their last contribution.
+    pub(crate) is_updated: &'a (dyn Fn(Range<usize>) -> bool + Sync),
     /// Between the last contribution of all and the last messages.
     pub(crate) finish: &'a (dyn Fn(&mut [N]) + Sync),
 }
@@ -265,7 +270,7 @@ impl Bins {
         let Self { rows, held, order, schedule, .. } = self;
         let start = held.bands.start;
         let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
-        for_each_band(bands, hooks, &|band, first, bin| {
+        for_each_band(*rows, bands, hooks, &|band, first, bin| {
             if let Some(particles) = order.part(bin - start) {
                 add(band, first, particles);
             }
@@ -294,7 +299,7 @@ impl Bins {
             return;
         };
         let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
-        for_each_band(bands, hooks, &|band, first, bin| {
+        for_each_band(*rows, bands, hooks, &|band, first, bin| {
             if let Some(elements) = elements.take(bin - start) {
                 add(band, first, bin as u32, elements);
             }
@@ -304,52 +309,69 @@ impl Bins {
 
 /// Calls `add(band, first, bin)` for each bin here, and the hooks around it.
 ///
-/// Of a segment that is shared with another process one has the first band. It sends its sums, which the other one adds to, and gets
-/// the updated nodes back.
+/// Of a segment that is shared with another process one has the first band. It sends its sums, which the other one adds to as soon as they
+/// have come, and gets the updated nodes back.
 fn for_each_band<N: Send>(
+    rows: BinRows,
     mut bands: ColoredBands<'_, N>,
     hooks: NodeHooks<'_, N>,
     add: &(dyn Fn(&mut [N], usize, usize) + Sync),
 ) {
-    let sums: Vec<Shared> = bands.shared().collect();
-    let is_lent = |segment: usize| {
-        sums.iter().find(|shared| shared.is_first_here && shared.segment == segment)
+    let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
+        bands.shared().partition(|shared| shared.is_first_here);
+    let returned: Vec<AtomicBool> = borrowed.iter().map(|_| AtomicBool::new(false)).collect();
+    // What a band that is done sends at once.
+    let send = |Halo { send, is_updated, .. }: &Halo<'_, N>, segment: usize, nodes: &[N]| {
+        for shared in lent.iter().filter(|shared| shared.segment == segment) {
+            send(*shared, nodes);
+        }
+        for (shared, is_returned) in borrowed.iter().zip(&returned) {
+            let rows = rows.first_row(segment)..rows.first_row(segment + 1);
+            if shared.segment == segment && is_updated(rows) {
+                send(*shared, nodes);
+                is_returned.store(true, Ordering::Relaxed);
+            }
+        }
     };
     let pass = |bands: &ColoredBands<'_, N>| {
         on_all_threads(&|thread| {
-            while let Some(mut band) = bands.take(thread) {
+            loop {
+                for &shared in &borrowed {
+                    if let Some(Halo { receive, has_arrived, .. }) = &hooks.halo
+                        && bands.is_awaited(shared)
+                        && has_arrived(shared)
+                    {
+                        bands.fill(shared, |nodes| receive(shared, nodes));
+                    }
+                }
+                let Some(mut band) = bands.take(thread) else { break };
                 (hooks.before)(band.first_touched().0);
                 let bin = band.segment();
                 let (elements, first) = band.elements();
                 add(elements, first, bin);
-                if let Some(Halo { send, .. }) = hooks.halo {
-                    for (segment, nodes) in band.segments() {
-                        if let Some(shared) = is_lent(segment) {
-                            send(*shared, nodes);
-                        }
-                    }
-                }
                 let (completed, first) = band.completed();
                 if !completed.is_empty() {
                     (hooks.after)(completed, first);
+                }
+                if let Some(halo) = &hooks.halo {
+                    band.segments().for_each(|(segment, nodes)| send(halo, segment, nodes));
                 }
             }
         });
     };
     pass(&bands);
-    let Some(Halo { send, receive, finish }) = hooks.halo else { return };
-    for &shared in sums.iter().filter(|shared| !shared.is_first_here) {
-        receive(shared, bands.of_shared(shared));
-        bands.arrived(shared);
-    }
-    if sums.iter().any(|shared| !shared.is_first_here) {
+    let Some(Halo { send, receive, finish, .. }) = &hooks.halo else { return };
+    let filled = borrowed.iter().map(|&shared| bands.fill(shared, |nodes| receive(shared, nodes)));
+    if filled.fold(false, |any, filled| any | filled) {
         pass(&bands);
     }
     finish(bands.all());
-    for &shared in sums.iter().filter(|shared| !shared.is_first_here) {
-        send(shared, bands.of_shared(shared));
+    for (&shared, is_returned) in borrowed.iter().zip(&returned) {
+        if !is_returned.load(Ordering::Relaxed) {
+            send(shared, bands.of_shared(shared));
+        }
     }
-    for &shared in sums.iter().filter(|shared| shared.is_first_here) {
+    for &shared in &lent {
         receive(shared, bands.of_shared(shared));
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! A process may hold some successive bands of an array whose others are held by other processes. It holds the segments that its bands
 //! cover. Of these it shares the first with the band below, and the last with the band above: such a band counts as any other,
-//! and [`ColoredBands::arrived`] says that it has released the segment.
+//! and [`ColoredBands::fill`] puts its sums in place.
 
 #![allow(unsafe_code, reason = "overlapping bands of one array, changed by several threads")]
 
@@ -68,6 +68,8 @@ pub(crate) struct Schedule {
     taken: Vec<bool>,
     /// Number of bands that threads hold at present.
     held: usize,
+    /// Whether the sums of the shared segment below and of that above have come, or are being taken.
+    has_come: [bool; 2],
 }
 
 /// Position of a band among the bands that cover one segment.
@@ -122,6 +124,7 @@ impl Schedule {
         self.taken.clear();
         self.taken.resize(of.bands.len(), false);
         self.held = 0;
+        self.has_come = [false; 2];
     }
 
     fn is_taken(&self, band: usize) -> bool {
@@ -131,16 +134,21 @@ impl Schedule {
     /// The order of taking: each band of the second colour soon after its neighbours, whose elements still lie in the cache.
     /// The `part`-th of `parts` threads begins at a place of its own, so that each stays among neighbours for long.
     ///
-    /// Bands that those of other processes wait for come first of all.
+    /// Bands that those of other processes wait for come first of all, and those that send what other processes wait for.
     fn order(&self, (part, parts): (usize, usize)) -> impl Iterator<Item = usize> + use<> {
         let Held { bands, all } = self.of.clone();
         // A band of the second colour has the place two after its number, next after that of its upper neighbour.
         let places = bands.len() + 2;
         let first = places * part / parts.max(1);
-        let mut awaited = [None; 2];
-        for (band, shared) in awaited.iter_mut().zip(self.of.shared()) {
-            let own = if shared.is_below { shared.segment } else { shared.segment - 1 };
-            *band = shared.is_first_here.then_some(own);
+        let mut awaited = [None; 4];
+        for (own, shared) in awaited.chunks_exact_mut(2).zip(self.of.shared()) {
+            let (band, neighbour) = match shared.is_below {
+                true => (shared.segment, Some(shared.segment + 1)),
+                false => (shared.segment - 1, shared.segment.checked_sub(2)),
+            };
+            // A band of the second colour waits for its neighbour here, too.
+            let neighbour = neighbour.filter(|own| !shared.is_first_here && bands.contains(own));
+            own.copy_from_slice(&[neighbour, Some(band)]);
         }
         let band = move |place: usize| {
             let band = bands.start + place;
@@ -231,10 +239,29 @@ impl<'a, N> ColoredBands<'a, N> {
         unsafe { slice::from_raw_parts_mut(self.first, self.length) }
     }
 
-    /// Says that the band of another process that covers a shared segment as well has released it.
-    pub(crate) fn arrived(&self, shared: Shared) {
-        let place = shared.segment - self.of.bands.start;
-        self.schedule().released[place] += 1;
+    /// Lets `fill` put the sums of another process in place, whose band comes first in a shared segment; that band has released the
+    /// segment then. Once; what follows does nothing. True where it did something.
+    pub(crate) fn fill(&self, shared: Shared, fill: impl FnOnce(&mut [N])) -> bool {
+        // What the unsafe code relies on.
+        assert!(!shared.is_first_here && self.of.shared().any(|known| known == shared));
+        let has_come = |schedule: &mut Schedule| {
+            std::mem::replace(&mut schedule.has_come[usize::from(shared.is_below)], true)
+        };
+        if has_come(&mut self.schedule()) {
+            return false;
+        }
+        let range = self.range(shared.segment..shared.segment + 1);
+        // SAFETY: as in `Band::elements` the range lies in the array. Of the bands here one alone covers the segment, which is not handed
+        // out before the segment is released below (`is_ready`); this is reached once (`has_come`); and `&mut self` of other
+        // functions excludes this one.
+        fill(unsafe { slice::from_raw_parts_mut(self.first.add(range.start), range.len()) });
+        self.schedule().released[shared.segment - self.of.bands.start] += 1;
+        true
+    }
+
+    /// Whether the sums of a shared segment have not come yet.
+    pub(crate) fn is_awaited(&self, shared: Shared) -> bool {
+        !self.schedule().has_come[usize::from(shared.is_below)]
     }
 
     /// The elements of a segment that is shared, while no thread holds a band.
@@ -373,6 +400,31 @@ mod tests {
             assert_eq!(taken.len(), segments);
             assert_eq!(taken.into_iter().collect::<HashSet<_>>().len(), segments);
         }
+    }
+
+    #[test]
+    fn sums_of_other_processes_come_once_and_before_the_band_that_adds_to_them() {
+        let mut array = vec![0; 8];
+        let mut schedule = Schedule::default();
+        // Bands 1 and 3 are of the second colour.
+        let held = Held { bands: 1..4, all: 7 };
+        let mut bands = ColoredBands::new(&mut array, 2, held, &mut schedule);
+        let shared: Vec<Shared> = bands.shared().collect();
+        assert_eq!(shared.iter().map(|shared| shared.segment).collect::<Vec<_>>(), [1, 4]);
+        let mut next = |bands: &ColoredBands<'_, i32>| {
+            let mut band = bands.take((0, 1))?;
+            band.elements().0.iter_mut().for_each(|element| *element += 1);
+            Some(band.segment())
+        };
+        assert_eq!((next(&bands), next(&bands)), (Some(2), None));
+        for (shared, band) in shared.into_iter().zip([1, 3]) {
+            assert!(bands.is_awaited(shared));
+            assert!(bands.fill(shared, |elements| elements.fill(10)));
+            assert!(!bands.is_awaited(shared));
+            assert_eq!((next(&bands), next(&bands)), (Some(band), None));
+            assert!(!bands.fill(shared, |_| panic!("a second time")));
+        }
+        assert_eq!(bands.all(), [11, 11, 2, 2, 2, 2, 11, 11]);
     }
 
     #[test]
