@@ -411,7 +411,7 @@ mod tests {
         let mut bands = ColoredBands::new(&mut array, 2, held, &mut schedule);
         let shared: Vec<Shared> = bands.shared().collect();
         assert_eq!(shared.iter().map(|shared| shared.segment).collect::<Vec<_>>(), [1, 4]);
-        let mut next = |bands: &ColoredBands<'_, i32>| {
+        let next = |bands: &ColoredBands<'_, i32>| {
             let mut band = bands.take((0, 1))?;
             band.elements().0.iter_mut().for_each(|element| *element += 1);
             Some(band.segment())
