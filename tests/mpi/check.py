@@ -70,7 +70,9 @@ def check_files():
     for count in (None, 3):
         start = [] if count is None else [*MPIRUN, "-n", str(count)]
         command = [*start, str(MMS), "run", "ring", "--cells", "64", "--periods", "0.1", "--frames", "3"]
-        subprocess.run([*command, "--vtk", str(FOLDER / f"particles-{count}")], check=True, stdout=subprocess.DEVNULL)
+        picture = ["--picture", str(FOLDER / f"picture-{count}.svg"), "--at", "0.05"]
+        subprocess.run([*command, *picture, "--vtk", str(FOLDER / f"particles-{count}")], check=True, stdout=subprocess.DEVNULL)
+    assert len({(FOLDER / f"picture-{count}.svg").read_text() for count in (None, 3)}) == 1
     for frame in range(3):
         whole = particles([FOLDER / f"particles-None/ring-{frame:06}.vtu"])
         pieces = sorted((FOLDER / "particles-3").glob(f"ring-{frame:06}-*.vtu"))

@@ -92,15 +92,7 @@ pub(crate) fn admit(command: &Command) -> Result<()> {
         )
     };
     match command {
-        Command::Run(options) => {
-            if options.picture.file.is_some() {
-                bail!(
-                    "mpirun -n {count} mms run --picture: one process alone draws; start one, or write particle files with --vtk DIR"
-                );
-            }
-            Ok(())
-        }
-        Command::Resume(_) => Ok(()),
+        Command::Run(_) | Command::Resume(_) => Ok(()),
         Command::Converge(_) => study("converge"),
         Command::Stability(_) => study("stability"),
         Command::Tradeoff(_) => study("tradeoff"),

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use bytemuck::Pod;
 use mmsmith_mpm::{Law, Particles};
-use mmsmith_ranks::gather;
+use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_vtk::{Array, Error, Frame, Provenance, Series, Values};
 use nalgebra::{Matrix3, SMatrix, SVector};
@@ -30,23 +31,53 @@ pub struct FrameOutput {
 pub struct Snapshot {
     /// The moment: a share of the time from the start, 0, to the end, 1. The step nearest to it is taken.
     pub share: f64,
-    /// The particles, once the run has been there; none where it stopped before, or where a particle is inside out then.
+    /// The particles, once the run has been there; none where it stopped before, or where a particle is inside out then. Of several
+    /// processes the first one has them, in the order of their numbers.
     pub frame: Option<Frame>,
 }
 
 impl Snapshot {
-    /// Keeps the state after a step, told with the number of all steps, if it is the one wanted.
+    /// Keeps the state after a step, told with the number of all steps, if it is the one wanted; a call of all processes.
     pub(crate) fn take<T: Precision<D>, const D: usize>(
         &mut self,
         state: (&Particles<T, D>, &Law<T, D>),
+        held: Option<Held<'_>>,
         exact: &dyn Solution<f64, D>,
         (step, steps): (u64, u64),
         time: f64,
     ) {
-        if step == (self.share.clamp(0.0, 1.0) * steps as f64).round() as u64 {
-            self.frame = frame(state, exact, step, time);
+        if step != (self.share.clamp(0.0, 1.0) * steps as f64).round() as u64 {
+            return;
+        }
+        let own = frame(state, exact, step, time);
+        self.frame = match held {
+            None => own,
+            Some(held) => whole(held, own),
+        };
+    }
+}
+
+/// The frame of all processes, in the order of the particles' numbers, at the first one; a call of all.
+fn whole(Held { ranks, ids }: Held<'_>, own: Option<Frame>) -> Option<Frame> {
+    fn all<E: Pod>(ranks: &dyn Ranks, order: &[usize], values: &mut Vec<E>) {
+        let found = gather(ranks, values);
+        *values = order.iter().map(|&p| found[p]).collect();
+    }
+    let is_any_inside_out = ranks.largest(own.is_none().into()) > 0;
+    let mut frame = own.filter(|_| !is_any_inside_out)?;
+    let ids = gather(ranks, ids);
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_unstable_by_key(|&p| ids[p]);
+    all(ranks, &order, &mut frame.points);
+    for Array { values, .. } in &mut frame.arrays {
+        match values {
+            Values::Scalar(values) => all(ranks, &order, values),
+            Values::Vector(values) => all(ranks, &order, values),
+            Values::Tensor(values) => all(ranks, &order, values),
+            Values::Id(values) => *values = (0..ids.len() as u64).collect(),
         }
     }
+    (ranks.rank() == 0).then_some(frame)
 }
 
 /// Writes the frames of one run. Frames tell the time of their velocities, but for the first state, whose velocity belongs to

@@ -345,7 +345,7 @@ where
                 frames.write(solver.observe(), measurement.held(), exact, (0, 0.0))?;
             }
             if let Some(snapshot) = &mut outputs.snapshot {
-                snapshot.take(solver.observe(), exact, (0, steps.count), 0.0);
+                snapshot.take(solver.observe(), measurement.held(), exact, (0, steps.count), 0.0);
             }
             let at_start = measurement.errors(solver, 0.0, lag);
             if let Some(recorder) = &mut recorder {
@@ -388,7 +388,7 @@ where
             frames.write(solver.observe(), measurement.held(), exact, (step, time))?;
         }
         if let Some(snapshot) = &mut outputs.snapshot {
-            snapshot.take(solver.observe(), exact, (step, steps.count), time);
+            snapshot.take(solver.observe(), measurement.held(), exact, (step, steps.count), time);
         }
         let share = step as f64 / steps.count as f64;
         (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });

@@ -8,6 +8,7 @@ use crate::arguments::{PictureOptions, Stress};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::number;
+use crate::processes;
 use crate::svg::Particles;
 
 impl Stress {
@@ -126,14 +127,16 @@ pub(super) struct Picture {
     stress: Stress,
     /// The moment in periods.
     at: f64,
-    output: Output,
+    /// Of several processes the first one has it.
+    output: Option<Output>,
     snapshot: Snapshot,
 }
 
 impl Picture {
     /// The picture that the options ask for, if any, of a run of so many periods.
     pub(super) fn asked(options: &PictureOptions, periods: f64) -> Result<Option<Self>> {
-        let Some(output) = Output::prepare_if(options.file.as_ref())? else { return Ok(None) };
+        let Some(file) = &options.file else { return Ok(None) };
+        let output = Output::prepare_if(Some(file).filter(|_| processes::is_first()))?;
         let at = options.at.unwrap_or(periods);
         if at > periods {
             let (at, periods) = (number::exact(at), number::exact(periods));
@@ -151,6 +154,7 @@ impl Picture {
 
     /// Draws what the run left.
     pub(super) fn write(self, selection: &Selection, row: &Row) -> Result<()> {
+        let Some(output) = self.output else { return Ok(()) };
         let Some(frame) = &self.snapshot.frame else {
             match &row.status {
                 Status::Ok => bail!(
@@ -173,7 +177,7 @@ impl Picture {
             self.stress.words(),
             number::rounded(frame.time, 4)
         );
-        self.output.write_text(&draw(&title, frame, &values, range(&values), units, ""))
+        output.write_text(&draw(&title, frame, &values, range(&values), units, ""))
     }
 }
 

@@ -6,8 +6,8 @@ use hand_coded::{AxisAligned, Coded, Plane, Ring};
 use mmsmith_ranks::in_process;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Arithmetic, Case, Extent, GridPose, Outputs, Placement, Row, Scheme, Shape, Start, Status,
-    Stepping, Total, Transfer, Updated, run,
+    Arithmetic, Case, Extent, GridPose, Outputs, Placement, Row, Scheme, Shape, Snapshot, Start,
+    Status, Stepping, Total, Transfer, Updated, run,
 };
 
 /// A row without what differs from run to run.
@@ -18,24 +18,32 @@ fn timeless(row: Row) -> Row {
 fn agrees<S: Plane + Clone>(solution: &S, case: &Case, counts: &[usize]) -> Row {
     let exact = AnySolution::Two(Box::new(Coded(solution.clone())));
     let what = |count: usize| format!("{count} processes, {case:?}");
-    let mut history = Vec::new();
+    let (mut history, mut expected) = (Vec::new(), Snapshot { share: 0.5, frame: None });
     let progress = &mut |_| ();
-    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(progress) };
+    let mut outputs = Outputs {
+        history: Some(&mut history),
+        snapshot: Some(&mut expected),
+        ..Outputs::new(progress)
+    };
     let alone =
         run(&exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run");
     for &count in counts {
         let found = in_process(count, |ranks| {
-            let mut history = Vec::new();
+            let (mut history, mut snapshot) = (Vec::new(), Snapshot { share: 0.5, frame: None });
             let progress = &mut |_| ();
             let mut outputs = Outputs {
                 history: Some(&mut history),
+                snapshot: Some(&mut snapshot),
                 ranks: Some(ranks),
                 ..Outputs::new(progress)
             };
             let row = run(&exact, Arithmetic::Double, case, &mut outputs);
-            (timeless(row.expect("a case that can be run")), history)
+            (timeless(row.expect("a case that can be run")), history, snapshot.frame)
         });
-        for (row, own) in found {
+        // The first one has the particles of all.
+        assert_eq!(found[0].2, expected.frame, "{}", what(count));
+        assert!(found[1..].iter().all(|(.., frame)| frame.is_none()), "{}", what(count));
+        for (row, own, _) in found {
             assert_eq!(row, timeless(alone.clone()), "{}", what(count));
             // As text: what is not a number equals itself.
             assert_eq!(format!("{own:?}"), format!("{history:?}"), "{}", what(count));
