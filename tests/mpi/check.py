@@ -48,11 +48,15 @@ def lasting(value):
     return [lasting(entry) for entry in value] if isinstance(value, list) else value
 
 
+def launched(count):
+    """How a command line begins that starts so many processes; none where no launcher does."""
+    return [] if count is None else [*MPIRUN, "-n", str(count)]
+
+
 def run(count, arguments, threads=1):
     """The result and the history of a run; `count` is none for a process that no launcher starts."""
     result, history = FOLDER / "result.json", FOLDER / "history.csv"
-    start = [] if count is None else [*MPIRUN, "-n", str(count)]
-    command = [*start, str(MMS), "run", *arguments.split(), "--threads", str(threads)]
+    command = [*launched(count), str(MMS), "run", *arguments.split(), "--threads", str(threads)]
     subprocess.run([*command, "--json", str(result), "--history", str(history)], check=True, stdout=subprocess.DEVNULL)
     return lasting(json.loads(result.read_text())), history.read_text()
 
@@ -68,8 +72,7 @@ def particles(pieces):
 def check_files():
     """Particle files in pieces hold what those of one process do, also for a reader that opens them as one."""
     for count in (None, 3):
-        start = [] if count is None else [*MPIRUN, "-n", str(count)]
-        command = [*start, str(MMS), "run", "ring", "--cells", "64", "--periods", "0.1", "--frames", "3"]
+        command = [*launched(count), str(MMS), "run", "ring", "--cells", "64", "--periods", "0.1", "--frames", "3"]
         picture = ["--picture", str(FOLDER / f"picture-{count}.svg"), "--at", "0.05"]
         subprocess.run([*command, *picture, "--vtk", str(FOLDER / f"particles-{count}")], check=True, stdout=subprocess.DEVNULL)
     assert len({(FOLDER / f"picture-{count}.svg").read_text() for count in (None, 3)}) == 1
@@ -95,10 +98,6 @@ KILLED = [
     (7, "ring --cells 64 --periods 2 --shape cpdi2 --layout body-fitted --every 5"),
     (6, "swirl --cells 64 --periods 2 --transfer apic --integrator musl --every 7"),
 ]
-
-
-def launched(count):
-    return [] if count is None else [*MPIRUN, "-n", str(count)]
 
 
 def processes(folder):

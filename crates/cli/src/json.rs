@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_verify::WholeFile;
 use serde::Serialize;
 
+use crate::processes;
 use crate::terminal;
 
 /// A file that cannot have so many bytes is refused before the work for it.
@@ -48,9 +49,9 @@ impl Output {
         Ok(Self(Place::File { path, file }))
     }
 
-    /// [`Output::prepare`] where a file was asked for.
+    /// [`Output::prepare`] where a file was asked for. Of several processes the first one writes what all have done.
     pub(crate) fn prepare_if(path: Option<&PathBuf>) -> Result<Option<Self>> {
-        path.map(|path| Self::prepare(path)).transpose()
+        path.filter(|_| processes::is_first()).map(|path| Self::prepare(path)).transpose()
     }
 
     /// Writes `value` and gives the file its name.

@@ -274,7 +274,7 @@ fn refused(error: LedgerError, folder: &Path, solution: &str) -> anyhow::Error {
     )
 }
 
-/// The settings that results depend on: all but the number of threads.
+/// The settings that results depend on: all but the numbers of threads and processes.
 pub(crate) fn decisive(settings: &Value) -> Value {
     let mut settings = settings.clone();
     if let Some(settings) = settings.as_object_mut() {

@@ -185,37 +185,44 @@ fn what_no_shard_can_do_is_refused_with_the_line_to_use() {
     refused("batch slurm --ranks 4 -- converge ring --cells 8 --out study", &["--shards 4"]);
 }
 
+/// Writes the script that `mms batch slurm` prints, which must have these lines.
+fn write_script(place: &Path, arguments: &str, lines: &[&str]) {
+    let script = mms(place, &format!("batch slurm {arguments}"));
+    assert_eq!((script.status, script.stderr.as_str()), (0, ""));
+    for line in lines {
+        assert!(script.stdout.lines().any(|known| known == *line), "{}", script.stdout);
+    }
+    std::fs::write(place.join("job.sh"), &script.stdout).expect("a file");
+}
+
+/// Runs that script as Slurm does, with its variables. Programs in the folder come first.
+fn run_script(place: &Path, variables: &[(&str, &str)]) {
+    let folder = Path::new(env!("CARGO_BIN_EXE_mms")).parent().expect("a folder");
+    let path = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{}:{path}", place.display(), folder.display());
+    let status = Command::new("bash")
+        .current_dir(place)
+        .arg("job.sh")
+        .envs(variables.iter().copied())
+        .env("PATH", path)
+        .stdout(Stdio::null())
+        .status();
+    assert!(status.expect("a shell").success(), "{variables:?}");
+}
+
 #[test]
 fn the_script_of_an_array_prints_the_table_of_one_process() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
-    let script = mms(
-        place,
-        &format!("batch slurm --shards 3 -- mms {IN_TIME} --out study --json table.json"),
-    );
-    assert_eq!((script.status, script.stderr.as_str()), (0, ""));
-    std::fs::write(place.join("study.sh"), &script.stdout).expect("a file");
-    for line in [
+    let lines = [
         "#SBATCH --array=1-3",
         "#SBATCH --job-name=mms-converge-axis-aligned",
         "#SBATCH --cpus-per-task=1",
-    ] {
-        assert!(script.stdout.lines().any(|known| known == line), "{}", script.stdout);
-    }
-    let folder = Path::new(env!("CARGO_BIN_EXE_mms")).parent().expect("a folder");
-    let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default());
-    for task in [2, 1, 3, 0] {
-        let status = Command::new("bash")
-            .current_dir(place)
-            .arg("study.sh")
-            .envs([
-                ("SLURM_ARRAY_TASK_ID", task.to_string().as_str()),
-                ("SLURM_CPUS_PER_TASK", "1"),
-                ("PATH", &path),
-            ])
-            .stdout(Stdio::null())
-            .status();
-        assert!(status.expect("a shell").success(), "task {task}");
+    ];
+    let study = format!("--shards 3 -- mms {IN_TIME} --out study --json table.json");
+    write_script(place, &study, &lines);
+    for task in ["2", "1", "3", "0"] {
+        run_script(place, &[("SLURM_ARRAY_TASK_ID", task), ("SLURM_CPUS_PER_TASK", "1")]);
     }
     assert_eq!(finished(place), (0, 4));
     let alone = mms_with(place, &format!("{IN_TIME} --json alone.json"), &[], "");
@@ -229,30 +236,14 @@ fn the_script_of_an_array_prints_the_table_of_one_process() {
 fn the_script_of_a_run_goes_on_from_its_checkpoint() {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
-    let script = mms(
-        place,
-        "batch slurm --ranks 4 --cores 2 -- run bar --cells 8 --checkpoint kept --every 1 --json a.json",
-    );
-    assert_eq!((script.status, script.stderr.as_str()), (0, ""));
-    std::fs::write(place.join("run.sh"), &script.stdout).expect("a file");
-    for line in ["#SBATCH --ntasks=4", "#SBATCH --cpus-per-task=2"] {
-        assert!(script.stdout.lines().any(|known| known == line), "{}", script.stdout);
-    }
+    let run = "--ranks 4 --cores 2 -- run bar --cells 8 --checkpoint kept --every 1 --json a.json";
+    write_script(place, run, &["#SBATCH --ntasks=4", "#SBATCH --cpus-per-task=2"]);
     let launcher = "#!/bin/sh\necho \"$1 $2 $4\" >> started\nshift 2\nexec \"$@\"\n";
     std::fs::write(place.join("mpirun"), launcher).expect("a file");
     let executable = Command::new("chmod").args(["+x", "mpirun"]).current_dir(place).status();
     assert!(executable.expect("a program").success());
-    let folder = Path::new(env!("CARGO_BIN_EXE_mms")).parent().expect("a folder");
-    let (here, path) = (place.display(), std::env::var("PATH").unwrap_or_default());
-    let path = format!("{here}:{}:{path}", folder.display());
     for _ in 0..2 {
-        let status = Command::new("bash")
-            .current_dir(place)
-            .arg("run.sh")
-            .envs([("SLURM_NTASKS", "4"), ("SLURM_CPUS_PER_TASK", "2"), ("PATH", &path)])
-            .stdout(Stdio::null())
-            .status();
-        assert!(status.expect("a shell").success());
+        run_script(place, &[("SLURM_NTASKS", "4"), ("SLURM_CPUS_PER_TASK", "2")]);
     }
     let started = std::fs::read_to_string(place.join("started")).expect("a file");
     assert_eq!(started, "-n 4 run\n-n 4 resume\n");

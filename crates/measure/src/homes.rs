@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use mmsmith_ranks::{Ranks, announce, exchange, gather, share};
+use mmsmith_ranks::{Ranks, announce, exchange, total};
 
 /// Particles in the largest group of any sum; smaller groups divide it.
 pub(crate) const GROUP: usize = 1024;
@@ -39,9 +39,7 @@ pub enum Holder {
 impl Homes {
     /// For a process that holds the particles `ids`, ascending; a call of all.
     pub fn new(ranks: Arc<dyn Ranks>, ids: &[u64]) -> Self {
-        let mut count = [gather(&*ranks, &[ids.len() as u64]).iter().sum::<u64>()];
-        share(&*ranks, 0, &mut count);
-        let count = count[0] as usize;
+        let count = total(&*ranks, ids.len() as u64) as usize;
         let groups = count.div_ceil(GROUP);
         let first = |rank: usize| (groups * rank / ranks.count() * GROUP).min(count);
         let range = |rank: usize| first(rank)..first(rank + 1);

@@ -5,7 +5,7 @@
 //! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
 
 use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
-use mmsmith_ranks::{gather, share};
+use mmsmith_ranks::total;
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
@@ -207,15 +207,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let mut saved = self.agreed(Saved::of_parts(parts, kind))?;
         // No process knows where another one keeps a particle, and all know where it goes for the time being.
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
-        let (processes, all) = match &ranks {
-            Some(ranks) => {
-                let mut all =
-                    [gather(&**ranks, &[self.particles.len() as u64]).iter().sum::<u64>()];
-                share(&**ranks, 0, &mut all);
-                (ranks.count(), all[0])
-            }
-            None => (1, self.particles.len() as u64),
-        };
+        let here = self.particles.len() as u64;
+        let (processes, all) =
+            ranks.as_ref().map_or((1, here), |ranks| (ranks.count(), total(&**ranks, here)));
         let is_known = saved.ids.iter().all(|&id| id < all)
             && saved.keys.iter().all(|&key| self.bins.bin_of_key(key).is_some());
         self.agreed(if is_known { Ok(()) } else { Err(SavedStateError::Particles) })?;
@@ -284,7 +278,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     ///
     /// # Errors
     ///
-    /// Where the state is not one of this set-up. The particles then may be those of any time.
+    /// Where the state is not one of this set-up. The particles then may be those of any time, and only another state can be taken up.
     pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
         // The grid no longer belongs to the particles.
         self.state.is_ahead = false;

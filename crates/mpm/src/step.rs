@@ -43,9 +43,6 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Support::Polygons(corners) = &mut self.support {
             corners.measure();
         }
-        if !self.bins.is_sorted() {
-            self.sort();
-        }
         if is_fused(integrator, self.transfer, &self.support) {
             return self.fused_step(body_force, times);
         }

@@ -109,6 +109,13 @@ pub fn share<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, from: usize, elemen
     }
 }
 
+/// The sum of the whole numbers of all ranks: a call of all.
+pub fn total(ranks: &dyn Ranks, own: u64) -> u64 {
+    let mut total = [gather(ranks, &[own]).iter().sum()];
+    share(ranks, 0, &mut total);
+    total[0]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,6 +143,7 @@ mod tests {
                 assert_eq!(sender[0] as usize, before);
                 let mut shared = [all.len() as u64, own as u64];
                 share(ranks, count - 1, &mut shared);
+                assert_eq!(total(ranks, 1 + own as u64), (1..=count as u64).sum());
                 (all, gathered, shared, ranks.largest(own as u64))
             });
             let expected = |own: usize| -> Vec<u64> {

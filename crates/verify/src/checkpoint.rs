@@ -333,12 +333,9 @@ impl Checkpoints {
             if name.starts_with(&start) && !name.starts_with(&current) {
                 let _ = fs::remove_file(entry.path());
             }
-            // One that a killed process was writing.
-            let under_way = name.strip_prefix('.').filter(|name| name.starts_with(&start));
-            if let Some((name, _)) = under_way.and_then(|name| name.split_once(".mms-")) {
-                WholeFile::sweep(&self.folder.path.join(name));
-            }
         }
+        let is_part = |name: &[u8]| name.starts_with(start.as_bytes());
+        WholeFile::sweep_where(&self.folder.path, &is_part);
     }
 
     /// How far the run was, and the solver's state; nothing where there is no checkpoint. A call of all processes, each of which reads
@@ -485,6 +482,7 @@ impl<W: Write> Write for Hashing<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::whole_file::tests::names;
     use mmsmith_ranks::in_process;
 
     fn checkpoints(folder: &Path) -> Checkpoints {
@@ -575,14 +573,6 @@ mod tests {
 
     fn read_together(folder: &Path, count: usize) -> Vec<Result<Option<TakenUp>, CheckpointError>> {
         in_process(count, |ranks| checkpoints_of(folder, &*ranks).read(Some(&*ranks)))
-    }
-
-    fn names(folder: &Path) -> Vec<String> {
-        let entries = fs::read_dir(folder).unwrap();
-        let mut names: Vec<_> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One run of a case, and the row of errors that comes out.
 
 use std::fmt;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Sub};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -87,10 +87,30 @@ pub struct RunTraffic {
     pub steps: u64,
 }
 
+impl Sub for RunTraffic {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        Self {
+            stepping: self.stepping - before.stepping,
+            measuring: self.measuring - before.measuring,
+            steps: self.steps - before.steps,
+        }
+    }
+}
+
 /// What this process has sent, by what for.
 struct Counters {
     stepping: Arc<Traffic>,
     measuring: Arc<Traffic>,
+}
+
+impl Counters {
+    /// Until now, after so many steps.
+    fn until(&self, steps: u64) -> RunTraffic {
+        let Self { stepping, measuring } = self;
+        RunTraffic { stepping: stepping.sent(), measuring: measuring.sent(), steps }
+    }
 }
 
 /// How a run ended.
@@ -366,9 +386,7 @@ where
                 errors: PerField { v: PerNorm::default(), ..at_start },
             }
         };
-    let before = done;
-    let sent = |Counters { stepping, measuring }: &Counters| (stepping.sent(), measuring.sent());
-    let sent_before = counters.map(sent);
+    let before = counters.map(|counters| counters.until(done));
     let outcome = driven.advance(done + 1..=steps.count, &mut |stepped| {
         let Stepped { step, time, solver, wall_s: of_step, cpu_s: cpu_of_step, is_interrupted } =
             stepped;
@@ -413,14 +431,9 @@ where
         }
         Ok(ControlFlow::Continue(()))
     })?;
-    if let (Some(traffic), Some((stepping, measuring)), Some(before_them)) =
-        (&mut outputs.traffic, counters.map(sent), sent_before)
+    if let (Some(traffic), Some(counters), Some(before)) = (&mut outputs.traffic, counters, before)
     {
-        **traffic = RunTraffic {
-            stepping: stepping - before_them.0,
-            measuring: measuring - before_them.1,
-            steps: done - before,
-        };
+        **traffic = counters.until(done) - before;
     }
     let status = match outcome {
         Outcome::Done => Status::Ok,

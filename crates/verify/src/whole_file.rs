@@ -80,10 +80,15 @@ impl WholeFile {
 
     /// Removes what killed writers of the file `path` have left beside it. What cannot be looked at or removed stays.
     pub fn sweep(path: &Path) {
-        let (Ok(prefix), Ok(entries)) = (prefix(path), fs::read_dir(folder(path))) else { return };
-        for entry in entries.flatten() {
+        let Some(name) = path.file_name().map(OsStr::as_encoded_bytes) else { return };
+        Self::sweep_where(folder(path), &|written| written == name);
+    }
+
+    /// Removes what killed writers have left in a folder of files with these names, given as bytes.
+    pub(crate) fn sweep_where(folder: &Path, is_meant: &dyn Fn(&[u8]) -> bool) {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-            if !is_file || !is_temporary(&entry.file_name(), &prefix) {
+            if !is_file || !name_of_written(&entry.file_name()).is_some_and(is_meant) {
                 continue;
             }
             let Ok(file) = File::open(entry.path()) else { continue };
@@ -122,22 +127,20 @@ fn prefix(path: &Path) -> io::Result<OsString> {
     Ok(prefix)
 }
 
-/// Whether `name` is one that [`WholeFile::create`] makes.
-fn is_temporary(name: &OsStr, prefix: &OsStr) -> bool {
-    let random = name
-        .as_encoded_bytes()
-        .strip_prefix(prefix.as_encoded_bytes())
-        .and_then(|rest| rest.strip_suffix(END.as_bytes()));
-    random.is_some_and(|random| {
-        random.len() == RANDOM && random.iter().all(u8::is_ascii_alphanumeric)
-    })
+/// The name of the file that a temporary one is written for, if [`WholeFile::create`] has made it.
+fn name_of_written(temporary: &OsStr) -> Option<&[u8]> {
+    let name = temporary.as_encoded_bytes().strip_prefix(b".")?.strip_suffix(END.as_bytes())?;
+    let (name, random) = name.split_at_checked(name.len().checked_sub(RANDOM)?)?;
+    let is_random = random.iter().all(u8::is_ascii_alphanumeric);
+    name.strip_suffix(MARK.as_bytes()).filter(|name| is_random && !name.is_empty())
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn names(folder: &Path) -> Vec<String> {
+    /// The names of what is in a folder.
+    pub(crate) fn names(folder: &Path) -> Vec<String> {
         let names = fs::read_dir(folder).unwrap();
         let mut names: Vec<_> =
             names.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();

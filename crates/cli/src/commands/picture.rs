@@ -8,7 +8,6 @@ use crate::arguments::{PictureOptions, Stress};
 use crate::json::Output;
 use crate::library::Selection;
 use crate::number;
-use crate::processes;
 use crate::svg::Particles;
 
 impl Stress {
@@ -135,8 +134,10 @@ pub(super) struct Picture {
 impl Picture {
     /// The picture that the options ask for, if any, of a run of so many periods.
     pub(super) fn asked(options: &PictureOptions, periods: f64) -> Result<Option<Self>> {
-        let Some(file) = &options.file else { return Ok(None) };
-        let output = Output::prepare_if(Some(file).filter(|_| processes::is_first()))?;
+        if options.file.is_none() {
+            return Ok(None);
+        }
+        let output = Output::prepare_if(options.file.as_ref())?;
         let at = options.at.unwrap_or(periods);
         if at > periods {
             let (at, periods) = (number::exact(at), number::exact(periods));

@@ -130,7 +130,7 @@ pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
     }
     fs::create_dir_all(folder)
         .with_context(|| format!("--checkpoint: cannot create {}", folder.display()))?;
-    let locked = take(folder).context("--checkpoint")?;
+    let locked = CheckpointFolder::lock(folder).context("--checkpoint")?;
     // Another run may have come and gone since.
     if path.exists() {
         bail!("--checkpoint: {} holds a run already", folder.display());

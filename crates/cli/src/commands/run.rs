@@ -45,10 +45,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let case = Case { cells, ..settled.case };
     let extent = model.admit(&[case])?;
     let keeps_history = options.history.is_some() || options.plot.is_some();
-    // One process writes what all have done.
-    let prepare = |path: &Option<PathBuf>| {
-        Output::prepare_if(path.as_ref().filter(|_| processes::is_first()))
-    };
+    let prepare = |path: &Option<PathBuf>| Output::prepare_if(path.as_ref());
     let [output, history, plot] = [&settled.json, &options.history, &options.plot].map(prepare);
     let (output, history, plot) = (output?, history?, plot?);
     if let Some(folder) = options.vtk.as_ref().filter(|_| processes::is_first()) {

@@ -192,11 +192,6 @@ impl Bins {
         &self.bin_of
     }
 
-    /// Whether each particle is in exactly one bin: false before the first sort.
-    pub(crate) fn is_sorted(&mut self) -> bool {
-        self.order.is_whole()
-    }
-
     /// The result of the last sort: the sub-bin of every particle.
     pub(crate) fn keys(&self) -> &[u32] {
         &self.keys
@@ -278,7 +273,7 @@ impl Bins {
     }
 
     /// As [`for_each`](Self::for_each) for kernels that change the bin's elements of three arrays. Does nothing where the
-    /// particles are not [sorted](Self::is_sorted).
+    /// particles have not been sorted.
     pub(crate) fn for_each_mut<N, A, B, C, const D: usize>(
         &mut self,
         layout: &Layout<D>,
@@ -431,9 +426,9 @@ mod tests {
             let layout = Layout::new(&grid, 8).unwrap();
             let nodes = first_nodes(&layout);
             let mut bins = Bins::new(&layout, nodes.len());
-            assert!(!bins.is_sorted());
+            assert!(!bins.order.is_whole());
             bins.sort(&layout, &|p| nodes[p]);
-            assert!(bins.is_sorted());
+            assert!(bins.order.is_whole());
             let mut met = vec![0; nodes.len()];
             let count = bins.rows.bins;
             for bin in 0..count {
