@@ -35,6 +35,10 @@ CASES = [
     "ring --cells 64 --periods 0.1 --extent full",
     "ring --cells 64 --periods 0.1 --shape cpdi2 --layout body-fitted",
     "axis-aligned-3d --cells 56 --periods 0.01",
+    "ring --cells 64 --periods 0.1 --shape cpdi2 --layout clipped --grid-angle 20",
+    "swirl --cells 64 --periods 0.1 --shape bspline3 --layout clipped --transfer apic --integrator usf",
+    "skew-2d --cells 64 --periods 0.1 --shape bspline2 --layout clipped --transfer xpic2 --integrator musl --grid-shift 0.3",
+    "sphere-shell --cells 56 --periods 0.01 --shape cpdi2 --layout clipped",
     # It is turned inside out.
     "axis-aligned --cells 64 --shape linear --integrator usl --cfl 1.9",
 ]
@@ -97,6 +101,7 @@ KILLED = [
     (7, "axis-aligned --cells 64 --periods 4 --every 3"),
     (7, "ring --cells 64 --periods 2 --shape cpdi2 --layout body-fitted --every 5"),
     (6, "swirl --cells 64 --periods 2 --transfer apic --integrator musl --every 7"),
+    (5, "ring --cells 64 --periods 1 --shape cpdi2 --layout clipped --transfer apic --every 6"),
 ]
 
 

@@ -100,7 +100,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         }
     }
 
-    /// Some successive particles alone, with their corners. Polygons stay as they are.
+    /// Some successive particles alone, with their corners.
     #[must_use]
     pub fn part(&self, own: &Range<usize>) -> Self {
         let Self { particles, half_edges, mesh, polygons } = self;
@@ -116,7 +116,9 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         };
         let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
         let mesh = mesh.as_ref().map(|mesh| mesh.part(own));
-        Self { particles, half_edges, mesh, polygons: polygons.clone() }
+        let own: Vec<usize> = own.clone().collect();
+        let polygons = polygons.as_ref().map(|polygons| polygons.part(&own));
+        Self { particles, half_edges, mesh, polygons }
     }
 
     /// A ring at rest, fitted by polar cells of equal width and angle. Particles lie at the exact centroids of the cells

@@ -2,6 +2,8 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::polygons::Load;
+
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T: Copy, const D: usize>: Sync {
     /// Writes into `b` the body force at the reference positions `X` and time `t`; both slices have the same length.
@@ -31,9 +33,9 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
         }
     }
 
-    /// Writes the Cauchy stress at the [loaded points](crate::Polygons::loads) of a body's boundary at time `t`, in their order. All are
-    /// zero before the first call. Default: leaves them as they are.
-    fn boundary_stress(&self, _t: T, _stress: &mut [SMatrix<T, D, D>]) {}
+    /// Writes the Cauchy stress at the [loaded points](crate::Polygons::loads) of a body's boundary at time `t`; both slices have the same
+    /// length. All are zero before the first call. Default: leaves them as they are.
+    fn boundary_stress(&self, _loads: &[Load<T, D>], _t: T, _stress: &mut [SMatrix<T, D, D>]) {}
 
     /// Whether the force is zero everywhere and always, so that a step may leave it out.
     fn is_absent(&self) -> bool {

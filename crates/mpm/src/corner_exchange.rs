@@ -32,15 +32,19 @@ pub(crate) struct Exchange<T, const D: usize> {
     pub(crate) given: Vec<Given<T, D>>,
     /// APIC: its affine momentum per cell, and the mean of its polygons; else empty.
     pub(crate) affine: Vec<(SMatrix<T, D, D>, SVector<T, D>)>,
+    /// Whether there are such.
+    has_affine: bool,
     /// Whether that counts in the sums at hand.
     pub(crate) is_affine: bool,
-    /// The sums at each corner.
+    /// The sums at each corner that this process sorts.
     sums: Vec<Node<T, D>>,
-    /// APIC: the affine momenta at each corner, along the axes of the grid; else empty.
+    /// APIC: the affine momenta at each of them, along the axes of the grid; else empty.
     affine_sums: Vec<SMatrix<T, D, D>>,
-    /// The values of the grid at each corner.
+    /// The values of the grid at each corner here.
     pub(crate) values: Vec<Node<T, D>>,
-    /// The same of velocities that are projected again, where there are such.
+    /// Whether velocities are projected again.
+    reprojects: bool,
+    /// The same of such velocities, where there are any.
     pub(crate) reprojected: Vec<Node<T, D>>,
     /// The Cauchy stress at each loaded point.
     stresses: Vec<SMatrix<T, D, D>>,
@@ -61,27 +65,44 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
     /// Reserves all memory that a support needs for it: none where particles share no corners that pass on what they give.
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool, reprojects: bool) -> Self {
         let none = ProductShape { on_axis: OnAxis::Hat, l: SVector::zeros() };
-        let (corners, particles, loads, at_corner) = match support {
-            Support::Polygons(own) => {
-                let Polygons { of_particles, loads, .. } = &own.polygons;
-                (own.count(), of_particles.len(), loads.len(), own.at_corner)
-            }
-            _ => (0, 0, 0, none),
-        };
-        let (zero, none) = (Node::zero(), SMatrix::zeros());
-        let if_affine = |count| if is_affine { count } else { 0 };
-        Self {
-            given: vec![Given { value: zero, stress_flux: none }; particles],
-            affine: vec![(none, SVector::zeros()); if_affine(particles)],
+        let mut own = Self {
+            given: Vec::new(),
+            affine: Vec::new(),
+            has_affine: is_affine,
             is_affine,
-            sums: vec![zero; corners],
-            affine_sums: vec![none; if_affine(corners)],
-            values: vec![zero; corners],
-            reprojected: vec![zero; if reprojects { corners } else { 0 }],
-            stresses: vec![none; loads],
-            at_nodes: Support::Product(at_corner),
+            sums: Vec::new(),
+            affine_sums: Vec::new(),
+            values: Vec::new(),
+            reprojects,
+            reprojected: Vec::new(),
+            stresses: Vec::new(),
+            at_nodes: Support::Product(none),
             buffers: BufferPool::new(),
+        };
+        if let Support::Polygons(corners) = support {
+            own.at_nodes = Support::Product(corners.at_corner);
+            own.fit(corners);
         }
+        own
+    }
+
+    /// Makes room for these corners and their particles.
+    pub(crate) fn fit(&mut self, corners: &SharedCorners<T, D>) {
+        let Polygons { of_particles, loads, .. } = &corners.polygons;
+        let (count, particles, own) = (corners.count(), of_particles.len(), corners.own());
+        let (zero, none) = (Node::zero(), SMatrix::zeros());
+        self.given.resize(particles, Given { value: zero, stress_flux: none });
+        self.sums.resize(own, zero);
+        self.values.resize(count, zero);
+        if self.has_affine {
+            self.affine.resize(particles, (none, SVector::zeros()));
+            self.affine_sums.resize(own, none);
+        }
+        if self.reprojects {
+            self.reprojected.resize(count, zero);
+        }
+        self.stresses.clear();
+        self.stresses.resize(loads.len(), none);
     }
 
     /// Sums what particles give at each corner, with the loads on it.
@@ -132,11 +153,12 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             }
         });
         let Some((loading, time)) = loading.filter(|_| !stresses.is_empty()) else { return };
-        loading.boundary_stress(time, stresses);
+        loading.boundary_stress(&corners.polygons.loads, time, stresses);
         for (load, stress) in corners.polygons.loads.iter().zip(&*stresses) {
             let force = stress * load.normal(&corners.polygons.x);
             for (&corner, &share) in load.corners.iter().zip(&load.shares) {
-                let Node { values } = &mut sums[corner as usize];
+                // The process that sorts a corner has all loads at it.
+                let Some(Node { values }) = sums.get_mut(corner as usize) else { continue };
                 (0..D).for_each(|i| values[D + i] += force[i] * share);
             }
         }
@@ -178,7 +200,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
     ) {
         let Self { values, buffers, at_nodes, .. } = self;
         let (buffers, at_nodes) = (&*buffers, &*at_nodes);
-        each_chunk(values, CHUNK, &|chunk, values| {
+        each_chunk(&mut values[..corners.own()], CHUNK, &|chunk, values| {
             let mut copies = Copies::new();
             let mut own = buffers.take(at_nodes, false);
             let Buffers { block, interpolated, .. } = &mut *own;
@@ -197,6 +219,9 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             }
             buffers.give_back(own);
         });
+        if let Some(halo) = &corners.halo {
+            halo.exchange(values);
+        }
     }
 
     /// The first node that a corner reaches.
@@ -221,7 +246,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         Some((invalid, corners.particle_at(corner)))
     }
 
-    /// Checks that every corner is on the grid and in its bin.
+    /// Checks that every corner that this process sorts is on the grid and in its bin.
     pub(crate) fn check(
         &self,
         c: &Constants<T, D>,
@@ -229,10 +254,10 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         bin_of: &[u32],
     ) -> Outcome {
         let found = SharedOutcome::default();
-        each((0..corners.count()).step_by(CHUNK).collect(), &|chunk: usize| {
+        each((0..corners.own()).step_by(CHUNK).collect(), &|chunk: usize| {
             let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
-            for first in (chunk..corners.count().min(chunk + CHUNK)).step_by(BLOCK) {
-                let count = BLOCK.min(corners.count() - first);
+            for first in (chunk..corners.own().min(chunk + CHUNK)).step_by(BLOCK) {
+                let count = BLOCK.min(corners.own() - first);
                 let ids = &successive(first)[..count];
                 let mut bins = [0; BLOCK];
                 bins[..count].copy_from_slice(&bin_of[first..first + count]);

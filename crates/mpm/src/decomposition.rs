@@ -3,10 +3,11 @@
 //! Bins are what sums go by, whoever holds them, so results have the same bits for any number of processes. A sort gives each
 //! particle to the process of its bin. Bins are cut where their particles are many, by whole bins.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use mmsmith_ranks::{Ranks, announce, exchange, share};
+use mmsmith_ranks::{Ranks, announce, exchange, gather, share};
 use nalgebra::RealField;
 
 use crate::error::{SetupError, StepError};
@@ -22,7 +23,7 @@ pub struct Share {
     pub ids: Vec<u64>,
 }
 
-/// Which particles a process holds.
+/// Which particles a process holds, each of which no other one does.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrangement<'a> {
     /// Their numbers in the whole body, ascending.
@@ -34,7 +35,10 @@ pub struct Arrangement<'a> {
 /// What a process knows of its part.
 pub(crate) struct Part {
     pub(crate) ranks: Arc<dyn Ranks>,
+    /// The numbers of the particles here, ascending.
     pub(crate) ids: Arc<Vec<u64>>,
+    /// Where some of these are here for corners that they share with others: those that this process holds.
+    pub(crate) own: Option<Own>,
     pub(crate) version: u64,
     /// The first bin of each process, and the number of bins.
     pub(crate) cuts: Vec<usize>,
@@ -42,16 +46,53 @@ pub(crate) struct Part {
     pub(crate) is_affine: bool,
 }
 
+/// Those of some particles that a process holds.
+pub(crate) struct Own {
+    /// Their places, ascending.
+    pub(crate) places: Vec<u32>,
+    /// Their numbers in the whole body.
+    pub(crate) ids: Arc<Vec<u64>>,
+}
+
 /// A cut is moved where a process has more particles than this share of the mean.
 pub(crate) const UNEVEN: f64 = 1.1;
 
 impl Part {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
-        Self { ranks, ids: Arc::new(ids), version: 0, cuts: Vec::new(), is_affine: false }
+        let ids = Arc::new(ids);
+        Self { ranks, ids, own: None, version: 0, cuts: Vec::new(), is_affine: false }
     }
 
     pub(crate) fn arrangement(&self) -> Arrangement<'_> {
-        Arrangement { ids: &self.ids, version: self.version }
+        let ids = self.own.as_ref().map_or(&self.ids, |own| &own.ids);
+        Arrangement { ids, version: self.version }
+    }
+
+    /// Cuts the bins anew where they are uneven, by the number of particles that this process has in each of them; gives the bins that
+    /// this process holds from now on. A call of all.
+    pub(crate) fn cut(&mut self, mut counts: Vec<u64>) -> Range<usize> {
+        let Self { ranks, cuts: known, .. } = self;
+        let bins = counts.len();
+        let all = gather(&**ranks, &counts);
+        let mut new: Vec<u64> = vec![0; ranks.count() + 1];
+        if ranks.rank() == 0 {
+            for (bin, count) in counts.iter_mut().enumerate() {
+                *count = all.iter().skip(bin).step_by(bins).sum();
+            }
+            let cuts = match known.as_slice() {
+                [_, ..] if unevenness(&counts, known) <= UNEVEN => known.clone(),
+                _ => cuts(&counts, ranks.count()),
+            };
+            new = cuts.into_iter().map(|cut| cut as u64).collect();
+        }
+        share(&**ranks, 0, &mut new);
+        *known = new.into_iter().map(|cut| cut as usize).collect();
+        known[ranks.rank()]..known[ranks.rank() + 1]
+    }
+
+    /// The process that holds a bin.
+    pub(crate) fn holder(&self, bin: usize) -> usize {
+        self.cuts.partition_point(|&cut| cut <= bin) - 1
     }
 
     /// The outcome of all processes; a failed particle has its number in the whole body.
@@ -132,6 +173,28 @@ pub(crate) fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
     most as f64 * (cuts.len() - 1) as f64 / total.max(1) as f64
 }
 
+/// Lists of elements, one of each particle.
+pub(crate) struct Lists<E> {
+    ends: Vec<usize>,
+    elements: Vec<E>,
+}
+
+impl<E: Copy> Lists<E> {
+    pub(crate) fn new<I: IntoIterator<Item = E>>(lists: impl Iterator<Item = I>) -> Self {
+        let mut all = Self { ends: Vec::new(), elements: Vec::new() };
+        for list in lists {
+            all.elements.extend(list);
+            all.ends.push(all.elements.len());
+        }
+        all
+    }
+
+    pub(crate) fn of(&self, p: usize) -> &[E] {
+        let start = if p == 0 { 0 } else { self.ends[p - 1] };
+        &self.elements[start..self.ends[p]]
+    }
+}
+
 /// Which elements go where, and in which order those that come are kept.
 pub(crate) struct Move {
     /// None where one process has all.
@@ -145,15 +208,17 @@ pub(crate) struct Move {
 }
 
 impl Move {
-    /// The move of particles `ids` to the processes `to(place)`, and the numbers of those that are here afterwards, ascending. A call of
-    /// all.
-    pub(crate) fn new(
+    /// The move of particles `ids` to the processes `to(place)`, to each of several or to none, and the numbers of those that are here
+    /// afterwards, ascending. A call of all.
+    pub(crate) fn new<I: IntoIterator<Item = usize>>(
         ranks: Option<&Arc<dyn Ranks>>,
         ids: &[u64],
-        to: impl Fn(usize) -> usize,
+        to: impl Fn(usize) -> I,
     ) -> (Self, Vec<u64>) {
         let mut out = vec![Vec::new(); ranks.map_or(1, |ranks| ranks.count())];
-        (0..ids.len()).for_each(|p| out[to(p)].push(p as u32));
+        for p in 0..ids.len() {
+            to(p).into_iter().for_each(|rank| out[rank].push(p as u32));
+        }
         let stay = std::mem::take(&mut out[ranks.map_or(0, |ranks| ranks.rank())]);
         let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
         let counts = ranks.map_or_else(|| vec![0], |ranks| announce(&**ranks, &lengths));
@@ -170,17 +235,46 @@ impl Move {
     }
 
     pub(crate) fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
-        let pick = |places: &Vec<u32>| places.iter().map(|&p| elements[p as usize]).collect();
-        let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
-        let others = match &self.ranks {
-            Some(ranks) => exchange(&**ranks, &out, &self.counts),
-            None => Vec::new(),
-        };
+        let others = self.coming(elements);
         let of = |&place: &u32| {
             let place = place as usize;
             *elements.get(place).unwrap_or_else(|| &others[place - elements.len()])
         };
         self.order.iter().map(of).collect()
+    }
+
+    /// The elements that come, in the order in which they do.
+    fn coming<E: Pod>(&self, elements: &[E]) -> Vec<E> {
+        let pick = |places: &Vec<u32>| places.iter().map(|&p| elements[p as usize]).collect();
+        let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
+        self.ranks.as_ref().map_or_else(Vec::new, |ranks| exchange(&**ranks, &out, &self.counts))
+    }
+
+    /// The lists of those that are here afterwards.
+    pub(crate) fn lists<E: Pod>(&self, lists: &Lists<E>) -> Lists<E> {
+        let here = lists.ends.len();
+        let lengths: Vec<u64> = (0..here).map(|p| lists.of(p).len() as u64).collect();
+        let coming = self.coming(&lengths);
+        let mut others = Lists { ends: Vec::with_capacity(coming.len()), elements: Vec::new() };
+        if let Some(ranks) = &self.ranks {
+            let pick = |places: &Vec<u32>| {
+                places.iter().flat_map(|&p| lists.of(p as usize)).copied().collect()
+            };
+            let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
+            let mut rest = coming.iter();
+            let of = |count: &usize| rest.by_ref().take(*count).sum::<u64>() as usize;
+            let counts: Vec<usize> = self.counts.iter().map(of).collect();
+            others.elements = exchange(&**ranks, &out, &counts);
+        }
+        let mut end = 0;
+        for length in coming {
+            end += length as usize;
+            others.ends.push(end);
+        }
+        Lists::new(self.order.iter().map(|&place| {
+            let place = place as usize;
+            if place < here { lists.of(place) } else { others.of(place - here) }.iter().copied()
+        }))
     }
 
     /// Number of particles here afterwards.

@@ -167,11 +167,9 @@ pub enum SetupError {
         /// The largest number that is of use.
         most: usize,
     },
-    /// Polygons that more than one process would hold.
-    #[error(
-        "particles that are polygons are simulated by one process; start one, or leave out --layout clipped"
-    )]
-    PolygonsOfOneProcess,
+    /// Polygons of a part of a body without their numbers in the whole.
+    #[error("the polygons of a process have no numbers in the whole body; take them by Body::part")]
+    NoNumbers,
     /// More particles than ids.
     #[error("{particles} particles are more than the supported {limit}")]
     TooManyParticles {

@@ -68,7 +68,9 @@ mod body;
 mod body_force;
 mod clip;
 mod corner_exchange;
+mod corner_halo;
 mod decomposition;
+mod directory;
 mod domain;
 mod error;
 #[doc(hidden)]
@@ -113,7 +115,7 @@ pub use grid::Grid;
 pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
 pub use particles::Particles;
-pub use polygons::{Faces, Load, Polygons};
+pub use polygons::{Faces, Load, Numbers, Polygons};
 pub use saved_state::{SavedState, SavedStateError};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;

@@ -25,6 +25,17 @@ pub struct Particles<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> Particles<T, D> {
+    /// Those at some places, in that order.
+    pub(crate) fn some(&self, places: &[u32]) -> Self {
+        fn of<E: Copy>(all: &[E], places: &[u32]) -> Vec<E> {
+            places.iter().map(|&place| all[place as usize]).collect()
+        }
+        let Self { X, x, v, F, mass, volume, half_size } = self;
+        let [X, x, v] = [X, x, v].map(|vectors| of(vectors, places));
+        let [mass, volume] = [mass, volume].map(|numbers| of(numbers, places));
+        Self { X, x, v, F: of(F, places), mass, volume, half_size: *half_size }
+    }
+
     /// A body of density `density` at rest and undeformed, on a square lattice with `per_cell` particles per cell and
     /// direction: those of the grid whose centre satisfies `inside`.
     ///

@@ -16,6 +16,7 @@
 //! normals in both: in `sum_p V_p grad N` it cancels, and the integral of `N n` over the boundary remains. That is the condition under
 //! which a constant stress gives no force inside (Chen, Wu, Yoon & You, IJNME 50 (2001) 435-466).
 
+pub(crate) mod part;
 mod polyhedra;
 
 use nalgebra::{RealField, SMatrix, SVector};
@@ -42,6 +43,17 @@ pub struct Polygons<T, const D: usize> {
     pub loads: Vec<Load<T, D>>,
     /// From the axes of the body to those of the grid, which is given in the latter; none where they are the same.
     pub turn: Option<SMatrix<T, D, D>>,
+    /// Where these are of some particles of a larger body: the numbers there.
+    pub numbers: Option<Numbers>,
+}
+
+/// The numbers that corners and loads of a part have in the whole body.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Numbers {
+    /// Of the corners.
+    pub corners: Vec<u64>,
+    /// Of the loads, ascending.
+    pub loads: Vec<u64>,
 }
 
 /// The faces of polyhedra.
@@ -67,6 +79,8 @@ pub struct Load<T, const D: usize> {
     pub corners: [u32; D],
     /// The share of the edge or triangle with which it acts on each of these corners.
     pub shares: [T; D],
+    /// Its reference position.
+    pub X: SVector<T, D>,
 }
 
 impl<T: RealField + Copy, const D: usize> Load<T, D> {
@@ -100,10 +114,11 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         if !(2..=3).contains(&D) {
             return Err(SetupError::PolygonDimension { dimension: D });
         }
-        let Self { X, x, corners, ends, of_particles, faces, loads, .. } = self;
+        let Self { X, x, corners, ends, of_particles, faces, loads, numbers, .. } = self;
         let is_rising = |ends: &[u32], last: usize| {
             ends.is_sorted() && ends.last().map_or(0, |end| *end as usize) == last
         };
+        let numbers = numbers.as_ref();
         // None where the ends of the parts do not fit.
         let parts = |ends: &[u32], parts: usize| parts * usize::from(is_rising(ends, parts));
         let polyhedra = if D == 3 { ends.len() } else { 0 };
@@ -115,6 +130,12 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
             ("of_polyhedra", faces.of_polyhedra.len(), polyhedra),
             ("ends of faces", parts(&faces.of_polyhedra, faces.ends.len()), faces.ends.len()),
             ("corners of faces", parts(&faces.ends, faces.corners.len()), faces.corners.len()),
+            ("numbers of the corners", numbers.map_or(X.len(), |own| own.corners.len()), X.len()),
+            (
+                "numbers of the loads",
+                numbers.map_or(loads.len(), |own| own.loads.len()),
+                loads.len(),
+            ),
         ] {
             if found != expected {
                 return Err(SetupError::LengthMismatch { array, found, expected });

@@ -1,15 +1,16 @@
 //! Particles go to the process of their bin.
 
+mod polygons;
+
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::cast_slice;
-use mmsmith_ranks::{gather, share};
 use nalgebra::{SMatrix, SVector};
 
 use crate::body::Mesh;
-use crate::decomposition::{Move, UNEVEN, cuts, unevenness};
+use crate::decomposition::Move;
 use crate::domain::HalfEdges;
 use crate::node::Node;
 use crate::parallel::coloring::Held;
@@ -19,49 +20,38 @@ use crate::state::State;
 use crate::support::Support;
 
 impl<T: Lanes, const D: usize> State<T, D> {
-    /// Gives every particle to the process of the bin that it is in now.
-    pub(crate) fn redistribute(&mut self) {
-        if self.part.is_none() {
-            return;
-        }
-        let Self { particles: Particles { x, F, .. }, constants, layout, bins, support, .. } = self;
-        let rows = bins.rows();
-        let first_node = |p| support.first_node(constants, p, &x[p], &F[p]);
-        let bin_of: Vec<usize> =
-            (0..x.len()).map(|p| rows.bin_of(first_node(p) / layout.row())).collect();
-        self.give_to_bins(&bin_of);
-    }
-
-    /// Gives every particle to the process of its bin `bin_of[particle]`, and tells how they move. Does nothing where this process has
-    /// all.
-    pub(crate) fn give_to_bins(&mut self, bin_of: &[usize]) -> Option<Move> {
-        let part = self.part.as_mut()?;
-        let ranks = part.ranks.clone();
-        let bins = self.bins.rows().count();
-        let mut counts = vec![0_u64; bins];
-        bin_of.iter().for_each(|&bin| counts[bin] += 1);
-        let all = gather(&*ranks, &counts);
-        let mut new: Vec<u64> = vec![0; ranks.count() + 1];
-        if ranks.rank() == 0 {
-            for (bin, count) in counts.iter_mut().enumerate() {
-                *count = all.iter().skip(bin).step_by(bins).sum();
-            }
-            let cuts = match part.cuts.as_slice() {
-                [_, ..] if unevenness(&counts, &part.cuts) <= UNEVEN => part.cuts.clone(),
-                _ => cuts(&counts, ranks.count()),
+    /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,
+    /// or of each corner of their polygons.
+    pub(crate) fn sort_as(&mut self, mut keys: Vec<u32>) {
+        if self.part.is_some() {
+            keys = match self.support {
+                Support::Polygons(_) => self.give_polygons(&keys),
+                _ => self.give_to_bins(keys),
             };
-            new = cuts.into_iter().map(|cut| cut as u64).collect();
         }
-        share(&*ranks, 0, &mut new);
-        let cuts: Vec<usize> = new.into_iter().map(|cut| cut as usize).collect();
-        part.cuts.clone_from(&cuts);
-        let moved = self.give(|p| cuts.partition_point(|&cut| cut <= bin_of[p]) - 1);
-        self.hold(cuts[ranks.rank()]..cuts[ranks.rank() + 1]);
-        moved
+        self.bins.sort_as(keys);
     }
 
-    /// Gives every particle to the process `to(particle)`, and tells how they move.
-    pub(crate) fn give(&mut self, to: impl Fn(usize) -> usize) -> Option<Move> {
+    /// Gives every particle to the process of its bin. Gives the sub-bins of those that are here then.
+    fn give_to_bins(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
+        let bins: Vec<usize> = keys.iter().map(|&key| self.bins.bin_of_key(key)).collect();
+        let mut counts = vec![0_u64; self.bins.rows().count()];
+        bins.iter().for_each(|&bin| counts[bin] += 1);
+        let Some(part) = &mut self.part else { return keys };
+        let own = part.cut(counts);
+        let holders: Vec<usize> = bins.into_iter().map(|bin| part.holder(bin)).collect();
+        if let Some(moved) = self.give(|p| Some(holders[p])) {
+            moved.replace(&mut keys);
+        }
+        self.hold(own, keys.len());
+        keys
+    }
+
+    /// Gives every particle to the processes `to(particle)`, and tells how they move; polygons stay.
+    pub(crate) fn give<I: IntoIterator<Item = usize>>(
+        &mut self,
+        to: impl Fn(usize) -> I,
+    ) -> Option<Move> {
         let Self { particles, support, part, .. } = self;
         let part = part.as_mut()?;
         let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
@@ -95,13 +85,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         Some(moved)
     }
 
-    /// Makes room for the bins `own` with the particles that are here, and for the rows that those reach.
-    fn hold(&mut self, own: Range<usize>) {
-        let Self { particles, constants, layout, bins, .. } = self;
+    /// Makes room for the bins `own`, with so many particles or corners, and for the rows that those reach.
+    fn hold(&mut self, own: Range<usize>, points: usize) {
+        let Self { constants, layout, bins, .. } = self;
         let rows = bins.rows();
         let held = Held { bands: own, all: rows.count() };
         let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
-        bins.hold(held, particles.len());
+        bins.hold(held, points);
         if rows == layout.rows() {
             return;
         }

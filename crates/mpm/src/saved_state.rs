@@ -10,6 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
 use crate::decomposition::Move;
+use crate::directory::Directory;
 use crate::particles::Particles;
 use crate::simd::Lanes;
 use crate::simulation::Simulation;
@@ -86,15 +87,29 @@ struct Saved<T, const D: usize> {
     v: Vec<SVector<T, D>>,
     F: Vec<SMatrix<T, D, D>>,
     affine: Vec<SMatrix<T, D, D>>,
-    /// The first, second, ... corner of each particle.
+    /// Cells: the first, second, ... corner of each particle.
     corners: Vec<Vec<SVector<T, D>>>,
+    /// Polygons: the numbers of the corners that have the keys.
+    corner_ids: Vec<u64>,
+    /// Polygons: their positions.
+    corner_x: Vec<SVector<T, D>>,
 }
 
 /// What the particles of a scheme have.
 #[derive(Clone, Copy)]
 struct Kind {
     is_affine: bool,
-    has_corners: bool,
+    corners: Corners,
+}
+
+/// What corners particles have that belong to the state.
+#[derive(Clone, Copy, PartialEq)]
+enum Corners {
+    None,
+    /// Those of cells, an array of places a particle.
+    OfCells,
+    /// Those of polygons. Keys are theirs: those of the first ones, which one process alone has.
+    OfPolygons,
 }
 
 /// The elements of a saved array, which are as many as `count`.
@@ -120,40 +135,62 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
             F: Vec::new(),
             affine: Vec::new(),
             corners: vec![Vec::new(); 1 << D],
+            corner_ids: Vec::new(),
+            corner_x: Vec::new(),
         };
         parts.into_iter().try_for_each(|part| saved.add(part))?;
         Ok(saved)
     }
 
     fn add(&mut self, part: SavedState) -> Result<(), SavedStateError> {
-        let Kind { is_affine, has_corners } = self.kind;
-        let (found, expected) = (part.len(), if has_corners { 9 } else { 7 });
+        let Kind { is_affine, corners } = self.kind;
+        let (found, expected) = (part.len(), if corners == Corners::None { 7 } else { 9 });
         if found != expected {
             return Err(SavedStateError::Arrays { found, expected });
         }
         let mut arrays = part.into_iter();
         let mut next = || arrays.next().unwrap_or_default();
         self.steps_done = elements(next(), 1)?[0];
-        let (ids, keys) = (next(), next());
-        let count = keys.len() / size_of::<u32>();
+        let (ids, keys, x) = (next(), next(), next());
+        let count = x.len() / size_of::<SVector<T, D>>();
         // Where one process had all, numbers are places.
-        let ids = if ids.is_empty() { (0..count as u64).collect() } else { elements(ids, count)? };
-        self.ids.extend(ids);
-        self.keys.extend(elements::<u32>(keys, count)?);
-        self.x.extend(elements::<SVector<T, D>>(next(), count)?);
+        let numbers = |ids: Vec<u8>, count: usize| {
+            if ids.is_empty() { Ok((0..count as u64).collect()) } else { elements(ids, count) }
+        };
+        self.ids.extend(numbers(ids, count)?);
+        self.x.extend(elements::<SVector<T, D>>(x, count)?);
         self.v.extend(elements::<SVector<T, D>>(next(), count)?);
         self.F.extend(elements::<SMatrix<T, D, D>>(next(), count)?);
         let affine = if is_affine { count } else { 0 };
         self.affine.extend(elements::<SMatrix<T, D, D>>(next(), affine)?);
-        if has_corners {
-            let x = next();
-            let corners = x.len() / size_of::<SVector<T, D>>();
-            let x: Vec<SVector<T, D>> = elements(x, corners)?;
-            let of_particles: Vec<[u32; 8]> = elements(next(), count)?;
-            for (corner, positions) in self.corners.iter_mut().enumerate() {
-                for own in &of_particles {
-                    positions.push(*x.get(own[corner] as usize).ok_or(SavedStateError::Place)?);
+        let keyed = match corners {
+            Corners::None | Corners::OfCells => count,
+            Corners::OfPolygons => keys.len() / size_of::<u32>(),
+        };
+        self.keys.extend(elements::<u32>(keys, keyed)?);
+        match corners {
+            Corners::None => {}
+            Corners::OfCells => {
+                let x = next();
+                let corners = x.len() / size_of::<SVector<T, D>>();
+                let x: Vec<SVector<T, D>> = elements(x, corners)?;
+                let of_particles: Vec<[u32; 8]> = elements(next(), count)?;
+                for (corner, positions) in self.corners.iter_mut().enumerate() {
+                    for own in &of_particles {
+                        let x = x.get(own[corner] as usize).ok_or(SavedStateError::Place)?;
+                        positions.push(*x);
+                    }
                 }
+            }
+            Corners::OfPolygons => {
+                let (x, ids) = (next(), next());
+                let corners = x.len() / size_of::<SVector<T, D>>();
+                let (x, ids) = (elements::<SVector<T, D>>(x, corners)?, numbers(ids, corners)?);
+                if keyed > corners {
+                    return Err(SavedStateError::Place);
+                }
+                self.corner_x.extend(&x[..keyed]);
+                self.corner_ids.extend(&ids[..keyed]);
             }
         }
         Ok(())
@@ -167,7 +204,7 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
         if self.kind.is_affine {
             moved.replace(&mut self.affine);
         }
-        if self.kind.has_corners {
+        if self.kind.corners == Corners::OfCells {
             self.corners.iter_mut().for_each(|positions| moved.replace(positions));
         }
     }
@@ -185,7 +222,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
             Support::Cpdi2 { mesh, .. } => {
                 arrays.extend([cast_slice(&mesh.x), cast_slice(&mesh.corners)]);
             }
-            Support::Polygons(corners) => arrays.push(cast_slice(&corners.polygons.x)),
+            Support::Polygons(corners) => {
+                let numbers = corners.polygons.numbers.as_ref();
+                let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
+                arrays.extend([cast_slice(&corners.polygons.x), cast_slice(numbers)]);
+            }
             Support::Product(_) | Support::Cpdi { .. } => {}
         }
         arrays
@@ -202,24 +243,43 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
         let kind = Kind {
             is_affine: self.transfer.is_affine(),
-            has_corners: matches!(self.support, Support::Cpdi2 { .. }),
+            corners: match self.support {
+                Support::Product(_) | Support::Cpdi { .. } => Corners::None,
+                Support::Cpdi2 { .. } => Corners::OfCells,
+                Support::Polygons(_) => Corners::OfPolygons,
+            },
         };
-        let mut saved = self.agreed(Saved::of_parts(parts, kind))?;
+        let saved = self.agreed(Saved::of_parts(parts, kind))?;
+        let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
+        self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
+        let steps_done = saved.steps_done as u64;
+        // Those that have read no part do not know it.
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let steps_done = ranks.as_ref().map_or(steps_done, |ranks| ranks.largest(steps_done));
+        let keys = match self.support {
+            Support::Polygons(_) => self.put_polygons(saved)?,
+            _ => self.put_particles(saved)?,
+        };
+        self.sort_as(keys);
+        Ok(steps_done as usize)
+    }
+
+    /// Puts particles in place that do not share corners, at processes that follow from their numbers. Gives their keys.
+    fn put_particles(&mut self, mut saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
         // No process knows where another one keeps a particle, and all know where it goes for the time being.
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let here = self.particles.len() as u64;
         let (processes, all) =
             ranks.as_ref().map_or((1, here), |ranks| (ranks.count(), total(&**ranks, here)));
-        let is_known = saved.ids.iter().all(|&id| id < all)
-            && saved.keys.iter().all(|&key| self.bins.bin_of_key(key).is_some());
+        let is_known = saved.ids.iter().all(|&id| id < all);
         self.agreed(if is_known { Ok(()) } else { Err(SavedStateError::Particles) })?;
         let per_process = all.div_ceil(processes as u64).max(1);
         let home = |id: u64| (id / per_process) as usize;
         if let Some(part) = &self.part {
             let ids = part.ids.clone();
-            self.give(|p| home(ids[p]));
+            self.give(|p| Some(home(ids[p])));
         }
-        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, |p| home(saved.ids[p]));
+        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, |p| Some(home(saved.ids[p])));
         saved.follow(&moved);
         let is_whole = match &self.part {
             Some(part) => ids == *part.ids,
@@ -227,7 +287,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         };
         self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
 
-        let Saved { steps_done, mut keys, x, v, F, affine, corners, .. } = saved;
+        let Saved { keys, x, v, F, affine, corners, .. } = saved;
         (self.particles.x, self.particles.v, self.particles.F) = (x, v, F);
         self.affine = affine;
         if let Support::Cpdi2 { mesh, next } = &mut self.support {
@@ -238,30 +298,35 @@ impl<T: Lanes, const D: usize> State<T, D> {
             }
             next.clone_from(&mesh.x);
         }
-        let bin_of = |key| self.bins.bin_of_key(key).unwrap_or(0);
-        let bins: Vec<usize> = keys.iter().map(|&key| bin_of(key)).collect();
-        if let Some(moved) = self.give_to_bins(&bins) {
-            moved.replace(&mut keys);
-        }
-        self.bins.sort_as(&keys);
-        // Those that have read no part do not know it.
-        Ok(ranks.map_or(steps_done, |ranks| ranks.largest(steps_done as u64) as usize))
+        Ok(keys)
     }
 
-    /// The same for polygons, which one process has as a whole.
-    fn take_up_polygons(&mut self, parts: &[SavedState]) -> Result<usize, SavedStateError> {
-        let Support::Polygons(corners) = &mut self.support else { return Ok(0) };
-        let Self { particles: Particles { x, v, F, .. }, affine, bins, .. } = self;
-        let (mut steps_done, mut keys) = ([0_usize], bins.keys().to_vec());
-        let mut state = vec![cast_slice_mut(&mut steps_done), &mut [], cast_slice_mut(&mut keys)];
-        state.extend([cast_slice_mut(x), cast_slice_mut(v), cast_slice_mut(F)]);
-        state.extend([cast_slice_mut(affine), cast_slice_mut(corners.positions())]);
-        replace_whole(&mut state, parts)?;
-        if keys.iter().any(|&key| bins.bin_of_key(key).is_none()) {
-            return Err(SavedStateError::Place);
+    /// Puts polygons in place, where they are. Gives the keys of their corners.
+    fn put_polygons(&mut self, saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
+        let Support::Polygons(corners) = &self.support else { return Ok(Vec::new()) };
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let ids = match &self.part {
+            Some(part) => part.ids.to_vec(),
+            None => (0..self.particles.len() as u64).collect(),
+        };
+        let numbers: Vec<u64> =
+            (0..corners.count()).map(|corner| corners.polygons.number(corner)).collect();
+        let particles = Directory::new(ranks.as_ref(), &saved.ids).ask(&ids);
+        let points = Directory::new(ranks.as_ref(), &saved.corner_ids).ask(&numbers);
+        // All processes ask before one of them gives up.
+        let is_whole = particles.is_whole && points.is_whole && points.is_unique;
+        self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
+        self.particles.x = particles.fetch(&saved.x);
+        self.particles.v = particles.fetch(&saved.v);
+        self.particles.F = particles.fetch(&saved.F);
+        if self.transfer.is_affine() {
+            self.affine = particles.fetch(&saved.affine);
         }
-        bins.sort_as(&keys);
-        Ok(steps_done[0])
+        let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
+        if let Support::Polygons(corners) = &mut self.support {
+            corners.positions().copy_from_slice(&x);
+        }
+        Ok(keys)
     }
 }
 
@@ -282,10 +347,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
         // The grid no longer belongs to the particles.
         self.state.is_ahead = false;
-        self.steps_done = match self.state.support {
-            Support::Polygons(_) => self.state.take_up_polygons(&parts)?,
-            _ => self.state.take_up(parts)?,
-        };
+        self.steps_done = self.state.take_up(parts)?;
         self.failed = None;
         Ok(())
     }

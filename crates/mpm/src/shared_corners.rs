@@ -2,6 +2,7 @@
 
 use nalgebra::SVector;
 
+use crate::corner_halo::CornerHalo;
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::node::Node;
@@ -31,6 +32,10 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     ends: Vec<u32>,
     /// The shape function at a corner, by which it reaches nodes.
     pub(crate) at_corner: ProductShape<T, D>,
+    /// How many corners this process sorts: the first ones.
+    own: usize,
+    /// Where the others are.
+    pub(crate) halo: Option<CornerHalo>,
 }
 
 /// A place in the list of corners, and the particle that it belongs to.
@@ -42,6 +47,16 @@ pub(crate) struct Place {
 
 impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     pub(crate) fn new(polygons: Polygons<T, D>, at_corner: ProductShape<T, D>) -> Self {
+        let own = polygons.X.len();
+        Self::of_part(polygons, at_corner, (own, None))
+    }
+
+    /// Where this process sorts the first `own` corners, and others do the rest.
+    pub(crate) fn of_part(
+        polygons: Polygons<T, D>,
+        at_corner: ProductShape<T, D>,
+        (own, halo): (usize, Option<CornerHalo>),
+    ) -> Self {
         let mut places = vec![Place { share: 0, particle: 0 }; polygons.corners.len()];
         let mut ends = vec![0; polygons.X.len() + 1];
         for &corner in &polygons.corners {
@@ -62,7 +77,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         let share = Share { corner: 0, w: T::zero(), g: [T::zero(); D] };
         let mut shares = vec![share; polygons.corners.len()];
         (0..particles).for_each(|p| polygons.means(p, &mut shares[polygons.places(p)]));
-        let mut own = Self {
+        let mut all = Self {
             next: polygons.x.clone(),
             is_measured: false,
             shares,
@@ -71,9 +86,11 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             ends,
             at_corner,
             polygons,
+            own,
+            halo,
         };
-        own.measure();
-        own
+        all.measure();
+        all
     }
 
     /// The positions, which the caller may overwrite.
@@ -131,6 +148,11 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     /// Number of corners.
     pub(crate) fn count(&self) -> usize {
         self.polygons.x.len()
+    }
+
+    /// Number of corners that this process sorts: the first ones.
+    pub(crate) fn own(&self) -> usize {
+        self.own
     }
 
     /// A corner's position along the axes of the grid.

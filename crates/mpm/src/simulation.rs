@@ -36,6 +36,8 @@ pub struct Simulation<T, const D: usize> {
     pub(crate) state: State<T, D>,
     pub(crate) steps_done: usize,
     pub(crate) failed: Option<StepError>,
+    /// Buffer for the particles that this process holds, where others are here as well.
+    own: Option<Particles<T, D>>,
 }
 
 /// Numbers whose steps are compiled with this crate: `f64` and `f32`.
@@ -109,7 +111,7 @@ impl<T: Simulated<D>, const D: usize> Simulation<T, D> {
     /// # Errors
     ///
     /// As [`new`](Self::new), at all processes alike where a particle's state is the reason; [`SetupError::TooManyRanks`], and
-    /// [`SetupError::PolygonsOfOneProcess`].
+    /// [`SetupError::NoNumbers`].
     pub fn shared_out(
         grid: Grid<T, D>,
         body: impl Into<Body<T, D>>,
@@ -164,7 +166,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         state.sort();
         state.start_affine();
-        Ok(Self { grid, law, settings, state, steps_done: 0, failed: None })
+        Ok(Self { grid, law, settings, state, steps_done: 0, failed: None, own: None })
     }
 
     /// See [`step`](Self::step).
@@ -191,9 +193,26 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         Ok(())
     }
 
-    /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag).
+    /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag). With polygons and several
+    /// processes these are also the particles of others that share corners with this one's; see [`own_particles`](Self::own_particles).
     pub fn particles(&self) -> &Particles<T, D> {
         &self.state.particles
+    }
+
+    /// The particles that this process alone holds, those of its [`arrangement`](Self::arrangement): all
+    /// [`particles`](Self::particles), but for polygons of several processes.
+    pub fn own_particles(&mut self) -> &Particles<T, D> {
+        self.observed().0
+    }
+
+    /// These, and their law.
+    pub(crate) fn observed(&mut self) -> (&Particles<T, D>, &Law<T, D>) {
+        let Self { state: State { particles, part, .. }, own: buffer, law, .. } = self;
+        let own = match part.as_ref().and_then(|part| part.own.as_ref()) {
+            Some(own) => buffer.insert(particles.some(&own.places)),
+            None => particles,
+        };
+        (own, law)
     }
 
     /// Which particles this process holds, where there are several.
@@ -332,8 +351,8 @@ fn check<T: Lanes, const D: usize>(
             return Err(SetupError::LengthMismatch { array, found, expected });
         }
     }
-    if share.is_some() && polygons.is_some() {
-        return Err(SetupError::PolygonsOfOneProcess);
+    if share.is_some() && polygons.as_ref().is_some_and(|own| own.numbers.is_none()) {
+        return Err(SetupError::NoNumbers);
     }
     if expected == 0 && share.is_none() {
         return Err(SetupError::NoParticles);

@@ -20,11 +20,14 @@ pub trait Solver<T, const D: usize> {
     /// See [`Simulation::step`].
     fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError>;
 
-    /// The particles as they are now, and their law.
+    /// The particles that this process holds as they are now, and their law.
     fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>);
 
     /// Which particles this process holds, where there are several.
     fn arrangement(&self) -> Option<Arrangement<'_>>;
+
+    /// The reference positions at which a step evaluates the body force, in the order of the numbers by which it does.
+    fn forced(&self) -> &[SVector<T, D>];
 
     /// How far velocities lag behind positions, a time.
     fn velocity_lag(&self) -> T;
@@ -46,11 +49,15 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
     }
 
     fn observe(&mut self) -> (&Particles<T, D>, &Law<T, D>) {
-        (self.particles(), self.law())
+        self.observed()
     }
 
     fn arrangement(&self) -> Option<Arrangement<'_>> {
         Simulation::arrangement(self)
+    }
+
+    fn forced(&self) -> &[SVector<T, D>] {
+        &self.particles().X
     }
 
     fn velocity_lag(&self) -> T {
@@ -147,6 +154,10 @@ macro_rules! driven {
 
             fn arrangement(&self) -> Option<Arrangement<'_>> {
                 None
+            }
+
+            fn forced(&self) -> &[SVector<f64, $D>] {
+                &self.body.particles().X
             }
 
             fn velocity_lag(&self) -> f64 {

@@ -68,13 +68,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Sorts the particles into bins, those of other processes too.
     pub(crate) fn sort(&mut self) {
-        self.redistribute();
         let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
-        if let Support::Polygons(corners) = support {
-            bins.sort(layout, &|corner| exchange.first_node(c, corners, corner));
-            return;
-        }
         let Particles { x, F, .. } = &*particles;
-        bins.sort(layout, &|p| support.first_node(c, p, &x[p], &F[p]));
+        let keys = match support {
+            Support::Polygons(corners) => bins.keys_of(layout, corners.count(), &|corner| {
+                exchange.first_node(c, corners, corner)
+            }),
+            _ => bins.keys_of(layout, x.len(), &|p| support.first_node(c, p, &x[p], &F[p])),
+        };
+        self.sort_as(keys);
     }
 }

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{AtTime, BodyForce, SavedState, SavedStateError, Solver, StepError};
+use mmsmith_mpm::{AtTime, BodyForce, Load, SavedState, SavedStateError, Solver, StepError};
 use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
@@ -71,22 +71,17 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
         f64: Precision<D>,
     {
         let time_step: T = Real::nearest(time_step);
-        let (mut solver, loaded) = match &case.scheme {
+        let mut solver: Box<dyn Solver<T, D> + 'a> = match &case.scheme {
             Scheme::Updated(updated) => {
-                let set_up =
-                    updated::set_up(exact, model, updated, case, scene, (time_step, ranks))?;
-                let solver: Box<dyn Solver<T, D>> = set_up.solver;
-                (solver, set_up.loaded)
+                updated::set_up(exact, model, updated, case, scene, (time_step, ranks))?
             }
             Scheme::Total(_) if ranks.is_some() => {
                 let instead = "updated-lagrangian, or start one process";
                 return Err(CaseError::setting("formulation", "total-lagrangian", instead));
             }
-            Scheme::Total(total) => {
-                (total::set_up(exact, total, case, scene, time_step)?, Vec::new())
-            }
+            Scheme::Total(total) => total::set_up(exact, total, case, scene, time_step)?,
         };
-        let body_force = ExactBodyForce::new(model, &solver.observe().0.X, loaded, ranks);
+        let body_force = ExactBodyForce::new(model, solver.as_mut(), ranks);
         Ok(Self { solver, body_force, dt: time_step.to_f64() })
     }
 }
@@ -154,8 +149,6 @@ fn is_lattice<T: Real, const D: usize>(ranks: &dyn Ranks, X: &[SVector<T, D>]) -
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
     model: &'a dyn Solution<T, D>,
-    /// Reference positions of points of the boundary with the exact stress, in the updated frame.
-    loaded: Vec<SVector<T, D>>,
     planted: Planted,
     /// Where several processes hold the particles, whether all of them make a lattice.
     is_lattice: Option<bool>,
@@ -166,14 +159,15 @@ struct ExactBodyForce<'a, T: Real, const D: usize> {
 impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
     fn new(
         model: &'a dyn Solution<T, D>,
-        X: &[SVector<T, D>],
-        loaded: Vec<SVector<T, D>>,
+        solver: &mut (dyn Solver<T, D> + 'a),
         ranks: Option<&Arc<dyn Ranks>>,
     ) -> Self {
         let planted = Planted::here();
-        let is_lattice = ranks.map(|ranks| model.has_form_on_lattice() && is_lattice(&**ranks, X));
-        let kept = Self::keep(model, X, is_lattice);
-        Self { kept, model, loaded, planted, is_lattice, version: None }
+        let is_lattice = ranks.map(|ranks| {
+            model.has_form_on_lattice() && is_lattice(&**ranks, &solver.observe().0.X)
+        });
+        let kept = Self::keep(model, solver.forced(), is_lattice);
+        Self { kept, model, planted, is_lattice, version: None }
     }
 
     /// What is kept of particles that started at `X`. Those of one process may make a lattice where all do not, and the other way
@@ -196,7 +190,7 @@ impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
         let version = solver.arrangement().map(|found| found.version);
         if version != self.version {
             self.version = version;
-            self.kept = Self::keep(self.model, &solver.observe().0.X, self.is_lattice);
+            self.kept = Self::keep(self.model, solver.forced(), self.is_lattice);
         }
     }
 }
@@ -214,8 +208,8 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
         self.kept.of_time(t, values);
     }
 
-    fn boundary_stress(&self, t: T, stress: &mut [SMatrix<T, D, D>]) {
-        for (stress, X) in stress.iter_mut().zip(&self.loaded) {
+    fn boundary_stress(&self, loads: &[Load<T, D>], t: T, stress: &mut [SMatrix<T, D, D>]) {
+        for (stress, Load { X, .. }) in stress.iter_mut().zip(loads) {
             let F = self.model.deformation_gradient(X, t);
             *stress =
                 self.model.first_piola_kirchhoff(X, t) * F.transpose() / self.model.jacobian(X, t);

@@ -5,10 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_mpm::{
-    Annulus, Body, Clip, Facet, Load, Particles, Settings, SetupError, Shape, Share, Side,
-    Simulation, Solver,
+    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Share, Side, Simulation, Solver,
 };
-use mmsmith_ranks::Ranks;
+use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
@@ -60,20 +59,19 @@ pub(crate) fn bytes_expected<const D: usize>(
         + scalar as f64 * (particles * (of_shape + of_transfer) as f64 + nodes * of_node as f64)
 }
 
-/// A body that a lattice clipped with its boundary makes, at rest, and the reference positions where a traction acts on it.
+/// A body that a lattice clipped with its boundary makes, at rest.
 fn clipped<T: Real, const D: usize>(
     scene: &Scene<D>,
     placement: Placement,
     per_cell: usize,
     density: f64,
-) -> Result<(Body<T, D>, Vec<SVector<T, D>>), CaseError> {
+) -> Result<Body<T, D>, CaseError> {
     let clip = Clip {
         sides: scene.boundary.iter().map(|part| part.side).collect(),
         turn: scene.turn,
         offset: placement.offset(),
     };
     let (mut body, facets) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
-    let mut points = Vec::new();
     if let Some(polygons) = &mut body.polygons {
         let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
         for (a, walls) in scene.walls.iter().enumerate() {
@@ -92,13 +90,13 @@ fn clipped<T: Real, const D: usize>(
             }
             let ends = corners.map(|corner| polygons.X[corner as usize].map(Real::to_f64));
             for (X, shares) in load_points(part.side, ends) {
-                polygons.loads.push(Load { corners, shares: shares.map(Real::nearest) });
-                points.push(X.map(Real::nearest));
+                let (X, shares) = (X.map(Real::nearest), shares.map(Real::nearest));
+                polygons.loads.push(Load { corners, shares, X });
             }
         }
         polygons.x.clone_from(&polygons.X);
     }
-    Ok((body, points))
+    Ok(body)
 }
 
 /// The points of an edge or a triangle between corners of a side at which loads act, with the shares that they give to each corner: two
@@ -126,38 +124,23 @@ fn load_points<const D: usize>(
     weights.into_iter().map(of_point).collect()
 }
 
-/// The particles of a body, in the order of their numbers, that a process begins with: as many as each other one does.
-fn born_here<const D: usize>(
-    scene: &Scene<D>,
-    updated: &Updated,
-    case: &Case,
-    ranks: &Arc<dyn Ranks>,
-) -> Result<Share, CaseError> {
-    let count = match (updated.placement, &scene.domain) {
-        (Placement::Clipped { .. }, _) => {
-            return Err(SetupError::PolygonsOfOneProcess.into());
-        }
-        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
-            let quarter = scene.extent() == Some(Extent::Quarter);
-            let ring = Annulus { inner, outer, quarter };
-            Body::<f64, D>::annulus(&ring, scene.spacing, case.per_cell, 1.0)?.particles.len()
-        }
-        (placement, _) => {
-            let inside = scene.inside(case.per_cell, placement.offset());
-            let count = Cell::new(0);
-            let none = Particles::<f64, D>::lattice(&scene.grid(), case.per_cell, 1.0, |X| {
-                count.set(count.get() + usize::from(inside(X)));
-                false
-            });
-            count.get() + none.len()
-        }
-    };
-    if count == 0 {
-        return Err(SceneError::Empty { cells: case.cells }.into());
-    }
+/// The share of a body of `count` particles that a process begins with: as many as each other one does, in the order of their numbers.
+fn share_of(count: usize, ranks: &Arc<dyn Ranks>) -> Share {
     let first = |rank: usize| (count * rank / ranks.count()) as u64;
     let ids = (first(ranks.rank())..first(ranks.rank() + 1)).collect();
-    Ok(Share { ranks: ranks.clone(), ids })
+    Share { ranks: ranks.clone(), ids }
+}
+
+/// The number of particles of a lattice in a body.
+fn count_lattice<const D: usize>(scene: &Scene<D>, per_cell: usize, offset: f64) -> usize {
+    let inside = scene.inside(per_cell, offset);
+    let count = Cell::new(0);
+    // None is kept.
+    let _ = Particles::<f64, D>::lattice(&scene.grid(), per_cell, 1.0, |X| {
+        count.set(count.get() + usize::from(inside(X)));
+        false
+    });
+    count.get()
 }
 
 /// The numbers of the particles of a share, which follow each other.
@@ -166,30 +149,38 @@ fn numbers(share: &Share) -> Range<usize> {
     first..first + share.ids.len()
 }
 
-/// The body of a case at rest in the reference configuration, or the share of it that a process begins with.
+/// The body of a case at rest in the reference configuration; where there are several processes, the share of it that this one begins
+/// with.
 fn body<T: Real, const D: usize>(
     scene: &Scene<D>,
     updated: &Updated,
     per_cell: usize,
     density: f64,
-    share: Option<&Share>,
-) -> Result<Body<T, D>, CaseError> {
-    let (grid, density) = (scene.grid::<T>(), T::nearest(density));
+    ranks: Option<&Arc<dyn Ranks>>,
+) -> Result<(Body<T, D>, Option<Share>), CaseError> {
+    let part = |whole: Body<T, D>| match ranks {
+        None => (whole, None),
+        Some(ranks) => {
+            let share = share_of(whole.particles.len(), ranks);
+            (whole.part(&numbers(&share)), Some(share))
+        }
+    };
+    let (grid, exact_density, density) = (scene.grid::<T>(), density, T::nearest(density));
     let offset = match (updated.placement, &scene.domain) {
         (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
             let quarter = scene.extent() == Some(Extent::Quarter);
             let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
-            let whole = Body::annulus(&ring, grid.spacing, per_cell, density)?;
-            return Ok(match share {
-                None => whole,
-                Some(share) => whole.part(&numbers(share)),
-            });
+            return Ok(part(Body::annulus(&ring, grid.spacing, per_cell, density)?));
+        }
+        (placement @ Placement::Clipped { .. }, _) => {
+            return Ok(part(clipped(scene, placement, per_cell, exact_density)?));
         }
         (placement, _) => placement.offset(),
     };
+    let share = ranks.map(|ranks| share_of(count_lattice(scene, per_cell, offset), ranks));
     let inside = scene.inside(per_cell, offset);
     let next = Cell::new(0);
-    let own = share.map(numbers);
+    let own = share.as_ref().map(numbers);
     let inside = |X: &SVector<T, D>| {
         let is_inside = inside(X);
         let number = next.replace(next.get() + usize::from(is_inside));
@@ -208,14 +199,7 @@ fn body<T: Real, const D: usize>(
             mesh.X.iter_mut().chain(&mut mesh.x).for_each(|place| *place += shift);
         }
     }
-    Ok(body)
-}
-
-/// A simulation at time zero.
-pub(crate) struct SetUp<T, const D: usize> {
-    pub(crate) solver: Box<dyn Solver<T, D>>,
-    /// The reference positions of the points of the boundary where a traction acts.
-    pub(crate) loaded: Vec<SVector<T, D>>,
+    Ok((body, share))
 }
 
 /// The simulation at time zero.
@@ -226,17 +210,11 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     case: &Case,
     scene: &Scene<D>,
     (time_step, ranks): (T, Option<&Arc<dyn Ranks>>),
-) -> Result<SetUp<T, D>, CaseError> {
-    let share = match ranks {
-        Some(ranks) => Some(born_here(scene, updated, case, ranks)?),
-        None => None,
-    };
-    let (mut body, loaded) = if updated.placement.is_clipped() {
-        clipped(scene, updated.placement, case.per_cell, exact.density())?
-    } else {
-        (body::<T, D>(scene, updated, case.per_cell, exact.density(), share.as_ref())?, Vec::new())
-    };
-    if body.particles.is_empty() && share.is_none() {
+) -> Result<Box<dyn Solver<T, D>>, CaseError> {
+    let (mut body, share) = body::<T, D>(scene, updated, case.per_cell, exact.density(), ranks)?;
+    let here = body.particles.len() as u64;
+    let particles = share.as_ref().map_or(here, |share| total(&*share.ranks, here));
+    if particles == 0 {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
@@ -271,7 +249,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         None => Simulation::new(grid, body, law, settings)?,
         Some(share) => Simulation::shared_out(grid, body, share, law, settings)?,
     };
-    Ok(SetUp { solver: Box::new(simulation), loaded })
+    Ok(Box::new(simulation))
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -312,6 +312,7 @@ fn assemble<T: RealField + Copy, const D: usize>(
         faces: Faces::default(),
         loads: Vec::new(),
         turn: turn_of(*turn),
+        numbers: None,
     };
     let mut boundary = Vec::new();
     let (mut X, mut volume, mut mass) = (Vec::new(), Vec::new(), Vec::new());

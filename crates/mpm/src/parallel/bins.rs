@@ -145,7 +145,7 @@ pub(crate) struct Halo<'a, N> {
 }
 
 impl Bins {
-    /// Allocates for `particles` particles on the grid; `sort` has to follow.
+    /// Allocates for `particles` particles on the grid; `sort_as` has to follow.
     pub(crate) fn new<const D: usize>(layout: &Layout<D>, particles: usize) -> Self {
         let rows = BinRows::new(layout);
         let bins = rows.bins;
@@ -168,12 +168,10 @@ impl Bins {
         self.rows
     }
 
-    /// Makes room for so many particles in the bins `held`; `sort` has to follow.
+    /// Makes room for so many particles in the bins `held`; `sort_as` has to follow.
     pub(crate) fn hold(&mut self, held: Held, particles: usize) {
         self.counts.resize(held.bands.len() * self.sub_bins + 1, 0);
         self.order = Partition::new(particles, held.bands.len());
-        self.bin_of.resize(particles, 0);
-        self.keys.resize(particles, 0);
         self.held = held;
     }
 
@@ -197,38 +195,38 @@ impl Bins {
         &self.keys
     }
 
-    /// The bin of a sub-bin, if the grid has such.
-    pub(crate) fn bin_of_key(&self, key: u32) -> Option<usize> {
-        Some(key as usize / self.sub_bins).filter(|bin| *bin < self.rows.bins)
+    /// Whether the grid has this sub-bin.
+    pub(crate) fn has_key(&self, key: u32) -> bool {
+        self.bin_of_key(key) < self.rows.bins
     }
 
-    /// Sorts all particles as they were sorted where [`keys`](Self::keys) had these values, of bins that are held here.
-    pub(crate) fn sort_as(&mut self, keys: &[u32]) {
-        self.keys.copy_from_slice(keys);
-        for (bin_of, key) in self.bin_of.iter_mut().zip(keys) {
-            *bin_of = key / self.sub_bins as u32;
-        }
-        self.arrange();
+    /// The bin of a sub-bin.
+    pub(crate) fn bin_of_key(&self, key: u32) -> usize {
+        key as usize / self.sub_bins
     }
 
-    /// Sorts all particles by the sub-bin of the first node of their stencils, `first_node(particle)`, in the numbers of the whole
-    /// grid.
-    pub(crate) fn sort<const D: usize>(
-        &mut self,
+    /// The sub-bin of each of `count` particles, by the first node of its stencil, in the numbers of the whole grid.
+    pub(crate) fn keys_of<const D: usize>(
+        &self,
         layout: &Layout<D>,
+        count: usize,
         first_node: &(dyn Fn(usize) -> usize + Sync),
-    ) {
-        let Self { rows, sub_bins, .. } = *self;
-        let (row, line) = (layout.row(), layout.dims[0]);
-        self.keys.par_iter_mut().zip(&mut self.bin_of).enumerate().for_each(
-            |(p, (key, bin_of))| {
-                let node = first_node(p);
-                let bin = rows.bin_of(node / row);
-                let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
-                *bin_of = bin as u32;
-                *key = (bin * sub_bins + sub_bin) as u32;
-            },
-        );
+    ) -> Vec<u32> {
+        let (rows, row, line) = (self.rows, layout.row(), layout.dims[0]);
+        let key = |p: usize| {
+            let node = first_node(p);
+            let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
+            (rows.bin_of(node / row) * self.sub_bins + sub_bin) as u32
+        };
+        (0..count).into_par_iter().map(key).collect()
+    }
+
+    /// Sorts all particles by their sub-bins, of bins that are held here.
+    pub(crate) fn sort_as(&mut self, keys: Vec<u32>) {
+        let per_bin = self.sub_bins as u32;
+        self.bin_of.clear();
+        self.bin_of.extend(keys.iter().map(|key| key / per_bin));
+        self.keys = keys;
         self.arrange();
     }
 
@@ -427,7 +425,7 @@ mod tests {
             let nodes = first_nodes(&layout);
             let mut bins = Bins::new(&layout, nodes.len());
             assert!(!bins.order.is_whole());
-            bins.sort(&layout, &|p| nodes[p]);
+            bins.sort_as(bins.keys_of(&layout, nodes.len(), &|p| nodes[p]));
             assert!(bins.order.is_whole());
             let mut met = vec![0; nodes.len()];
             let count = bins.rows.bins;
@@ -466,7 +464,7 @@ mod tests {
                 Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
             let layout = Layout::new(&grid, 8).unwrap();
             let mut bins = Bins::new(&layout, 0);
-            bins.sort(&layout, &|_| 0);
+            bins.sort_as(Vec::new());
             let (BinRows { height, bins: count }, row) = (bins.rows, layout.row());
             assert_eq!(count, (layout.dims[D - 1] / height).max(1));
             let mut nodes = vec![9; layout.nodes];

@@ -209,10 +209,15 @@ fn neighbours_share_their_facets_and_the_rest_is_the_boundary() {
 }
 
 /// Loads on all of the boundary, at the middle of each facet.
-fn loaded<const D: usize>(body: &mut Body<f64, D>, boundary: &[Facet<D>]) {
+pub(crate) fn loaded<const D: usize>(body: &mut Body<f64, D>, boundary: &[Facet<D>]) {
     let shares = [1.0 / D as f64; D];
-    let loads = boundary.iter().map(|facet| Load { corners: facet.corners, shares });
-    body.polygons.as_mut().expect("polygons").loads = loads.collect();
+    let own = body.polygons.as_mut().expect("polygons");
+    let middle = |corners: [u32; D]| -> SVector<f64, D> {
+        corners.iter().map(|corner| own.X[*corner as usize]).sum::<SVector<f64, D>>() / D as f64
+    };
+    let load = |&Facet { corners, .. }: &Facet<D>| Load { corners, shares, X: middle(corners) };
+    let loads = boundary.iter().map(load).collect();
+    own.loads = loads;
 }
 
 /// A stress that is the same on all of the boundary.
@@ -223,7 +228,7 @@ impl<const D: usize> BodyForce<f64, D> for Constant<D> {
         b.fill(SVector::zeros());
     }
 
-    fn boundary_stress(&self, _: f64, stress: &mut [SMatrix<f64, D, D>]) {
+    fn boundary_stress(&self, _: &[Load<f64, D>], _: f64, stress: &mut [SMatrix<f64, D, D>]) {
         stress.fill(self.0);
     }
 }

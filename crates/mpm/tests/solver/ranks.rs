@@ -3,13 +3,14 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_mpm::{
-    Body, Grid, Integrator, Material, SavedState, SavedStateError, Scalar, Settings, SetupError,
-    Shape, Share, Simulation, StepError, Transfer,
+    Body, BodyForce, Clip, Grid, Integrator, Load, Material, SavedState, SavedStateError, Scalar,
+    Settings, SetupError, Shape, Share, Side, Simulation, StepError, Transfer,
 };
 use mmsmith_ranks::{Ranks, counted, in_process};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
+use crate::polygons::loaded;
 use crate::schemes::{self, noise};
 
 /// A column: walls at its foot and sides, long enough for several processes.
@@ -55,6 +56,21 @@ fn body_force<const D: usize>(X: &[SVector<f64, D>], t: f64, b: &mut [SVector<f6
     }
 }
 
+/// That body force, and a stress on the boundary where bodies have loads there.
+struct Forced;
+
+impl<const D: usize> BodyForce<f64, D> for Forced {
+    fn evaluate(&self, _: usize, X: &[SVector<f64, D>], t: f64, b: &mut [SVector<f64, D>]) {
+        body_force(X, t, b);
+    }
+
+    fn boundary_stress(&self, loads: &[Load<f64, D>], t: f64, stress: &mut [SMatrix<f64, D, D>]) {
+        for (stress, Load { X, .. }) in stress.iter_mut().zip(loads) {
+            *stress = SMatrix::from_fn(|i, j| (4.0 * X[i] + 3.0 * X[j] + t).sin());
+        }
+    }
+}
+
 /// The particles of `body` that a process begins with, and their numbers: some here, some there.
 fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D>, Vec<u64>) {
     let count = body.particles.len();
@@ -68,7 +84,8 @@ fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D
     part.particles.F = own.iter().map(|&k| p.F[k]).collect();
     part.particles.mass = own.iter().map(|&k| p.mass[k]).collect();
     part.particles.volume = own.iter().map(|&k| p.volume[k]).collect();
-    part.half_edges = own.iter().map(|&k| body.half_edges[k]).collect();
+    part.half_edges = own.iter().filter_map(|&k| body.half_edges.get(k).copied()).collect();
+    part.polygons = body.polygons.as_ref().map(|polygons| polygons.part(&own));
     if let (Some(part), Some(whole)) = (&mut part.mesh, &body.mesh) {
         part.corners = own.iter().map(|&k| whole.corners[k]).collect();
         let used: Vec<u32> = {
@@ -90,15 +107,13 @@ fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D
 /// State of a particle: number, position, velocity, deformation gradient.
 type Of<const D: usize> = (u64, SVector<f64, D>, SVector<f64, D>, SMatrix<f64, D, D>);
 
-fn state<const D: usize>(simulation: &Simulation<f64, D>) -> Vec<Of<D>>
+fn state<const D: usize>(simulation: &mut Simulation<f64, D>) -> Vec<Of<D>>
 where
     f64: Scalar<D>,
 {
-    let p = simulation.particles();
-    let ids: Vec<u64> = match simulation.arrangement() {
-        Some(arrangement) => arrangement.ids.to_vec(),
-        None => (0..p.len() as u64).collect(),
-    };
+    let ids = simulation.arrangement().map(|arrangement| arrangement.ids.to_vec());
+    let p = simulation.own_particles();
+    let ids: Vec<u64> = ids.unwrap_or_else(|| (0..p.len() as u64).collect());
     (0..p.len()).map(|k| (ids[k], p.x[k], p.v[k], p.F[k])).collect()
 }
 
@@ -110,7 +125,7 @@ fn fly<const D: usize>(
 where
     f64: Scalar<D>,
 {
-    let end = (0..steps).find_map(|_| simulation.step(&body_force::<D>).err());
+    let end = (0..steps).find_map(|_| simulation.step(&Forced).err());
     (state(simulation), end, simulation.arrangement().map_or(0, |found| found.version))
 }
 
@@ -119,21 +134,29 @@ where
     f64: Scalar<D>,
 {
     let whole = body::<D>(speed, settings.transfer == Transfer::Flip);
-    let mut alone = Simulation::new(grid::<D>(), whole.clone(), law(), settings).unwrap();
-    let (expected, error, _) = fly(&mut alone, steps);
-    assert_ne!(
-        expected,
-        state(&Simulation::new(grid::<D>(), whole.clone(), law(), settings).unwrap())
-    );
+    agrees_on((&grid::<D>(), &whole), settings, counts, steps);
+}
+
+fn agrees_on<const D: usize>(
+    (grid, whole): (&Grid<f64, D>, &Body<f64, D>),
+    settings: Settings<f64>,
+    counts: &[usize],
+    steps: usize,
+) where
+    f64: Scalar<D>,
+{
+    let set_up = || Simulation::new(grid.clone(), whole.clone(), law(), settings).unwrap();
+    let (expected, error, _) = fly(&mut set_up(), steps);
+    assert_ne!(expected, state(&mut set_up()));
     for &count in counts {
         let found = in_process(count, |ranks| {
-            let (body, ids) = share(&whole, &*ranks);
+            let (body, ids) = share(whole, &*ranks);
             let share = Share { ranks, ids };
             let mut part =
-                Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+                Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
             fly(&mut part, steps)
         });
-        let what = format!("{count} processes, {steps} steps from {speed}, {settings:?}");
+        let what = format!("{count} processes, {steps} steps, {settings:?}");
         let sorted = found[0].2;
         // Cuts or particles have moved on the way.
         assert!(error.is_some() || sorted > 1, "{what}: sorted {sorted} times");
@@ -252,7 +275,7 @@ fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
 
 /// What `count` processes save after some steps, each its part, and what they come to in some more.
 fn save_and_go_on<const D: usize>(
-    (whole, settings): (&Body<f64, D>, Settings<f64>),
+    (grid, whole, settings): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>),
     count: usize,
     taken_up: Option<&[SavedState]>,
 ) -> (Vec<SavedState>, Vec<Of<D>>)
@@ -263,7 +286,7 @@ where
         let rank = ranks.rank();
         let (body, ids) = share(whole, &*ranks);
         let share = Share { ranks, ids };
-        let mut part = Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+        let mut part = Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
         match taken_up {
             // What continues has gone another way before.
             Some(parts) => {
@@ -289,10 +312,10 @@ fn what_any_number_of_processes_saved_any_other_goes_on_with() {
     for (n, settings) in schemes::schemes().map(flying).enumerate() {
         let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
         let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
-        let (one, expected) = save_and_go_on((&whole, settings), 1, None);
-        let (many, _) = save_and_go_on((&whole, settings), 2 + n % 3, None);
+        let (one, expected) = save_and_go_on((&grid(), &whole, settings), 1, None);
+        let (many, _) = save_and_go_on((&grid(), &whole, settings), 2 + n % 3, None);
         for (saved, count) in [(&one, 3), (&many, 1), (&many, 2), (&many, 5)] {
-            let (again, found) = save_and_go_on((&whole, settings), count, Some(saved));
+            let (again, found) = save_and_go_on((&grid(), &whole, settings), count, Some(saved));
             let other = found.iter().zip(&expected).find(|(a, b)| a != b);
             let what = format!("{} to {count} processes, {settings:?}", saved.len());
             assert_eq!((found.len(), other), (expected.len(), None), "{what}");
@@ -310,13 +333,13 @@ fn one_process_goes_on_with_what_several_saved() {
     let settings = flying(schemes::schemes().next().unwrap());
     let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
     let whole = body::<3>(-14.0, true);
-    let (saved, expected) = save_and_go_on((&whole, settings), 3, None);
+    let (saved, expected) = save_and_go_on((&grid(), &whole, settings), 3, None);
     let mut alone = Simulation::new(grid::<3>(), whole.clone(), law(), settings).unwrap();
     alone.take_up(saved).unwrap();
     fly(&mut alone, 8);
-    assert_eq!(state(&alone), expected);
+    assert_eq!(state(&mut alone), expected);
     // A part is missing, or is there twice.
-    let (saved, _) = save_and_go_on((&whole, settings), 3, None);
+    let (saved, _) = save_and_go_on((&grid(), &whole, settings), 3, None);
     assert_eq!(alone.take_up(saved[1..].to_vec()), Err(SavedStateError::Particles));
     let refused = in_process(2, |ranks| {
         let rank = ranks.rank();
@@ -360,8 +383,8 @@ fn record<const D: usize>(settings: &Settings<f64>) -> u64 {
         _ => 0,
     };
     let of_transfer = if settings.transfer == Transfer::Apic { matrix } else { 0 };
-    // Number; X, x, v; F; mass and volume.
-    (8 * (1 + 3 * D + matrix + 2 + of_domain + of_transfer)) as u64
+    // Number; X, x, v; F; mass and volume; and, in four bytes, the sub-bin.
+    (8 * (1 + 3 * D + matrix + 2 + of_domain + of_transfer) + 4) as u64
 }
 
 /// Enough for particles to come into other bins.
@@ -384,7 +407,7 @@ where
         let step = |_| {
             let (before, arrangement) = (traffic.sent(), part.arrangement().unwrap());
             let (version, ids) = (arrangement.version, arrangement.ids.to_vec());
-            part.step(&body_force::<D>).unwrap();
+            part.step(&Forced).unwrap();
             let after = part.arrangement().unwrap();
             let is_sorted = after.version != version;
             let left = ids.iter().filter(|id| after.ids.binary_search(id).is_err()).count();
@@ -433,5 +456,140 @@ fn messages_have_the_bytes_that_the_formula_says() {
         let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
         sends_what_the_formula_says::<1>(settings, 3);
         sends_what_the_formula_says::<3>(settings, 3);
+    }
+}
+
+/// A high grid without walls, and a ring or a shell of polygons with loads that flies up in it, its lattice turned.
+fn polygons<const D: usize>(speed: f64) -> (Grid<f64, D>, Body<f64, D>) {
+    let mut grid = Grid {
+        lower: SVector::repeat(-1.5),
+        spacing: if D == 2 { 0.125 } else { 0.25 },
+        cells: [if D == 2 { 24 } else { 12 }; D],
+        walls: [[false; 2]; D],
+    };
+    grid.cells[D - 1] = 60;
+    let (sin, cos) = 25.0_f64.to_radians().sin_cos();
+    let sides = vec![Side::Inner { radius: 0.55 }, Side::Outer { radius: 0.95 }];
+    // The grid has its own axes; the body flies along those of its own.
+    let clip = Clip { sides, turn: if D == 2 { [cos, sin] } else { [1.0, 0.0] }, offset: 0.2 };
+    let (mut body, boundary) = Body::clipped(&grid, 2, 2.0, &clip).unwrap();
+    loaded(&mut body, &boundary);
+    let turn = body.polygons.as_ref().unwrap().turn;
+    let mut up = SVector::zeros();
+    up[D - 1] = speed;
+    let up = turn.map_or(up, |turn: SMatrix<f64, D, D>| turn.transpose() * up);
+    let p = &mut body.particles;
+    for k in 0..p.len() {
+        p.v[k] = up + SVector::from_fn(|a, _| 0.5 * noise(7 * k + a));
+        p.F[k] += SMatrix::from_fn(|i, j| 0.02 * noise(11 * k + 3 * i + j));
+    }
+    (grid, body)
+}
+
+/// Every integrator and transfer, with the shapes that polygons have.
+fn polygon_settings() -> impl Iterator<Item = Settings<f64>> {
+    let shapes = [Shape::Cpdi2, Shape::Bspline2, Shape::Bspline3];
+    let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(3)];
+    Integrator::ALL.into_iter().enumerate().flat_map(move |(n, integrator)| {
+        transfers.into_iter().enumerate().map(move |(m, transfer)| {
+            let settings = schemes::settings(shapes[(n + m) % 3], integrator, transfer);
+            Settings { time_step: 1.0 / 512.0, ..flying(settings) }
+        })
+    })
+}
+
+#[test]
+fn polygons_have_the_bits_of_one_process() {
+    for settings in polygon_settings() {
+        let settings = Settings { time_step: 1.0 / 512.0, ..settings };
+        let (grid, whole) = polygons::<2>(40.0);
+        agrees_on((&grid, &whole), settings, &[1, 2, 5], 16);
+    }
+    for settings in polygon_settings().step_by(5) {
+        let settings = Settings { time_step: 1.0 / 512.0, ..settings };
+        let (grid, whole) = polygons::<3>(70.0);
+        agrees_on((&grid, &whole), settings, &[3], 16);
+    }
+}
+
+#[test]
+fn polygons_that_turn_inside_out_are_told_alike_by_all() {
+    let (grid, mut whole) = polygons::<2>(5.0);
+    let p = &mut whole.particles;
+    p.v.iter_mut().zip(&p.X).for_each(|(v, X)| v[0] -= 60.0 * X[0]);
+    for integrator in [Integrator::Usf, Integrator::Usl] {
+        let settings = schemes::settings(Shape::Cpdi2, integrator, Transfer::Flip);
+        let settings = Settings { time_step: 1.0 / 512.0, ..settings };
+        agrees_on((&grid, &whole), settings, &[2, 4], 40);
+    }
+}
+
+#[test]
+fn polygons_that_any_number_of_processes_saved_any_other_goes_on_with() {
+    for settings in polygon_settings().step_by(2) {
+        let (grid, whole) = polygons::<2>(30.0);
+        let case = (&grid, &whole, settings);
+        let mut alone = Simulation::new(grid.clone(), whole.clone(), law(), settings).unwrap();
+        fly(&mut alone, 7);
+        let one: SavedState = alone.state().iter().map(|array| array.to_vec()).collect();
+        fly(&mut alone, 8);
+        let expected = state(&mut alone);
+        let (many, _) = save_and_go_on(case, 3, None);
+        for (saved, count) in [(&vec![one], 3), (&many, 1), (&many, 2), (&many, 4)] {
+            let (_, found) = save_and_go_on(case, count, Some(saved));
+            let other = found.iter().zip(&expected).find(|(a, b)| a != b);
+            let what = format!("{} to {count} processes, {settings:?}", saved.len());
+            assert_eq!((found.len(), other), (expected.len(), None), "{what}");
+        }
+        alone.take_up(many.clone()).unwrap();
+        fly(&mut alone, 8);
+        assert_eq!(state(&mut alone), expected);
+        // A part is missing, or is there twice.
+        let twice = many.iter().chain(&many[1..2]).cloned().collect();
+        for saved in [many[1..].to_vec(), twice] {
+            assert_eq!(alone.take_up(saved), Err(SavedStateError::Particles));
+        }
+    }
+}
+
+#[test]
+fn polygons_send_what_the_formula_says() {
+    for settings in polygon_settings() {
+        let (grid, whole) = polygons::<2>(0.5);
+        let corners = whole.polygons.as_ref().unwrap().X.len();
+        let found = in_process(3, |ranks| {
+            let (ranks, traffic) = counted(ranks);
+            let (body, ids) = share(&whole, &*ranks);
+            let share = Share { ranks, ids };
+            let mut part =
+                Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
+            let version = part.arrangement().unwrap().version;
+            let before = traffic.sent();
+            part.step(&Forced).unwrap();
+            assert_eq!(part.arrangement().unwrap().version, version);
+            ((traffic.sent() - before).bytes, part.polygons().unwrap().X.len())
+        });
+        let (bytes, here): (Vec<u64>, Vec<usize>) = found.into_iter().unzip();
+        // Corners that two processes have, whose values one gets: two vectors each time.
+        let others = (here.iter().sum::<usize>() - corners) as u64;
+        assert!(others > 0);
+        let of_filter = match settings.transfer {
+            Transfer::Xpic(order) => u64::from(order) - 1,
+            _ => 0,
+        };
+        let interpolations = of_filter
+            + match settings.integrator {
+                Integrator::Usl | Integrator::Cd => 1,
+                // Once more before forces, or of the velocities projected again.
+                Integrator::Usf | Integrator::Usavg | Integrator::Musl => 2,
+            };
+        let row = (grid.cells[0] + 9) as u64;
+        let passes = match settings.integrator {
+            Integrator::Usl | Integrator::Cd => 1,
+            Integrator::Usf | Integrator::Usavg | Integrator::Musl => 2,
+        } + of_filter;
+        let halo = 2 * 2 * 8 * row * 5 * 8 * passes;
+        let expected = halo + interpolations * others * 4 * 8;
+        assert_eq!(bytes.iter().sum::<u64>(), expected, "{settings:?}");
     }
 }

@@ -112,6 +112,7 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
             faces: own.faces.clone(),
             loads: Vec::new(),
             turn: own.turn.map(|turn| turn.cast()),
+            numbers: None,
         }),
     }
 }

@@ -269,7 +269,7 @@ fn states_that_cannot_be_are_refused() {
         };
         // Bins, and the same particle twice.
         let far = saved[2].iter().map(|_| 255).collect();
-        assert_eq!(run.take_up(with(2, far)), Err(SavedStateError::Particles), "{settings:?}");
+        assert_eq!(run.take_up(with(2, far)), Err(SavedStateError::Place), "{settings:?}");
         let twice = vec![0; 2 * saved[2].len()];
         assert_eq!(run.take_up(with(1, twice)), Err(SavedStateError::Particles), "{settings:?}");
         assert_eq!(run.take_up(vec![]), Err(SavedStateError::Particles), "{settings:?}");

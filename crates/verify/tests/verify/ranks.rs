@@ -94,26 +94,39 @@ fn a_run_that_fails_is_told_alike_by_all() {
 }
 
 #[test]
-fn what_one_process_alone_can_do_is_refused_with_what_to_use() {
-    let clipped = Updated {
-        placement: Placement::Clipped { offset: 0.0, pose: GridPose::default() },
-        shape: Shape::Cpdi2,
-        ..Updated::default()
-    };
-    for (scheme, said) in [
-        (Scheme::Total(Total::of_degree(3)), "start one process"),
-        (Scheme::Updated(clipped), "start one, or leave out --layout clipped"),
-    ] {
-        let refusals = in_process(2, |ranks| {
-            let progress = &mut |_| ();
-            let mut outputs = Outputs { ranks: Some(ranks), ..Outputs::new(progress) };
-            let exact = AnySolution::Two(Box::new(Coded(AxisAligned::default())));
-            let case = Case { scheme, cells: 64, ..Case::default() };
-            run(&exact, Arithmetic::Double, &case, &mut outputs).map(timeless)
-        });
-        for refusal in refusals {
-            let error = refusal.expect_err("one process alone can do that").to_string();
-            assert!(error.contains(said), "{error}");
+fn clipped_particles_have_the_bits_of_one_process() {
+    let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(2)];
+    for (n, stepping) in [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl].into_iter().enumerate()
+    {
+        let moved = GridPose { angle: 17.0, shift: 0.3 };
+        for (m, pose) in [GridPose::default(), moved].into_iter().enumerate() {
+            let updated = Updated {
+                shape: [Shape::Cpdi2, Shape::Bspline2, Shape::Bspline3][(n + m) % 3],
+                stepping,
+                transfer: transfers[(n + 2 * m) % 3],
+                placement: Placement::Clipped { offset: 0.29, pose },
+            };
+            let scheme = Scheme::Updated(updated);
+            let case = Case { scheme, cells: 64, periods: 0.02, ..Case::default() };
+            agrees(&AxisAligned::default(), &case, &[2, 3]);
+            let row = agrees(&Ring::default(), &case, &[4]);
+            assert!(row.errors.u.linf > 0.0, "{row:?}");
         }
+    }
+}
+
+#[test]
+fn what_one_process_alone_can_do_is_refused_with_what_to_use() {
+    let refusals = in_process(2, |ranks| {
+        let progress = &mut |_| ();
+        let mut outputs = Outputs { ranks: Some(ranks), ..Outputs::new(progress) };
+        let exact = AnySolution::Two(Box::new(Coded(AxisAligned::default())));
+        let case =
+            Case { scheme: Scheme::Total(Total::of_degree(3)), cells: 64, ..Case::default() };
+        run(&exact, Arithmetic::Double, &case, &mut outputs).map(timeless)
+    });
+    for refusal in refusals {
+        let error = refusal.expect_err("one process alone can do that").to_string();
+        assert!(error.contains("start one process"), "{error}");
     }
 }
