@@ -49,7 +49,7 @@ pub(crate) fn join() -> Result<()> {
 
 #[cfg(feature = "mpi")]
 fn start() -> Result<Arc<dyn Ranks>> {
-    let Some(ranks) = mmsmith_ranks::message_passing::start() else {
+    let Some(ranks) = mmsmith_message_passing::start() else {
         bail!("mpirun: this MPI does not allow calls from several threads, one at a time");
     };
     Ok(ranks)
@@ -175,7 +175,7 @@ pub(crate) fn fail(message: &str, status: u8) {
         let _ = writeln!(std::io::stderr(), "error: process {}: {message}", ranks.rank());
     }
     #[cfg(feature = "mpi")]
-    mmsmith_ranks::message_passing::abort(status);
+    mmsmith_message_passing::abort(status);
     #[cfg(not(feature = "mpi"))]
     let _ = status;
 }

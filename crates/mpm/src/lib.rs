@@ -61,7 +61,7 @@
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
 //! - `grid`, `node`: memory layout, walls and ghost nodes. `parallel`: bins of particles and the two-colour schedule.
-//! - `decomposition`, `redistribute`: several processes. `saved_state`: what a run goes on from.
+//! - `decomposition`, `redistribute`, `corner_halo`, `directory`: several processes. `saved_state`: what a run goes on from.
 //! - `simulation`: set-up and life cycle. `state`, `geometry`, `health`: data and checks that the stages share.
 
 mod body;

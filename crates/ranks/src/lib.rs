@@ -3,12 +3,9 @@
 //! A [`Ranks`] is one process among several. What the solver and the measurement ask of it is little: to send, to receive, and the
 //! largest of some whole numbers. Numbers with a fraction are never summed here: their sums would depend on who adds first.
 //!
-//! [`in_process()`] gives ranks that are threads of one process, for tests. With the feature `mpi` the module `message_passing` gives those
-//! of MPI.
+//! [`in_process()`] gives ranks that are threads of one process, for tests. The crate `mmsmith-message-passing` gives those of MPI.
 
 mod in_process;
-#[cfg(feature = "mpi")]
-pub mod message_passing;
 mod traffic;
 
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, cast_slice_mut};

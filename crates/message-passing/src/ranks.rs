@@ -16,7 +16,7 @@ use mpi::ffi;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Equivalence};
 
-use crate::Ranks;
+use mmsmith_ranks::Ranks;
 
 /// A message of more bytes goes in several.
 const MOST: usize = 1 << 30;
