@@ -316,8 +316,8 @@ def moose(case):
     text = case.generate("moose", ".i").read_text()
     blocks = dict(re.findall(r"\[(mms_\w+)\]\s+type = ParsedFunction\s+expression = '([^']*)'", text))
     prefix = f"mms_{case.module}_"
-    names, fields = [], {**FIELDS, "rho0_b": 1}
-    for field, rank in fields.items():
+    names = []
+    for field, rank in ALL.items():
         places = np.ndindex((case.dimension,) * rank)
         names += [prefix + field + ("_" if rank else "") + "".join(str(i) for i in place) for place in places]
     (case.folder / "expressions.txt").write_text("".join(" ".join(blocks[name].split()) + "\n" for name in names))
@@ -327,7 +327,7 @@ def moose(case):
     environment = {**os.environ, "LD_LIBRARY_PATH": os.environ.get("FPARSER_LIB", "")}
     flat = call([program, case.folder / "expressions.txt"], input=points.tobytes(), env=environment)
     assert f"function = {prefix}rho0_b_0" in text
-    return case.unpacked(flat, fields)
+    return case.unpacked(flat, ALL)
 
 
 def moose_program(folder):
@@ -340,7 +340,7 @@ def kratos(case):
 
     given = json.loads(case.generate("kratos", "_kratos.json").read_text())
     found = {}
-    for field in [*FIELDS, "rho0_b"]:
+    for field in ALL:
         functions = [KratosMultiphysics.GenericFunctionUtility(text) for text in given[field]]
         columns = []
         for X, t in zip(case.X, case.t):
@@ -364,7 +364,7 @@ def febio(case):
         return np.broadcast_to(eval(text.replace("^", "**"), {"__builtins__": {}}, known), (POINTS,))
 
     found = {}
-    for field in [*FIELDS, "rho0_b"]:
+    for field in ALL:
         entries = root.findall(f"field[@name='{field}']/entry")
         found[field] = np.column_stack([value(entry.text) for entry in entries])
     load = root.find("body_load")

@@ -2,10 +2,10 @@
 
 use crate::code::Code;
 use crate::function::digits;
-use crate::listing::{Given, Item};
+use crate::listing::Given;
 use crate::target::{Called, Unwritable, arithmetic};
 use crate::text::spell;
-use mmsmith_expr::{Function, Operation, nearest_f64};
+use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
 use mmsmith_stage::{Operand, Shape};
 use std::collections::BTreeMap;
 
@@ -43,26 +43,87 @@ pub(crate) struct Entry {
 }
 
 impl Strings {
-    /// The fields, the tractions and `rho0_b`, with a word about each.
+    /// The fields, what is formed from them, and the tractions, with a word about each.
     pub(crate) fn fields(&self, code: &Code<'_>) -> Result<Vec<Field>, Unwritable> {
         let mut all = Vec::new();
-        let density = self.constant(code, "density");
-        for item in code.functions().iter().filter(|item| item.given == Given::PositionAndTime) {
-            let entries = self.entries(code, item)?;
+        let density = number(self.constant(code, "density"));
+        let functions = code.functions();
+        let outputs = |name: &str| -> Vec<Slot> {
+            functions
+                .iter()
+                .find(|item| item.name == name)
+                .map_or(Vec::new(), |item| item.outputs().to_vec())
+        };
+        let (a, b) = (outputs("a"), outputs("b"));
+        for item in functions.iter().filter(|item| item.given == Given::PositionAndTime) {
             if item.name == "b" {
-                let scaled = entries.iter().map(|entry| Entry {
-                    name: format!("rho0_{}", entry.name),
-                    text: self.scaled(&entry.text, density),
-                });
-                all.push(Field {
-                    name: "rho0_b".to_owned(),
-                    about: "body force per unit reference volume".to_owned(),
-                    entries: scaled.collect(),
-                });
+                let scaled = |of: &[String]| format!("{density}*({})", of[0]);
+                let of = |i: usize| self.joined(code, &[b[i]], scaled);
+                all.push(field("rho0_b", "body force per unit reference volume", 1, b.len(), of)?);
+                let scaled = |of: &[String]| format!("{density}*({} - {})", of[0], of[1]);
+                let of = |i: usize| self.joined(code, &[b[i], a[i]], scaled);
+                let about = "-Div P, the force per unit reference volume that holds the deformation of a time still";
+                all.push(field("static_force", about, 1, b.len(), of)?);
             }
-            all.push(Field { name: item.name.clone(), about: item.about.clone(), entries });
+            let rank = match item.shape {
+                Shape::Scalar => 0,
+                Shape::Vector => 1,
+                Shape::Matrix => 2,
+            };
+            let outputs = item.outputs();
+            let of = |k: usize| self.joined(code, &outputs[k..=k], |of| of[0].clone());
+            all.push(field(&item.name, &item.about, rank, outputs.len(), of)?);
         }
+        all.extend(self.stresses(code, [outputs("F"), outputs("J"), outputs("P")])?);
         Ok(all)
+    }
+
+    /// The Cauchy stress `P F^T / J` and the second Piola-Kirchhoff stress `F^-1 P`, both symmetric.
+    fn stresses(
+        &self,
+        code: &Code<'_>,
+        [F, J, P]: [Vec<Slot>; 3],
+    ) -> Result<[Field; 2], Unwritable> {
+        let d = code.spec.dimension;
+        let all: Vec<Slot> = [F, J, P].concat();
+        let entry = |of: &[String], tensor: usize, i: usize, j: usize| {
+            of[tensor * (d * d + 1) + i * d + j].clone()
+        };
+        let (deformation, stress) = (0, 1);
+        let product = |of: &[String], factors: Vec<[String; 2]>| {
+            let terms: Vec<String> = factors.iter().map(|[a, b]| format!("{a}*{b}")).collect();
+            format!("({})/{}", terms.join(" + "), of[d * d])
+        };
+        let sigma = |k: usize| {
+            self.joined(code, &all, |of| {
+                let factors = |m| [entry(of, stress, k / d, m), entry(of, deformation, k % d, m)];
+                product(of, (0..d).map(factors).collect())
+            })
+        };
+        let S = |k: usize| {
+            self.joined(code, &all, |of| {
+                let F = |i: usize, j: usize| entry(of, deformation, i % d, j % d);
+                // J F^-1
+                let adjugate = |i: usize, j: usize| match d {
+                    1 => "1.0".to_owned(),
+                    2 if i == j => F(1 - i, 1 - j),
+                    2 => format!("(0.0 - {})", F(i, j)),
+                    _ => format!(
+                        "({}*{} - {}*{})",
+                        F(j + 1, i + 1),
+                        F(j + 2, i + 2),
+                        F(j + 1, i + 2),
+                        F(j + 2, i + 1)
+                    ),
+                };
+                let factors = |m| [adjugate(k / d, m), entry(of, stress, m, k % d)];
+                product(of, (0..d).map(factors).collect())
+            })
+        };
+        Ok([
+            field("sigma", "Cauchy stress", 2, d * d, sigma)?,
+            field("S", "second Piola-Kirchhoff stress", 2, d * d, S)?,
+        ])
     }
 
     /// The value of a scalar that depends on the parameters only.
@@ -72,39 +133,14 @@ impl Strings {
         values.and_then(|values| values.first().copied()).unwrap_or(f64::NAN)
     }
 
-    /// The last expression times a number.
-    pub(crate) fn scaled(&self, text: &str, factor: f64) -> String {
-        let (before, last) =
-            text.rsplit_once("; ").map_or(("", text), |(before, last)| (before, last));
-        let joint = if before.is_empty() { "" } else { "; " };
-        format!("{before}{joint}{}*({last})", number(factor))
-    }
-
-    fn entries(&self, code: &Code<'_>, item: &Item) -> Result<Vec<Entry>, Unwritable> {
-        let d = code.spec.dimension;
-        (0..item.outputs().len())
-            .map(|index| {
-                let place = match item.shape {
-                    Shape::Scalar => Vec::new(),
-                    Shape::Vector => vec![index],
-                    Shape::Matrix => vec![index / d, index % d],
-                };
-                let places: String = place.iter().map(usize::to_string).collect();
-                let joint = if places.is_empty() { "" } else { "_" };
-                let text = self.expression(code, item, index)?;
-                Ok(Entry { name: format!("{}{joint}{places}", item.name), text })
-            })
-            .collect()
-    }
-
-    /// One output of a function.
-    fn expression(
+    /// An expression of some outputs, `join` of what each of them is.
+    fn joined(
         &self,
         code: &Code<'_>,
-        item: &Item,
-        output: usize,
+        outputs: &[Slot],
+        join: impl FnOnce(&[String]) -> String,
     ) -> Result<String, Unwritable> {
-        let block = code.staged.after_parameters(&item.outputs()[output..=output]);
+        let block = code.staged.after_parameters(outputs);
         let fixed = code.fixed_values();
         let mut texts: BTreeMap<usize, String> = BTreeMap::new();
         let mut statements = String::new();
@@ -129,8 +165,8 @@ impl Strings {
             };
             texts.insert(index, text);
         }
-        let result: String = block.outputs().map(|operand| value(&texts, operand)).collect();
-        Ok(statements + &result)
+        let of: Vec<String> = block.outputs().map(|operand| value(&texts, operand)).collect();
+        Ok(statements + &join(&of))
     }
 
     /// An operation with its operands, in parentheses.
@@ -207,6 +243,27 @@ impl Strings {
             }),
         }
     }
+}
+
+/// A field of this rank with the entries `of(index)`, row by row.
+fn field(
+    name: &str,
+    about: &str,
+    rank: u32,
+    entries: usize,
+    of: impl Fn(usize) -> Result<String, Unwritable>,
+) -> Result<Field, Unwritable> {
+    let d = if rank == 2 { entries.isqrt() } else { entries };
+    let entry = |index: usize| {
+        let places = match rank {
+            0 => String::new(),
+            1 => format!("_{index}"),
+            _ => format!("_{}{}", index / d, index % d),
+        };
+        Ok(Entry { name: format!("{name}{places}"), text: of(index)? })
+    };
+    let entries = (0..entries).map(entry).collect::<Result<_, Unwritable>>()?;
+    Ok(Field { name: name.to_owned(), about: about.to_owned(), entries })
 }
 
 /// A number that can stand after any sign.
