@@ -188,7 +188,7 @@ if not options.quick:
 for number, case in enumerate(CASES):
     if options.quick and number % 2 != ["even", "odd"].index(options.quick):
         continue
-    counts = [2 + number // 2 % 2] if options.quick else COUNTS
+    counts = [3 - number % 2] if options.quick else COUNTS
     alone = run(None, case)
     assert options.quick or run(None, case, threads=2) == alone, case
     for count in counts:
