@@ -104,16 +104,8 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
     #[must_use]
     pub fn part(&self, own: &Range<usize>) -> Self {
         let Self { particles, half_edges, mesh, polygons } = self;
-        let Particles { X, x, v, F, mass, volume, half_size } = particles;
-        let particles = Particles {
-            X: X[own.clone()].to_vec(),
-            x: x[own.clone()].to_vec(),
-            v: v[own.clone()].to_vec(),
-            F: F[own.clone()].to_vec(),
-            mass: mass[own.clone()].to_vec(),
-            volume: volume[own.clone()].to_vec(),
-            half_size: *half_size,
-        };
+        let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
+        let particles = particles.some(&places);
         let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
         let mesh = mesh.as_ref().map(|mesh| mesh.part(own));
         let own: Vec<usize> = own.clone().collect();

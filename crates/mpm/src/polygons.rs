@@ -109,6 +109,21 @@ pub(crate) struct Share<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
+    /// None yet, of a whole body.
+    pub(crate) fn none(turn: Option<SMatrix<T, D, D>>) -> Self {
+        Self {
+            X: Vec::new(),
+            x: Vec::new(),
+            corners: Vec::new(),
+            ends: Vec::new(),
+            of_particles: Vec::new(),
+            faces: Faces::default(),
+            loads: Vec::new(),
+            turn,
+            numbers: None,
+        }
+    }
+
     /// Whether indices are in range, and every corner belongs to a particle.
     pub(crate) fn check(&self, particles: usize) -> Result<(), SetupError> {
         if !(2..=3).contains(&D) {

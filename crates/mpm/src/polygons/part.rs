@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use bytemuck::Pod;
 use nalgebra::{RealField, SMatrix, SVector};
 
-use super::{Faces, Load, Numbers, Polygons, start};
+use super::{Load, Numbers, Polygons, start};
 use crate::decomposition::{Lists, Move};
 
 /// The polygons of some particles, which can be told apart from the others.
@@ -62,17 +62,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
         turn: Option<SMatrix<T, D, D>>,
         is_behind: impl Fn(usize, usize) -> bool,
     ) -> (Polygons<T, D>, Vec<[usize; 2]>) {
-        let mut own = Polygons {
-            X: Vec::new(),
-            x: Vec::new(),
-            corners: Vec::new(),
-            ends: Vec::new(),
-            of_particles: Vec::new(),
-            faces: Faces::default(),
-            loads: Vec::new(),
-            turn,
-            numbers: None,
-        };
+        let mut own = Polygons::none(turn);
         // The number in the whole body of each place's corner, particle after particle.
         let mut numbers = Vec::new();
         let mut found: HashMap<u64, [usize; 2]> = HashMap::new();
