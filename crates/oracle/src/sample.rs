@@ -416,14 +416,17 @@ impl<'a> Sampler<'a> {
             .then(|| (*period, measures.to_vec()))
     }
 
-    /// Whether there is a body: parameters without bounds may exchange its surfaces.
+    /// Whether there is a body of its kind: parameters without bounds may exchange its surfaces, or close its hole.
     fn has_volume(&self, measures: &[f64]) -> bool {
         match &self.spec.domain {
             Domain::Box { lower, .. } => {
                 let (lower, upper) = measures.split_at(lower.len());
                 lower.iter().zip(upper).all(|(lower, upper)| lower < upper)
             }
-            Domain::Annulus { .. } => 0.0 <= measures[0] && measures[0] < measures[1],
+            Domain::Annulus { inner, .. } => {
+                let is_disc = *inner == Graph::ZERO;
+                (measures[0] > 0.0 || is_disc) && measures[0] < measures[1]
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Coordinate systems: orthogonal coordinates, their unit vectors, and the way to Cartesian components.
 
-use mmsmith_expr::{Expr, Function, Graph};
+use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use std::collections::BTreeMap;
 
 /// The coordinates in which a solution is stated.
@@ -85,8 +85,8 @@ pub(crate) struct Geometry {
     pub(crate) cartesian: Vec<Expr>,
     /// What the symbols `q_k` mean in Cartesian symbols; empty where they are the same.
     pub(crate) definitions: Vec<(Expr, Expr)>,
-    /// Expressions in `q_k` that have a shorter form in Cartesian symbols.
-    pub(crate) shorter: BTreeMap<Expr, Expr>,
+    /// The angles among the `q_k`.
+    angles: Vec<Angle>,
     /// Spherical coordinates: `e_theta e_theta^T + e_phi e_phi^T` without the angles, which are not defined on the axis.
     pub(crate) transverse: Option<Vec<Vec<Expr>>>,
 }
@@ -108,7 +108,7 @@ impl Geometry {
                 rotation: identity(dimension),
                 cartesian,
                 definitions: Vec::new(),
-                shorter: BTreeMap::new(),
+                angles: Vec::new(),
                 transverse: None,
             },
             Coordinates::Polar | Coordinates::Cylindrical => Self::around_axis(graph, cartesian),
@@ -128,8 +128,6 @@ impl Geometry {
         let radius = distance(graph, &[X, Y]);
         let angle = graph.call(Function::Atan2, &[Y, X]);
         let (cosine, sine) = (graph.div(X, R), graph.div(Y, R));
-        let cos_theta = graph.call(Function::Cos, &[theta]);
-        let sin_theta = graph.call(Function::Sin, &[theta]);
         let mut rotation = identity(dimension);
         rotation[0][0] = cosine;
         rotation[0][1] = graph.neg(sine);
@@ -146,7 +144,7 @@ impl Geometry {
             rotation,
             cartesian,
             definitions: vec![(R, radius), (theta, angle)],
-            shorter: BTreeMap::from([(cos_theta, cosine), (sin_theta, sine)]),
+            angles: vec![Angle { symbol: theta, cosine, sine }],
             transverse: None,
         }
     }
@@ -196,8 +194,6 @@ impl Geometry {
         let (radius, from_axis) = (distance(graph, &[X, Y, Z]), distance(graph, &[X, Y]));
         let colatitude = graph.call(Function::Atan2, &[s, Z]);
         let longitude = graph.call(Function::Atan2, &[Y, X]);
-        let (cos_of_phi, sin_of_phi) =
-            (graph.call(Function::Cos, &[phi]), graph.call(Function::Sin, &[phi]));
         let scale = vec![Graph::ONE, R, graph.mul(R, sin_theta)];
         Geometry {
             coordinates: vec![R, theta, phi],
@@ -206,18 +202,121 @@ impl Geometry {
             rotation,
             cartesian,
             definitions: vec![(R, radius), (s, from_axis), (theta, colatitude), (phi, longitude)],
-            shorter: BTreeMap::from([
-                (cos_theta, Z_over_R),
-                (sin_theta, s_over_R),
-                (cos_of_phi, cos_phi),
-                (sin_of_phi, sin_phi),
-            ]),
+            angles: vec![
+                Angle { symbol: theta, cosine: Z_over_R, sine: s_over_R },
+                Angle { symbol: phi, cosine: cos_phi, sine: sin_phi },
+            ],
             transverse: Some(transverse),
         }
     }
 
     pub(crate) fn dimension(&self) -> usize {
         self.coordinates.len()
+    }
+
+    /// `expr` with the cosines, sines and tangents of whole multiples of the angles, and of sums with such a multiple, in
+    /// Cartesian symbols.
+    ///
+    /// An angle is rounded: near an axis the sine of twice the angle would be lost, while `2 X Y/R^2` keeps its digits.
+    pub(crate) fn without_angles(&self, graph: &mut Graph, expr: Expr) -> Expr {
+        let mut known = BTreeMap::new();
+        if self.angles.is_empty() {
+            return expr;
+        }
+        for call in graph.reachable(&[expr]) {
+            let Node::Call(function @ (Function::Cos | Function::Sin | Function::Tan), arguments) =
+                graph.node(call)
+            else {
+                continue;
+            };
+            let (function, argument) = (*function, arguments[0]);
+            if let Some(Turn { cosine, sine }) = self.turn(graph, argument) {
+                let value = match function {
+                    Function::Cos => cosine,
+                    Function::Sin => sine,
+                    _ => graph.div(sine, cosine),
+                };
+                known.insert(call, value);
+            }
+        }
+        graph.replace(expr, &known)
+    }
+
+    /// The cosine and the sine of a whole multiple of an angle, or of a sum with one.
+    fn turn(&self, graph: &mut Graph, argument: Expr) -> Option<Turn> {
+        self.angles.iter().find_map(|angle| {
+            let multiple = match graph.node(argument) {
+                Node::Sum { terms, .. } => {
+                    let (_, multiple) = terms.iter().find(|(term, _)| *term == angle.symbol)?;
+                    multiple.clone()
+                }
+                _ => (argument == angle.symbol).then(|| Rational::from_integer(1.into()))?,
+            };
+            let times = multiple.is_integer().then(|| multiple.to_integer().try_into().ok())?;
+            let times = times.filter(|times: &i64| times.unsigned_abs() <= MULTIPLES)?;
+            let own = graph.sum([(multiple, angle.symbol)]);
+            let rest = graph.sub(argument, own);
+            let own = Turn { cosine: angle.cosine, sine: angle.sine }.times(graph, times);
+            if rest == Graph::ZERO {
+                return Some(own);
+            }
+            let rest = self.turn(graph, rest).unwrap_or_else(|| Turn {
+                cosine: graph.call(Function::Cos, &[rest]),
+                sine: graph.call(Function::Sin, &[rest]),
+            });
+            Some(own.and(graph, &rest))
+        })
+    }
+}
+
+/// The largest multiple of an angle that is written in Cartesian symbols, which takes as many terms.
+const MULTIPLES: u64 = 32;
+
+/// An angle among the coordinates, with its cosine and sine in Cartesian symbols.
+struct Angle {
+    symbol: Expr,
+    cosine: Expr,
+    sine: Expr,
+}
+
+/// The cosine and the sine of an angle.
+struct Turn {
+    cosine: Expr,
+    sine: Expr,
+}
+
+impl Turn {
+    /// Of this many times the angle, by halves: each product vanishes where the whole does, or the terms of a sum have one sign there.
+    fn times(&self, graph: &mut Graph, times: i64) -> Turn {
+        match times {
+            ..0 => {
+                let Turn { cosine, sine } = self.times(graph, times.saturating_neg());
+                Turn { cosine, sine: graph.neg(sine) }
+            }
+            0 => Turn { cosine: Graph::ONE, sine: Graph::ZERO },
+            1 => Turn { cosine: self.cosine, sine: self.sine },
+            _ if times % 2 == 0 => {
+                let Turn { cosine, sine } = self.times(graph, times / 2);
+                let (sum, difference) = (graph.add(cosine, sine), graph.sub(cosine, sine));
+                let product = graph.mul(cosine, sine);
+                Turn {
+                    cosine: graph.mul(difference, sum),
+                    sine: graph.sum([(Rational::from_integer(2.into()), product)]),
+                }
+            }
+            _ => {
+                let (less, more) = (self.times(graph, times / 2), self.times(graph, times / 2 + 1));
+                less.and(graph, &more)
+            }
+        }
+    }
+
+    /// Of the sum of two angles.
+    fn and(&self, graph: &mut Graph, other: &Turn) -> Turn {
+        let of = |graph: &mut Graph, a, b| graph.mul(a, b);
+        let (cc, ss) = (of(graph, self.cosine, other.cosine), of(graph, self.sine, other.sine));
+        let (sc, cs) = (of(graph, self.sine, other.cosine), of(graph, self.cosine, other.sine));
+        Turn { cosine: graph.sub(cc, ss), sine: graph.add(sc, cs) }
     }
 }
 

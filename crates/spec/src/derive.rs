@@ -90,7 +90,7 @@ impl Fields {
         let v: Vector = u.iter().map(|&u| derivation.derivative(u, time)).collect();
         let a: Vector = v.iter().map(|&v| derivation.derivative(v, time)).collect();
         let H = derivation.gradient(&u);
-        let deformation = Deformation::new(&mut derivation, H.clone());
+        let deformation = Deformation::new(&mut derivation, &u, H.clone());
         let stress = law::stress(&mut derivation, &deformation, &spec.material)?;
         let b = body_force(&mut derivation, &a, &stress, spec.density);
 
@@ -107,13 +107,13 @@ impl Fields {
         let mut P = stress.P.clone();
         if !geometry.is_cartesian() {
             P = turn_matrix(&mut graph, &geometry, &stress.anisotropic);
-            let isotropic = graph.replace(stress.isotropic, &geometry.shorter);
+            let isotropic = geometry.without_angles(&mut graph, stress.isotropic);
             for (i, row) in P.iter_mut().enumerate() {
                 row[i] = graph.add(isotropic, row[i]);
             }
         }
-        let W = stress.energy.map(|W| graph.replace(W, &geometry.shorter));
-        let J = graph.replace(deformation.J, &geometry.shorter);
+        let W = stress.energy.map(|W| geometry.without_angles(&mut graph, W));
+        let J = geometry.without_angles(&mut graph, deformation.J);
         let mut F = H.clone();
         for i in 0..n {
             F[i][i] = graph.add(Graph::ONE, H[i][i]);
@@ -183,7 +183,12 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
 }
 
 /// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
-fn is_joined(graph: &mut Graph, sum: Expr, [a, b]: [Expr; 2], variables: &BTreeSet<Expr>) -> bool {
+pub(crate) fn is_joined(
+    graph: &mut Graph,
+    sum: Expr,
+    [a, b]: [Expr; 2],
+    variables: &BTreeSet<Expr>,
+) -> bool {
     let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
     let others = graph.sub(sum, a);
     let own = match graph.node(a) {
@@ -222,7 +227,7 @@ pub(crate) fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &[Expr
                 .map(|a| graph.mul(geometry.rotation[i][a], vector[a]))
                 .collect();
             let component = graph.sum_of(terms);
-            graph.replace(component, &geometry.shorter)
+            geometry.without_angles(graph, component)
         })
         .collect()
 }
@@ -251,7 +256,7 @@ fn turn_matrix(graph: &mut Graph, geometry: &Geometry, matrix: &Matrix) -> Matri
                 }
             }
             let component = graph.sum_of(terms);
-            turned[i][j] = graph.replace(component, &geometry.shorter);
+            turned[i][j] = geometry.without_angles(graph, component);
         }
     }
     turned

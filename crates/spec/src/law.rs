@@ -5,6 +5,7 @@ mod isochoric;
 mod neo_hookean;
 mod principal_stretches;
 mod st_venant_kirchhoff;
+mod turn;
 
 use crate::derivation::Derivation;
 use crate::tensor::{
@@ -14,6 +15,7 @@ use crate::{DeriveError, Law};
 use energy::ComponentLaw;
 use mmsmith_expr::{Expr, Function, Graph, Node};
 use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
+use turn::Turn;
 
 /// The deformation of one solution, in physical components.
 pub(crate) struct Deformation {
@@ -28,6 +30,8 @@ pub(crate) struct Deformation {
     /// `J - 1`, small where `H` is small.
     volume_change: Expr,
     log_J: Expr,
+    /// The turn within `H`, where there is one that strains next to it are small.
+    turn: Option<Turn>,
 }
 
 /// A stress, and its divergence in two parts.
@@ -82,11 +86,15 @@ impl Stress {
 }
 
 impl Deformation {
-    pub(crate) fn new(derivation: &mut Derivation, open: Matrix) -> Self {
+    /// From the displacement and its gradient.
+    pub(crate) fn new(derivation: &mut Derivation, u: &Vector, open: Matrix) -> Self {
         let n = open.len();
+        let turn = Turn::of(derivation, u);
         let graph = &mut derivation.graph;
+        let apart = turn.as_ref().map(|turn| turn.gradient(graph));
+        let entries = apart.as_ref().unwrap_or(&open);
         let H: Matrix =
-            open.iter().map(|row| row.iter().map(|&h| graph.whole(h)).collect()).collect();
+            entries.iter().map(|row| row.iter().map(|&h| graph.whole(h)).collect()).collect();
         let mut F = H.clone();
         for i in 0..n {
             F[i][i] = graph.add(Graph::ONE, H[i][i]);
@@ -94,8 +102,13 @@ impl Deformation {
         let determinant = determinant(graph, &F);
         let J = graph.whole(determinant);
         // J - 1 as the sum of the principal minors of H, small where H is small.
-        let minors = principal_minors(graph, &H);
-        let volume_change = graph.sum_of(minors);
+        let volume_change = match &turn {
+            Some(turn) => turn.volume_change(graph),
+            None => {
+                let minors = principal_minors(graph, &H);
+                graph.sum_of(minors)
+            }
+        };
         let volume_change = zero_if_vanishing(graph, volume_change);
         let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
         let volume_change = graph.whole(volume_change);
@@ -124,7 +137,7 @@ impl Deformation {
             let derivative = derivation.graph.sum_of(terms);
             derivation.derivatives.define(log_J, q, derivative);
         }
-        Deformation { open, H, inverse_transpose, J, volume_change, log_J }
+        Deformation { open, H, inverse_transpose, J, volume_change, log_J, turn }
     }
 
     /// `H^T F^-T`.

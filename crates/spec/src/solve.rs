@@ -176,7 +176,7 @@ impl<'a> Solver<'a> {
         let time = derivation.time;
         let u = spec.displacement.clone();
         let H = derivation.gradient(&u);
-        let deformation = Deformation::new(&mut derivation, H.clone());
+        let deformation = Deformation::new(&mut derivation, &u, H.clone());
         let stress = law::stress(&mut derivation, &deformation, &spec.material)
             .map_err(|error| scope.source.error(error.to_string(), span.clone(), None))?;
         if derivation.graph.is_overgrown() {

@@ -12,6 +12,7 @@ fn motions_without_symmetry_pass_in_all_coordinates() {
 
 /// Each law against the solver's own, and energies and stresses of the specification's own against their differences.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "computes for long; runs with the release build of mms")]
 fn every_material_passes() {
     all_pass("tests/data/specs/materials");
 }

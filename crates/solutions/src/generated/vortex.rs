@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for VortexParameters<T> {
 pub struct Vortex<T: crate::Real> {
     parameters: VortexParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 20],
+    fixed: [T; 22],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Vortex<T> {
@@ -124,23 +124,26 @@ impl<T: crate::Real> Vortex<T> {
         let t146 = parameters.nu + T::one();
         let t147 = T::nearest(0.5) * parameters.E;
         let t148 = t147 / t146;
-        let t212 = parameters.rho0 * t146;
-        let t213 = parameters.E / t212;
-        let t234 = parameters.A * t79;
-        let t237 = T::one() / t146;
-        let t250 = T::nearest(2.0) / t5;
-        let t251 = T::nearest(2.0) * parameters.nu;
-        let t252 = T::one() - t251;
-        let t253 = parameters.E * parameters.nu;
-        let t254 = t146 * t252;
-        let t255 = t253 / t254;
-        let t268 = T::nearest(2.0) + T::nearest(3.0);
-        let t269 = T::one() - T::one();
-        let t292 = parameters.A * t82;
-        let t296 = T::nearest(2.0) * t82;
-        let t305 = t71 * t234;
-        let t311 = t237 * t269;
-        let t313 = t102 * t237;
+        let t157 = T::nearest(128.0) * parameters.A;
+        let t158 = t157 * t148;
+        let t171 = t92 * t148;
+        let t201 = parameters.rho0 * t146;
+        let t202 = parameters.E / t201;
+        let t223 = parameters.A * t79;
+        let t226 = T::one() / t146;
+        let t239 = T::nearest(2.0) / t5;
+        let t240 = T::nearest(2.0) * parameters.nu;
+        let t241 = T::one() - t240;
+        let t242 = parameters.E * parameters.nu;
+        let t243 = t146 * t241;
+        let t244 = t242 / t243;
+        let t263 = T::nearest(2.0) + T::nearest(3.0);
+        let t264 = T::one() - T::one();
+        let t287 = parameters.A * t82;
+        let t291 = T::nearest(2.0) * t82;
+        let t300 = t71 * t223;
+        let t306 = t226 * t264;
+        let t308 = t102 * t226;
         Ok(Vortex {
             parameters,
             fixed: [
@@ -153,17 +156,19 @@ impl<T: crate::Real> Vortex<T> {
                 t92,
                 t102,
                 t148,
-                t213,
-                t234,
-                t237,
-                t250,
-                t255,
-                t268,
-                t292,
-                t296,
-                t305,
-                t311,
-                t313,
+                t158,
+                t171,
+                t202,
+                t223,
+                t226,
+                t239,
+                t244,
+                t263,
+                t287,
+                t291,
+                t300,
+                t306,
+                t308,
             ],
         })
     }
@@ -506,58 +511,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t25 = t24.sin();
         let t26 = t24.cos();
         let t42 = t25 * t25;
-        let t43 = t26 * t26;
-        let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t93 = self.fixed[6] * t7;
-        let t94 = t13 * t15;
-        let t95 = t94 * t19;
-        let t96 = t93 * t95;
-        let t97 = t96 * t26;
-        let t98 = t25 + t97;
-        let t99 = t7 * t95;
-        let t100 = t99 * t44;
-        let t103 = self.fixed[7] * t100;
-        let t104 = t46 - t103;
         let t109 = X[0] * X[1];
         let t114 = T::one() / t12;
-        let t149 = T::nearest(2.0) * t46;
-        let t150 = -t149;
-        let t151 = T::nearest(2.0) * t104;
-        let t152 = t25 * t98;
-        let t153 = T::nearest(2.0) * t152;
-        let t154 = -t153;
-        let t155 = T::nearest(2.0) * t42;
-        let t156 = -t155;
-        let t157 = t156 + T::nearest(2.0);
-        let t158 = t150 * t151;
-        let t159 = t154 * t157;
-        let t160 = t158 - t159;
-        let t161 = t151 - t149;
-        let t162 = t154 + T::nearest(2.0);
-        let t163 = t156 * t162;
-        let t164 = t158 - t163;
-        let t165 = t10 * t160;
-        let t166 = T::nearest(2.0) * t109;
-        let t167 = t166 * t161;
-        let t168 = t11 * t164;
-        let t169 = t165 + t167;
-        let t170 = t169 + t168;
-        let t171 = self.fixed[8] * t114;
-        let t172 = t171 * t170;
-        let t173 = -t172;
-        let t174 = t159 - t163;
-        let t175 = t10 - t11;
-        let t176 = t161 * t175;
-        let t177 = t109 * t174;
-        let t178 = t176 + t177;
-        let t179 = t171 * t178;
-        let t180 = t11 * t160;
-        let t181 = t10 * t164;
-        let t182 = t167 - t180;
-        let t183 = t182 - t181;
-        let t184 = t171 * t183;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184)
+        let t149 = T::nearest(2.0) * t42;
+        let t150 = T::one() - t149;
+        let t151 = t10 - t11;
+        let t152 = t151 * t26;
+        let t153 = t25 * t152;
+        let t154 = t109 * t150;
+        let t155 = t153 + t154;
+        let t159 = self.fixed[9] * t7;
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t162 = t160 * t161;
+        let t163 = t159 * t162;
+        let t164 = t163 * t155;
+        let t165 = -t164;
+        let t166 = t150 * t151;
+        let t168 = T::nearest(4.0) * t109;
+        let t169 = t168 * t46;
+        let t170 = t169 - t166;
+        let t172 = self.fixed[10] * t7;
+        let t173 = t172 * t162;
+        let t174 = t173 * t170;
+        let t175 = -t174;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164)
     }
     #[inline]
     fn body_force(
@@ -609,67 +588,67 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t103 = self.fixed[7] * t100;
         let t104 = t46 - t103;
         let t114 = T::one() / t12;
-        let t185 = T::nearest(2.0) * t13;
-        let t187 = T::nearest(3.0) * t15;
-        let t188 = t185 - t187;
-        let t189 = t19 * t188;
-        let t190 = t13 * t17;
-        let t191 = T::nearest(64.0) * t190;
-        let t192 = t191 - t189;
-        let t193 = t26 * t192;
-        let t194 = t190 * t21;
-        let t195 = t93 * t194;
-        let t196 = t195 * t25;
-        let t197 = t193 - t196;
-        let t198 = t15 * t19;
-        let t199 = t26 * t98;
-        let t200 = t198 * t199;
-        let t201 = t25 * t197;
-        let t202 = t200 + t201;
-        let t203 = t96 * t46;
-        let t204 = t13 * t114;
-        let t205 = t204 * t203;
-        let t206 = self.fixed[7] * t7;
-        let t207 = t206 * t202;
-        let t208 = t205 + t207;
-        let t209 = t13 * t21;
-        let t210 = self.fixed[5] * t209;
-        let t211 = t210 * t69;
-        let t214 = self.fixed[9] * t208;
-        let t215 = t214 - t211;
-        let t216 = t13 - t15;
-        let t217 = t19 * t216;
-        let t218 = T::nearest(32.0) * t190;
-        let t219 = t218 - t217;
-        let t220 = t26 * t219;
-        let t221 = t220 - t196;
-        let t222 = t25 * t219;
-        let t223 = t195 * t26;
-        let t224 = t222 + t223;
-        let t225 = t198 * t44;
-        let t226 = t26 * t221;
-        let t227 = t25 * t224;
-        let t228 = t225 - t226;
-        let t229 = t228 + t227;
-        let t230 = t46 - t104;
-        let t231 = t204 * t230;
-        let t232 = t206 * t229;
-        let t233 = t231 + t232;
-        let t235 = self.fixed[10] * t209;
-        let t236 = t235 * t75;
-        let t238 = self.fixed[11] * t233;
-        let t239 = t236 + t238;
-        let t240 = X[0] * t215;
-        let t241 = self.fixed[0] * X[1];
-        let t242 = t241 * t239;
-        let t243 = t240 - t242;
-        let t244 = t204 * t243;
-        let t245 = X[1] * t215;
-        let t246 = self.fixed[0] * X[0];
-        let t247 = t246 * t239;
-        let t248 = t245 + t247;
-        let t249 = t204 * t248;
-        crate::nalgebra::SVector::<T, 2>::new(t244, t249)
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t176 = T::nearest(2.0) * t13;
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = t13 * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t184 = t26 * t183;
+        let t185 = t181 * t21;
+        let t186 = t93 * t185;
+        let t187 = t186 * t25;
+        let t188 = t184 - t187;
+        let t189 = t26 * t98;
+        let t190 = t160 * t189;
+        let t191 = t25 * t188;
+        let t192 = t190 + t191;
+        let t193 = t96 * t46;
+        let t194 = t161 * t193;
+        let t195 = self.fixed[7] * t7;
+        let t196 = t195 * t192;
+        let t197 = t194 + t196;
+        let t198 = t13 * t21;
+        let t199 = self.fixed[5] * t198;
+        let t200 = t199 * t69;
+        let t203 = self.fixed[11] * t197;
+        let t204 = t203 - t200;
+        let t205 = t13 - t15;
+        let t206 = t19 * t205;
+        let t207 = T::nearest(32.0) * t181;
+        let t208 = t207 - t206;
+        let t209 = t26 * t208;
+        let t210 = t209 - t187;
+        let t211 = t25 * t208;
+        let t212 = t186 * t26;
+        let t213 = t211 + t212;
+        let t214 = t160 * t44;
+        let t215 = t26 * t210;
+        let t216 = t25 * t213;
+        let t217 = t214 - t215;
+        let t218 = t217 + t216;
+        let t219 = t46 - t104;
+        let t220 = t161 * t219;
+        let t221 = t195 * t218;
+        let t222 = t220 + t221;
+        let t224 = self.fixed[12] * t198;
+        let t225 = t224 * t75;
+        let t227 = self.fixed[13] * t222;
+        let t228 = t225 + t227;
+        let t229 = X[0] * t204;
+        let t230 = self.fixed[0] * X[1];
+        let t231 = t230 * t228;
+        let t232 = t229 - t231;
+        let t233 = t161 * t232;
+        let t234 = X[1] * t204;
+        let t235 = self.fixed[0] * X[0];
+        let t236 = t235 * t228;
+        let t237 = t234 + t236;
+        let t238 = t161 * t237;
+        crate::nalgebra::SVector::<T, 2>::new(t233, t238)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t6 = self.fixed[1] * t;
@@ -792,102 +771,86 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t142 = -t141;
         let t143 = T::one() - t116;
         let t144 = T::one() - t141;
-        let t149 = T::nearest(2.0) * t46;
-        let t150 = -t149;
-        let t151 = T::nearest(2.0) * t104;
-        let t152 = t25 * t98;
-        let t153 = T::nearest(2.0) * t152;
-        let t154 = -t153;
-        let t155 = T::nearest(2.0) * t42;
-        let t156 = -t155;
-        let t157 = t156 + T::nearest(2.0);
-        let t158 = t150 * t151;
-        let t159 = t154 * t157;
-        let t160 = t158 - t159;
-        let t161 = t151 - t149;
-        let t162 = t154 + T::nearest(2.0);
-        let t163 = t156 * t162;
-        let t164 = t158 - t163;
-        let t165 = t10 * t160;
-        let t166 = T::nearest(2.0) * t109;
-        let t167 = t166 * t161;
-        let t168 = t11 * t164;
-        let t169 = t165 + t167;
-        let t170 = t169 + t168;
-        let t171 = self.fixed[8] * t114;
-        let t172 = t171 * t170;
-        let t173 = -t172;
-        let t174 = t159 - t163;
-        let t175 = t10 - t11;
-        let t176 = t161 * t175;
-        let t177 = t109 * t174;
-        let t178 = t176 + t177;
-        let t179 = t171 * t178;
-        let t180 = t11 * t160;
-        let t181 = t10 * t164;
-        let t182 = t167 - t180;
-        let t183 = t182 - t181;
-        let t184 = t171 * t183;
-        let t185 = T::nearest(2.0) * t13;
-        let t187 = T::nearest(3.0) * t15;
-        let t188 = t185 - t187;
-        let t189 = t19 * t188;
-        let t190 = t13 * t17;
-        let t191 = T::nearest(64.0) * t190;
-        let t192 = t191 - t189;
-        let t193 = t26 * t192;
-        let t194 = t190 * t21;
-        let t195 = t93 * t194;
-        let t196 = t195 * t25;
-        let t197 = t193 - t196;
-        let t198 = t15 * t19;
-        let t199 = t26 * t98;
-        let t200 = t198 * t199;
-        let t201 = t25 * t197;
-        let t202 = t200 + t201;
-        let t203 = t96 * t46;
-        let t204 = t13 * t114;
-        let t205 = t204 * t203;
-        let t206 = self.fixed[7] * t7;
-        let t207 = t206 * t202;
-        let t208 = t205 + t207;
-        let t209 = t13 * t21;
-        let t210 = self.fixed[5] * t209;
-        let t211 = t210 * t69;
-        let t214 = self.fixed[9] * t208;
-        let t215 = t214 - t211;
-        let t216 = t13 - t15;
-        let t217 = t19 * t216;
-        let t218 = T::nearest(32.0) * t190;
-        let t219 = t218 - t217;
-        let t220 = t26 * t219;
-        let t221 = t220 - t196;
-        let t222 = t25 * t219;
-        let t223 = t195 * t26;
-        let t224 = t222 + t223;
-        let t225 = t198 * t44;
-        let t226 = t26 * t221;
-        let t227 = t25 * t224;
-        let t228 = t225 - t226;
-        let t229 = t228 + t227;
-        let t230 = t46 - t104;
-        let t231 = t204 * t230;
-        let t232 = t206 * t229;
-        let t233 = t231 + t232;
-        let t235 = self.fixed[10] * t209;
-        let t236 = t235 * t75;
-        let t238 = self.fixed[11] * t233;
-        let t239 = t236 + t238;
-        let t240 = X[0] * t215;
-        let t241 = self.fixed[0] * X[1];
-        let t242 = t241 * t239;
-        let t243 = t240 - t242;
-        let t244 = t204 * t243;
-        let t245 = X[1] * t215;
-        let t246 = self.fixed[0] * X[0];
-        let t247 = t246 * t239;
-        let t248 = t245 + t247;
-        let t249 = t204 * t248;
+        let t149 = T::nearest(2.0) * t42;
+        let t150 = T::one() - t149;
+        let t151 = t10 - t11;
+        let t152 = t151 * t26;
+        let t153 = t25 * t152;
+        let t154 = t109 * t150;
+        let t155 = t153 + t154;
+        let t159 = self.fixed[9] * t7;
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t162 = t160 * t161;
+        let t163 = t159 * t162;
+        let t164 = t163 * t155;
+        let t165 = -t164;
+        let t166 = t150 * t151;
+        let t168 = T::nearest(4.0) * t109;
+        let t169 = t168 * t46;
+        let t170 = t169 - t166;
+        let t172 = self.fixed[10] * t7;
+        let t173 = t172 * t162;
+        let t174 = t173 * t170;
+        let t175 = -t174;
+        let t176 = T::nearest(2.0) * t13;
+        let t178 = T::nearest(3.0) * t15;
+        let t179 = t176 - t178;
+        let t180 = t19 * t179;
+        let t181 = t13 * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t183 = t182 - t180;
+        let t184 = t26 * t183;
+        let t185 = t181 * t21;
+        let t186 = t93 * t185;
+        let t187 = t186 * t25;
+        let t188 = t184 - t187;
+        let t189 = t26 * t98;
+        let t190 = t160 * t189;
+        let t191 = t25 * t188;
+        let t192 = t190 + t191;
+        let t193 = t96 * t46;
+        let t194 = t161 * t193;
+        let t195 = self.fixed[7] * t7;
+        let t196 = t195 * t192;
+        let t197 = t194 + t196;
+        let t198 = t13 * t21;
+        let t199 = self.fixed[5] * t198;
+        let t200 = t199 * t69;
+        let t203 = self.fixed[11] * t197;
+        let t204 = t203 - t200;
+        let t205 = t13 - t15;
+        let t206 = t19 * t205;
+        let t207 = T::nearest(32.0) * t181;
+        let t208 = t207 - t206;
+        let t209 = t26 * t208;
+        let t210 = t209 - t187;
+        let t211 = t25 * t208;
+        let t212 = t186 * t26;
+        let t213 = t211 + t212;
+        let t214 = t160 * t44;
+        let t215 = t26 * t210;
+        let t216 = t25 * t213;
+        let t217 = t214 - t215;
+        let t218 = t217 + t216;
+        let t219 = t46 - t104;
+        let t220 = t161 * t219;
+        let t221 = t195 * t218;
+        let t222 = t220 + t221;
+        let t224 = self.fixed[12] * t198;
+        let t225 = t224 * t75;
+        let t227 = self.fixed[13] * t222;
+        let t228 = t225 + t227;
+        let t229 = X[0] * t204;
+        let t230 = self.fixed[0] * X[1];
+        let t231 = t230 * t228;
+        let t232 = t229 - t231;
+        let t233 = t161 * t232;
+        let t234 = X[1] * t204;
+        let t235 = self.fixed[0] * X[0];
+        let t236 = t235 * t228;
+        let t237 = t234 + t236;
+        let t238 = t161 * t237;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
@@ -895,8 +858,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
             H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t117, t127, t135, t142),
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
             J: T::one(),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
-            b: crate::nalgebra::SVector::<T, 2>::new(t244, t249),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164),
+            b: crate::nalgebra::SVector::<T, 2>::new(t233, t238),
         }
     }
     fn traction(
@@ -929,38 +892,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
-                let t43 = t26 * t26;
-                let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[6] * t7;
-                let t94 = t13 * t15;
-                let t95 = t94 * t19;
-                let t96 = t93 * t95;
-                let t97 = t96 * t26;
-                let t98 = t25 + t97;
-                let t99 = t7 * t95;
-                let t100 = t99 * t44;
-                let t103 = self.fixed[7] * t100;
-                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t149 = T::nearest(2.0) * t46;
-                let t150 = -t149;
-                let t151 = T::nearest(2.0) * t104;
-                let t152 = t25 * t98;
-                let t153 = T::nearest(2.0) * t152;
-                let t154 = -t153;
-                let t155 = T::nearest(2.0) * t42;
-                let t156 = -t155;
-                let t158 = t150 * t151;
-                let t161 = t151 - t149;
-                let t162 = t154 + T::nearest(2.0);
-                let t163 = t156 * t162;
-                let t164 = t158 - t163;
-                let t259 = t11 * t114;
-                let t260 = self.fixed[8] * t259;
-                let t261 = t260 * t164;
-                let t262 = t260 * t161;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t261, t262))
+                let t149 = T::nearest(2.0) * t42;
+                let t150 = T::one() - t149;
+                let t159 = self.fixed[9] * t7;
+                let t160 = t15 * t19;
+                let t161 = t13 * t114;
+                let t172 = self.fixed[10] * t7;
+                let t248 = t160 * t11;
+                let t249 = t248 * t161;
+                let t250 = t159 * t249;
+                let t251 = t250 * t46;
+                let t252 = -t251;
+                let t253 = t172 * t249;
+                let t254 = t253 * t150;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t252, t254))
             }
             crate::Surface::Lower(1) => {
                 let t6 = self.fixed[1] * t;
@@ -979,39 +926,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t25 = t24.sin();
                 let t26 = t24.cos();
                 let t42 = t25 * t25;
-                let t43 = t26 * t26;
-                let t44 = t42 - t43;
                 let t46 = t25 * t26;
-                let t93 = self.fixed[6] * t7;
-                let t94 = t13 * t15;
-                let t95 = t94 * t19;
-                let t96 = t93 * t95;
-                let t97 = t96 * t26;
-                let t98 = t25 + t97;
-                let t99 = t7 * t95;
-                let t100 = t99 * t44;
-                let t103 = self.fixed[7] * t100;
-                let t104 = t46 - t103;
                 let t114 = T::one() / t12;
-                let t149 = T::nearest(2.0) * t46;
-                let t150 = -t149;
-                let t151 = T::nearest(2.0) * t104;
-                let t152 = t25 * t98;
-                let t153 = T::nearest(2.0) * t152;
-                let t154 = -t153;
-                let t155 = T::nearest(2.0) * t42;
-                let t156 = -t155;
-                let t158 = t150 * t151;
-                let t161 = t151 - t149;
-                let t162 = t154 + T::nearest(2.0);
-                let t163 = t156 * t162;
-                let t164 = t158 - t163;
-                let t263 = t10 * t114;
-                let t264 = self.fixed[8] * t263;
-                let t265 = t264 * t161;
-                let t266 = -t265;
-                let t267 = t264 * t164;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t266, t267))
+                let t149 = T::nearest(2.0) * t42;
+                let t150 = T::one() - t149;
+                let t159 = self.fixed[9] * t7;
+                let t160 = t15 * t19;
+                let t161 = t13 * t114;
+                let t172 = self.fixed[10] * t7;
+                let t255 = t160 * t10;
+                let t256 = t255 * t161;
+                let t257 = t172 * t256;
+                let t258 = t257 * t150;
+                let t259 = -t258;
+                let t260 = t159 * t256;
+                let t261 = t260 * t46;
+                let t262 = -t261;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t259, t262))
             }
             _ => None,
         }
@@ -1039,7 +970,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[13],
+            lambda: self.fixed[15],
             mu: self.fixed[8],
         })
     }
@@ -1050,7 +981,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[12]
+        self.fixed[14]
     }
     fn body_force_on(
         &self,
@@ -1063,7 +994,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
     ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 3, 2, 7>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 5, 2, 8>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1076,13 +1007,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
         let t41 = t6.cos_pi();
         let t62 = t41 * t41;
         let t93 = self.fixed[6] * t7;
-        let t206 = self.fixed[7] * t7;
-        let t293 = self.fixed[15] * t62;
-        let t297 = self.fixed[16] * t7;
-        let t303 = self.fixed[10] * t7;
-        let t306 = self.fixed[17] * t62;
-        let t314 = self.fixed[19] * t7;
-        [t23, t93, t206, t293, t297, t303, t306, t314]
+        let t195 = self.fixed[7] * t7;
+        let t288 = self.fixed[17] * t62;
+        let t292 = self.fixed[18] * t7;
+        let t298 = self.fixed[12] * t7;
+        let t301 = self.fixed[19] * t62;
+        let t309 = self.fixed[21] * t7;
+        [t23, t93, t195, t288, t292, t298, t301, t309]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -1091,8 +1022,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
         let t12 = t10 + t11;
         let t13 = t12.sqrt();
         let t114 = T::one() / t12;
-        let t204 = t13 * t114;
-        [X[0], X[1], t13, t204]
+        let t161 = t13 * t114;
+        [X[0], X[1], t13, t161]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1112,87 +1043,89 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
         let t43 = t26 * t26;
         let t44 = t42 - t43;
         let t46 = t25 * t26;
-        let t190 = point[2] * t17;
-        let t191 = T::nearest(64.0) * t190;
-        let t198 = t15 * t19;
-        let t209 = point[2] * t21;
-        let t216 = point[2] - t15;
-        let t217 = t19 * t216;
-        let t218 = T::nearest(32.0) * t190;
-        let t219 = t218 - t217;
-        let t220 = t26 * t219;
-        let t222 = t25 * t219;
-        let t225 = t198 * t44;
-        let t241 = self.fixed[0] * point[1];
-        let t246 = self.fixed[0] * point[0];
-        let t270 = point[2] * t198;
-        let t271 = time[1] * t270;
-        let t272 = point[3] * t46;
-        let t273 = t272 * t271;
-        let t274 = t26 * t271;
-        let t275 = t25 + t274;
-        let t276 = t198 * t26;
-        let t277 = t276 * t275;
-        let t278 = self.fixed[14] * point[2];
-        let t279 = t278 - T::nearest(3.0);
-        let t280 = t19 * t279;
-        let t281 = t191 - t280;
-        let t282 = t281 * t26;
-        let t283 = time[1] * t21;
-        let t284 = t283 * t190;
-        let t285 = t25 * t284;
-        let t286 = t282 - t285;
-        let t287 = t25 * t286;
-        let t288 = t277 + t287;
-        let t289 = time[2] * t288;
-        let t290 = t273 + t289;
-        let t291 = self.fixed[9] * t290;
-        let t294 = time[3] * t21;
-        let t295 = t294 * t44;
-        let t298 = time[4] * t46;
-        let t299 = t295 + t298;
-        let t300 = t209 * t299;
-        let t301 = t291 + t300;
-        let t302 = point[0] * t301;
-        let t304 = time[5] * t44;
-        let t307 = time[6] * t21;
-        let t308 = t307 * t46;
-        let t309 = t304 - t308;
-        let t310 = t209 * t309;
-        let t312 = self.fixed[18] * t46;
-        let t315 = time[7] * t270;
-        let t316 = t315 * t44;
-        let t317 = t312 + t316;
-        let t318 = point[3] * t317;
-        let t319 = t220 - t285;
-        let t320 = t26 * t319;
-        let t321 = t225 - t320;
-        let t322 = t26 * t284;
-        let t323 = t222 + t322;
-        let t324 = t25 * t323;
-        let t325 = t321 + t324;
-        let t326 = time[7] * t325;
-        let t327 = t318 + t326;
-        let t328 = t310 + t327;
-        let t329 = t241 * t328;
-        let t330 = t302 - t329;
-        let t331 = point[3] * t330;
-        let t332 = point[1] * t301;
-        let t333 = t246 * t328;
-        let t334 = t332 + t333;
-        let t335 = point[3] * t334;
-        crate::nalgebra::SVector::<T, 2>::new(t331, t335)
+        let t160 = t15 * t19;
+        let t181 = point[2] * t17;
+        let t182 = T::nearest(64.0) * t181;
+        let t198 = point[2] * t21;
+        let t205 = point[2] - t15;
+        let t206 = t19 * t205;
+        let t207 = T::nearest(32.0) * t181;
+        let t208 = t207 - t206;
+        let t209 = t26 * t208;
+        let t211 = t25 * t208;
+        let t214 = t160 * t44;
+        let t230 = self.fixed[0] * point[1];
+        let t235 = self.fixed[0] * point[0];
+        let t265 = point[2] * t160;
+        let t266 = time[1] * t265;
+        let t267 = point[3] * t46;
+        let t268 = t267 * t266;
+        let t269 = t26 * t266;
+        let t270 = t25 + t269;
+        let t271 = t160 * t26;
+        let t272 = t271 * t270;
+        let t273 = self.fixed[16] * point[2];
+        let t274 = t273 - T::nearest(3.0);
+        let t275 = t19 * t274;
+        let t276 = t182 - t275;
+        let t277 = t276 * t26;
+        let t278 = time[1] * t21;
+        let t279 = t278 * t181;
+        let t280 = t25 * t279;
+        let t281 = t277 - t280;
+        let t282 = t25 * t281;
+        let t283 = t272 + t282;
+        let t284 = time[2] * t283;
+        let t285 = t268 + t284;
+        let t286 = self.fixed[11] * t285;
+        let t289 = time[3] * t21;
+        let t290 = t289 * t44;
+        let t293 = time[4] * t46;
+        let t294 = t290 + t293;
+        let t295 = t198 * t294;
+        let t296 = t286 + t295;
+        let t297 = point[0] * t296;
+        let t299 = time[5] * t44;
+        let t302 = time[6] * t21;
+        let t303 = t302 * t46;
+        let t304 = t299 - t303;
+        let t305 = t198 * t304;
+        let t307 = self.fixed[20] * t46;
+        let t310 = time[7] * t265;
+        let t311 = t310 * t44;
+        let t312 = t307 + t311;
+        let t313 = point[3] * t312;
+        let t314 = t209 - t280;
+        let t315 = t26 * t314;
+        let t316 = t214 - t315;
+        let t317 = t26 * t279;
+        let t318 = t211 + t317;
+        let t319 = t25 * t318;
+        let t320 = t316 + t319;
+        let t321 = time[7] * t320;
+        let t322 = t313 + t321;
+        let t323 = t305 + t322;
+        let t324 = t230 * t323;
+        let t325 = t297 - t324;
+        let t326 = point[3] * t325;
+        let t327 = point[1] * t296;
+        let t328 = t235 * t323;
+        let t329 = t327 + t328;
+        let t330 = point[3] * t329;
+        crate::nalgebra::SVector::<T, 2>::new(t326, t330)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
+impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 8> for Vortex<T> {
     #[inline]
-    fn state_time(&self, t: T) -> [T; 3] {
+    fn state_time(&self, t: T) -> [T; 5] {
         let t6 = self.fixed[1] * t;
         let t7 = t6.sin_pi();
         let t23 = self.fixed[2] * t7;
         let t93 = self.fixed[6] * t7;
-        [t7, t23, t93]
+        let t159 = self.fixed[9] * t7;
+        let t172 = self.fixed[10] * t7;
+        [t7, t23, t93, t159, t172]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 2] {
@@ -1204,7 +1137,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         [t23, t52]
     }
     #[inline]
-    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 7] {
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
         let t10 = X[0] * X[0];
         let t11 = X[1] * X[1];
         let t12 = t10 + t11;
@@ -1217,14 +1150,18 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t94 = t13 * t15;
         let t95 = t94 * t19;
         let t114 = T::one() / t12;
-        [X[0], X[1], t10, t11, t21, t95, t114]
+        let t115 = T::nearest(2.0) * t114;
+        let t160 = t15 * t19;
+        let t161 = t13 * t114;
+        let t162 = t160 * t161;
+        [X[0], X[1], t10, t11, t21, t95, t115, t162]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
         &self,
-        time: &[T; 3],
+        time: &[T; 5],
         velocity_time: &[T; 2],
-        point: &[T; 7],
+        point: &[T; 8],
     ) -> crate::State<T, 2> {
         let v = {
             let time = velocity_time;
@@ -1285,8 +1222,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t111 = point[3] * t42;
         let t112 = t110 - t108;
         let t113 = t112 + t111;
-        let t115 = T::nearest(2.0) * point[6];
-        let t116 = t115 * t113;
+        let t116 = point[6] * t113;
         let t118 = point[1] * t98;
         let t119 = t35 + t118;
         let t120 = point[0] * t119;
@@ -1295,7 +1231,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t123 = t109 * t42;
         let t124 = t121 + t122;
         let t125 = t124 - t123;
-        let t126 = t115 * t125;
+        let t126 = point[6] * t125;
         let t127 = -t126;
         let t128 = point[1] * t106;
         let t129 = t25 * t128;
@@ -1303,57 +1239,38 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 2, 7> for Vortex<T> {
         let t131 = t129 + t123;
         let t132 = t131 + t130;
         let t133 = -t132;
-        let t134 = t115 * t133;
+        let t134 = point[6] * t133;
         let t135 = -t134;
         let t136 = point[1] * t119;
         let t137 = t25 * t136;
         let t138 = point[2] * t42;
         let t139 = t137 - t110;
         let t140 = t139 + t138;
-        let t141 = t115 * t140;
+        let t141 = point[6] * t140;
         let t143 = T::one() - t116;
         let t144 = T::one() - t141;
-        let t149 = T::nearest(2.0) * t46;
-        let t150 = -t149;
-        let t151 = T::nearest(2.0) * t104;
-        let t152 = t25 * t98;
-        let t153 = T::nearest(2.0) * t152;
-        let t154 = -t153;
-        let t155 = T::nearest(2.0) * t42;
-        let t156 = -t155;
-        let t157 = t156 + T::nearest(2.0);
-        let t158 = t150 * t151;
-        let t159 = t154 * t157;
-        let t160 = t158 - t159;
-        let t161 = t151 - t149;
-        let t162 = t154 + T::nearest(2.0);
-        let t163 = t156 * t162;
-        let t164 = t158 - t163;
-        let t165 = point[2] * t160;
-        let t166 = T::nearest(2.0) * t109;
-        let t167 = t166 * t161;
-        let t168 = point[3] * t164;
-        let t169 = t165 + t167;
-        let t170 = t169 + t168;
-        let t171 = self.fixed[8] * point[6];
-        let t172 = t171 * t170;
-        let t173 = -t172;
-        let t174 = t159 - t163;
-        let t175 = point[2] - point[3];
-        let t176 = t161 * t175;
-        let t177 = t109 * t174;
-        let t178 = t176 + t177;
-        let t179 = t171 * t178;
-        let t180 = point[3] * t160;
-        let t181 = point[2] * t164;
-        let t182 = t167 - t180;
-        let t183 = t182 - t181;
-        let t184 = t171 * t183;
+        let t149 = T::nearest(2.0) * t42;
+        let t150 = T::one() - t149;
+        let t151 = point[2] - point[3];
+        let t152 = t151 * t26;
+        let t153 = t25 * t152;
+        let t154 = t109 * t150;
+        let t155 = t153 + t154;
+        let t163 = time[3] * point[7];
+        let t164 = t163 * t155;
+        let t165 = -t164;
+        let t166 = t150 * t151;
+        let t168 = T::nearest(4.0) * t109;
+        let t169 = t168 * t46;
+        let t170 = t169 - t166;
+        let t173 = time[4] * point[7];
+        let t174 = t173 * t170;
+        let t175 = -t174;
         crate::State {
             u: crate::nalgebra::SVector::<T, 2>::new(t33, t39),
             v,
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t143, t127, t135, t144),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t173, t179, t179, t184),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t165, t175, t175, t164),
         }
     }
 }

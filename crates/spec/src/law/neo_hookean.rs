@@ -4,6 +4,8 @@
 //!   `(F F^T - I) F^-T = F - F^-T = H + H^T F^-T`, it is `P = mu (H + H^T F^-T) + lambda log1p(J - 1) F^-T`. The product
 //!   `tau F^-T` instead would form squares of `H` that the division by `F` takes away again: at large gradients
 //!   that loses digits.
+//! - Where shear strains are small next to the turn, terms of `H + H^T` cancel in symbols. The entry of `F - F^-T` is
+//!   `H + H^T - H^T (H^T F^-T)` then, whose second part is of second order.
 //! - Where the motion turns as it goes, `H` is large next to the strain, and the turn drops out of the sum
 //!   `F F^T - I = H + H^T + H H^T` alone, in symbols: there `P = tau F^-T` with
 //!   `tau = lambda log1p(J - 1) I + mu (F F^T - I)`.
@@ -12,10 +14,13 @@
 //!   `mu Div H + (lambda + mu) grad tr H` and, with `M = H^T F^-T` and `g = grad tr H - m`, a remainder of second order,
 //!   `-(lambda + mu) (m + M g) - lambda ln J F^-T g`, where `m = M : grad H`.
 
+use super::turn::strain_without_turn;
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
+use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, matrix_product};
 use mmsmith_expr::{Expr, Graph};
+use std::collections::BTreeSet;
 
 pub(super) fn stress(
     derivation: &mut Derivation,
@@ -28,8 +33,9 @@ pub(super) fn stress(
     let open = (lambda, mu);
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
-    let law = NeoHookean { deformation, lambda, mu };
-    let strain = strain_without_turn(graph, &deformation.H);
+    let doubled_strain = doubled_strain(graph, deformation, &derivation.variables);
+    let law = NeoHookean { deformation, lambda, mu, doubled_strain };
+    let strain = strain_without_turn(graph, deformation);
     let P = match &strain {
         Some(strain) => law.by_strain(graph, strain),
         None => law.by_gradient(graph),
@@ -48,6 +54,8 @@ struct NeoHookean<'a> {
     /// Lamé's constants, each in one piece.
     lambda: Expr,
     mu: Expr,
+    /// `H + H^T` without its diagonal, where terms of its parts cancel in symbols.
+    doubled_strain: Vec<Vec<Option<Expr>>>,
 }
 
 impl NeoHookean<'_> {
@@ -58,7 +66,7 @@ impl NeoHookean<'_> {
         let mut P = once.clone();
         for (i, row) in P.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {
-                let shear = graph.add(self.deformation.H[i][j], once[i][j]);
+                let shear = self.difference(graph, &once, i, j);
                 let shear = graph.mul(self.mu, shear);
                 let normal = graph.mul(pressure, self.deformation.inverse_transpose[i][j]);
                 *entry = graph.add(shear, normal);
@@ -66,6 +74,17 @@ impl NeoHookean<'_> {
             }
         }
         P
+    }
+
+    /// Entry `ij` of `F - F^-T`, from `M = H^T F^-T`: `H + M`, or `H + H^T - H^T M`.
+    fn difference(&self, graph: &mut Graph, M: &Matrix, i: usize, j: usize) -> Expr {
+        let H = &self.deformation.H;
+        let Some(strain) = self.doubled_strain[i][j] else {
+            return graph.add(H[i][j], M[i][j]);
+        };
+        let terms: Vec<Expr> = (0..H.len()).map(|k| graph.mul(H[k][i], M[k][j])).collect();
+        let second = graph.sum_of(terms);
+        graph.sub(strain, second)
     }
 
     /// `tau F^-T` with `tau = lambda ln J I + mu (F F^T - I)`.
@@ -119,7 +138,7 @@ impl NeoHookean<'_> {
             let once = self.deformation.transposed_gradient_times_inverse(graph);
             for i in 0..n {
                 for j in 0..n {
-                    let shear = graph.add(H[i][j], once[i][j]);
+                    let shear = self.difference(graph, &once, i, j);
                     let shear = graph.mul(self.mu, shear);
                     let turned = graph.mul(pressure, once[i][j]);
                     rest[i][j] = graph.sub(shear, turned);
@@ -138,7 +157,7 @@ impl NeoHookean<'_> {
         derivation: &mut Derivation,
         (open_lambda, open_mu): (Expr, Expr),
     ) -> Divergence {
-        let &Self { deformation, lambda, mu } = self;
+        let &Self { deformation, lambda, mu, .. } = self;
         let H = &deformation.H;
         let n = H.len();
         let graph = &mut derivation.graph;
@@ -197,23 +216,25 @@ impl NeoHookean<'_> {
     }
 }
 
-/// `H + H^T + H H^T = F F^T - I` where a turn drops out of it in symbols.
-pub(super) fn strain_without_turn(graph: &mut Graph, H: &Matrix) -> Option<Matrix> {
-    let n = H.len();
-    let mut strain = vec![vec![Graph::ZERO; n]; n];
-    let mut turns = false;
+/// The entries of `H + H^T`, but for the diagonal, where terms of the sum cancel in symbols.
+fn doubled_strain(
+    graph: &mut Graph,
+    deformation: &Deformation,
+    variables: &BTreeSet<Expr>,
+) -> Vec<Vec<Option<Expr>>> {
+    let open = &deformation.open;
+    let n = open.len();
+    let mut strain = vec![vec![None; n]; n];
     for i in 0..n {
-        for j in 0..n {
-            let mut terms = vec![H[i][j], H[j][i]];
-            terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
-            let left = graph.without_vanishing_part(&terms);
-            let sum = graph.sum_of(left.iter().copied());
-            strain[i][j] = graph.shortened(sum);
-            // A turn takes the parts of first order away with those of second order.
-            let first = [H[i][j], H[j][i]];
-            let lost = |h: &Expr| *h != Graph::ZERO && !left.contains(h);
-            turns |= first.iter().any(lost) || strain[i][j] != sum;
+        for j in 0..i {
+            let negative = graph.neg(open[j][i]);
+            let sum = graph.sub(open[i][j], negative);
+            let sum = graph.cancel(sum, variables);
+            if is_joined(graph, sum, [open[i][j], negative], variables) {
+                let sum = graph.whole(sum);
+                (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
+            }
         }
     }
-    turns.then_some(strain)
+    strain
 }

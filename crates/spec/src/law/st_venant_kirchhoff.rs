@@ -3,6 +3,7 @@
 //! With `G = 2 E = H + H^T + H^T H` it is `P = S + H S`: the part linear in `H` and the remainder
 //! `lambda/2 (H : H) I + mu H^T H + H S`, all of them sums in which nothing large cancels.
 
+use super::turn::right_strain;
 use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, matrix_product, transpose};
@@ -20,17 +21,7 @@ pub(super) fn stress(
     let H = &deformation.H;
     let n = H.len();
     let products = matrix_product(graph, &transpose(H), H);
-    let mut G = products.clone();
-    for i in 0..n {
-        for j in 0..n {
-            let mut terms = vec![H[i][j], H[j][i]];
-            terms.extend((0..n).map(|m| graph.mul(H[m][i], H[m][j])));
-            // What a rotation leaves behind cancels identically.
-            let terms = graph.without_vanishing_part(&terms);
-            let sum = graph.sum_of(terms);
-            G[i][j] = graph.shortened(sum);
-        }
-    }
+    let G = right_strain(graph, deformation);
     let mut second = isotropic(graph, &G, lambda, mu);
     for entry in second.iter_mut().flatten() {
         *entry = graph.whole(*entry);
