@@ -14,7 +14,6 @@
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
 use super::energy::modulus_at_rest;
-use super::turn::strain_without_turn;
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, matrix_product};
@@ -121,7 +120,7 @@ impl Invariants {
         let power_change = graph.neg(change);
         let power_change = graph.whole(power_change);
 
-        let strain = strain_without_turn(graph, deformation);
+        let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
         let trace = match &strain {
             Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
             None => {

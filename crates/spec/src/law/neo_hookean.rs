@@ -14,7 +14,6 @@
 //!   `mu Div H + (lambda + mu) grad tr H` and, with `M = H^T F^-T` and `g = grad tr H - m`, a remainder of second order,
 //!   `-(lambda + mu) (m + M g) - lambda ln J F^-T g`, where `m = M : grad H`.
 
-use super::turn::strain_without_turn;
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::derive::is_joined;
@@ -35,7 +34,7 @@ pub(super) fn stress(
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let doubled_strain = doubled_strain(graph, deformation, &derivation.variables);
     let law = NeoHookean { deformation, lambda, mu, doubled_strain };
-    let strain = strain_without_turn(graph, deformation);
+    let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
     let P = match &strain {
         Some(strain) => law.by_strain(graph, strain),
         None => law.by_gradient(graph),

@@ -3,7 +3,6 @@
 //! With `G = 2 E = H + H^T + H^T H` it is `P = S + H S`: the part linear in `H` and the remainder
 //! `lambda/2 (H : H) I + mu H^T H + H S`, all of them sums in which nothing large cancels.
 
-use super::turn::right_strain;
 use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, matrix_product, transpose};
@@ -21,7 +20,18 @@ pub(super) fn stress(
     let H = &deformation.H;
     let n = H.len();
     let products = matrix_product(graph, &transpose(H), H);
-    let G = right_strain(graph, deformation);
+    let G = match &deformation.turn {
+        Some(turn) => turn.right_strain(graph),
+        None => {
+            let mut G = products.clone();
+            for i in 0..n {
+                for j in 0..n {
+                    G[i][j] = graph.sum_of([H[i][j], H[j][i], products[i][j]]);
+                }
+            }
+            G
+        }
+    };
     let mut second = isotropic(graph, &G, lambda, mu);
     for entry in second.iter_mut().flatten() {
         *entry = graph.whole(*entry);

@@ -4,10 +4,9 @@
 //! these in symbols, they keep their digits: at once, or with `H = S + N`, where `S` is the gradient of the displacement with the angles of
 //! the motion held, and `I + S` a rotation. Then `F F^T - I = N + N^T + S N^T + N S^T + N N^T`.
 
-use super::Deformation;
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, determinant, principal_minors, transpose};
-use mmsmith_expr::{Expr, Function, Graph, Node};
+use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A displacement gradient `S + N` in which `I + S` is a rotation.
@@ -28,9 +27,10 @@ impl Turn {
             return None;
         }
         let (mut held, mut free) = (BTreeMap::new(), BTreeMap::new());
-        for (k, &angle) in angles.iter().enumerate() {
-            // No specification can have names like these.
-            let symbol = graph.symbol(&format!("angle {k}"));
+        // No specification can have names like these.
+        let symbols: Vec<Expr> =
+            (0..angles.len()).map(|k| graph.symbol(&format!("angle {k}"))).collect();
+        for (&angle, &symbol) in angles.iter().zip(&symbols) {
             for function in [Function::Sin, Function::Cos] {
                 let (of_angle, of_symbol) =
                     (graph.call(function, &[angle]), graph.call(function, &[symbol]));
@@ -39,29 +39,26 @@ impl Turn {
             }
         }
         let u: Vector = u.iter().map(|&u| graph.replace(u, &held)).collect();
-        let mut S = derivation.gradient(&u);
-        for entry in S.iter_mut().flatten() {
-            *entry = derivation.graph.replace(*entry, &free);
-        }
-        let mut N = S.clone();
-        for (i, &u) in u.iter().enumerate() {
+        let gradient = derivation.gradient(&u);
+        let (mut S, mut N) = (gradient.clone(), gradient.clone());
+        for i in 0..n {
             for j in 0..n {
-                let mut terms = Vec::new();
-                for (k, &angle) in angles.iter().enumerate() {
-                    let symbol = derivation.graph.symbol(&format!("angle {k}"));
-                    let change = derivation.derivative(u, symbol);
+                let (turn, rest) = split(&mut derivation.graph, gradient[i][j], &symbols);
+                let mut terms = vec![derivation.graph.replace(rest, &free)];
+                for (&angle, &symbol) in angles.iter().zip(&symbols) {
+                    let change = derivation.derivative(u[i], symbol);
                     let change = derivation.graph.replace(change, &free);
                     let along = derivation.along(angle, j);
                     terms.push(derivation.graph.mul(change, along));
                 }
+                S[i][j] = derivation.graph.replace(turn, &free);
                 N[i][j] = derivation.graph.sum_of(terms);
             }
         }
-        let graph = &mut derivation.graph;
-        let is_zero = |A: &Matrix| A.iter().flatten().all(|&entry| entry == Graph::ZERO);
-        if is_zero(&S) || is_zero(&N) {
+        if S.iter().flatten().all(|&entry| entry == Graph::ZERO) {
             return None;
         }
+        let graph = &mut derivation.graph;
         for i in 0..n {
             for j in 0..n {
                 let mut terms = vec![S[i][j], S[j][i]];
@@ -108,7 +105,7 @@ impl Turn {
     }
 
     /// `F F^T - I`.
-    fn strain(&self, graph: &mut Graph) -> Matrix {
+    pub(super) fn strain(&self, graph: &mut Graph) -> Matrix {
         let Turn { S, N } = self;
         let n = S.len();
         let mut strain = S.clone();
@@ -120,14 +117,15 @@ impl Turn {
                     terms.push(graph.mul(N[i][m], S[j][m]));
                     terms.push(graph.mul(N[i][m], N[j][m]));
                 }
-                strain[i][j] = graph.sum_of(terms);
+                let sum = graph.sum_of(terms);
+                strain[i][j] = graph.shortened(sum);
             }
         }
         strain
     }
 
     /// `F^T F - I`.
-    fn right_strain(&self, graph: &mut Graph) -> Matrix {
+    pub(super) fn right_strain(&self, graph: &mut Graph) -> Matrix {
         Turn { S: transpose(&self.S), N: transpose(&self.N) }.strain(graph)
     }
 }
@@ -146,47 +144,19 @@ fn angles(graph: &Graph, u: &Vector, coordinates: &[Expr]) -> Vec<Expr> {
     found.into_iter().filter(depends).collect()
 }
 
-/// `H + H^T + H H^T = F F^T - I` where a turn drops out of it in symbols.
-pub(super) fn strain_without_turn(graph: &mut Graph, deformation: &Deformation) -> Option<Matrix> {
-    if let Some(turn) = &deformation.turn {
-        return Some(turn.strain(graph));
-    }
-    let H = &deformation.H;
-    let n = H.len();
-    let mut strain = vec![vec![Graph::ZERO; n]; n];
-    let mut turns = false;
-    for i in 0..n {
-        for j in 0..n {
-            let mut terms = vec![H[i][j], H[j][i]];
-            terms.extend((0..n).map(|m| graph.mul(H[i][m], H[j][m])));
-            let left = graph.without_vanishing_part(&terms);
-            let sum = graph.sum_of(left.iter().copied());
-            strain[i][j] = graph.shortened(sum);
-            // A turn takes the parts of first order away with those of second order.
-            let first = [H[i][j], H[j][i]];
-            let lost = |h: &Expr| *h != Graph::ZERO && !left.contains(h);
-            turns |= first.iter().any(lost) || strain[i][j] != sum;
+/// The terms in which nothing occurs but the angles, and the others.
+fn split(graph: &mut Graph, entry: Expr, angles: &[Expr]) -> (Expr, Expr) {
+    let is_of_angles =
+        |term: Expr| graph.symbols_in(&[term]).iter().all(|symbol| angles.contains(symbol));
+    let own: Vec<(Rational, Expr)> = match graph.node(entry) {
+        Node::Sum { constant, terms } => {
+            let own = terms.iter().filter(|(term, _)| is_of_angles(*term));
+            let own = own.map(|(term, coefficient)| (coefficient.clone(), *term));
+            own.chain([(constant.clone(), Graph::ONE)]).collect()
         }
-    }
-    turns.then_some(strain)
-}
-
-/// `H + H^T + H^T H = F^T F - I`, without what a turn leaves behind.
-pub(super) fn right_strain(graph: &mut Graph, deformation: &Deformation) -> Matrix {
-    if let Some(turn) = &deformation.turn {
-        return turn.right_strain(graph);
-    }
-    let H = &deformation.H;
-    let n = H.len();
-    let mut G = H.clone();
-    for i in 0..n {
-        for j in 0..n {
-            let mut terms = vec![H[i][j], H[j][i]];
-            terms.extend((0..n).map(|m| graph.mul(H[m][i], H[m][j])));
-            let terms = graph.without_vanishing_part(&terms);
-            let sum = graph.sum_of(terms);
-            G[i][j] = graph.shortened(sum);
-        }
-    }
-    G
+        _ if is_of_angles(entry) => return (entry, Graph::ZERO),
+        _ => return (Graph::ZERO, entry),
+    };
+    let own = graph.sum(own);
+    (own, graph.sub(entry, own))
 }
