@@ -32,32 +32,45 @@ pub(super) fn stress(
             G
         }
     };
+    let pressure = half_trace_times(graph, &G, lambda);
     let mut second = isotropic(graph, &G, lambda, mu);
     for entry in second.iter_mut().flatten() {
         *entry = graph.whole(*entry);
     }
     let turned = matrix_product(graph, H, &second);
-    let mut P = second;
+    let (mut P, mut anisotropic) = (second.clone(), second);
     let mut remainder = isotropic(graph, &products, lambda, mu);
     for i in 0..n {
         for j in 0..n {
             P[i][j] = graph.add(P[i][j], turned[i][j]);
             P[i][j] = zero_if_vanishing(graph, P[i][j]);
             P[i][j] = graph.shortened(P[i][j]);
+            anisotropic[i][j] = match i == j && pressure != Graph::ZERO {
+                true => {
+                    let shear = graph.mul(mu, G[i][j]);
+                    let entry = graph.add(shear, turned[i][j]);
+                    zero_if_vanishing(graph, entry)
+                }
+                false => P[i][j],
+            };
             remainder[i][j] = graph.add(remainder[i][j], turned[i][j]);
         }
     }
     let remainder = derivation.divergence(&remainder);
-    let anisotropic = P.clone();
-    Stress { P, isotropic: Graph::ZERO, anisotropic, linear, remainder, whole: None, energy: None }
+    Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole: None, energy: None }
+}
+
+/// `lambda/2 tr(G)`.
+fn half_trace_times(graph: &mut Graph, G: &Matrix, lambda: Expr) -> Expr {
+    let trace = graph.sum_of((0..G.len()).map(|k| G[k][k]));
+    let two = graph.integer(2);
+    let half = graph.div(trace, two);
+    graph.mul(lambda, half)
 }
 
 /// `lambda/2 tr(G) I + mu G`.
 fn isotropic(graph: &mut Graph, G: &Matrix, lambda: Expr, mu: Expr) -> Matrix {
-    let trace = graph.sum_of((0..G.len()).map(|k| G[k][k]));
-    let two = graph.integer(2);
-    let half = graph.div(trace, two);
-    let pressure = graph.mul(lambda, half);
+    let pressure = half_trace_times(graph, G, lambda);
     let mut stress = G.clone();
     for (i, row) in stress.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
