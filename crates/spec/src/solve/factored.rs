@@ -103,18 +103,33 @@ pub(super) fn factored(
     let mut form = Form { graph, space, coordinate, places };
     let differences = form.differences();
     let shifts = form.shifts()?;
-    let below = form.expression(denominator, &differences, &shifts)?;
-    let mut terms = Vec::new();
+    let below = form.expression(denominator.clone(), &differences, &shifts)?;
+    let (mut terms, mut given) = (Vec::new(), Vec::new());
     for (changing, numerator) in numerators {
         let roots = form.roots();
         let all: Vec<Polynomial> = roots.into_iter().chain(differences.iter().cloned()).collect();
+        let common = Common { denominator: &denominator, below, factors: &all };
+        if let Some(value) = form.through_given_values(&numerator, least, &common, &shifts) {
+            given.push(form.graph.mul(changing, value));
+            continue;
+        }
         let above = form.expression(numerator, &all, &shifts)?;
         terms.push(form.graph.mul(changing, above));
     }
     let sum = graph.sum_of(terms);
     let power = graph.powi(along.coordinate, least);
     let scaled = graph.mul(sum, power);
-    Some(graph.div(scaled, below))
+    given.push(graph.div(scaled, below));
+    Some(graph.sum_of(given))
+}
+
+/// What the terms of a displacement have in common.
+struct Common<'a> {
+    denominator: &'a Polynomial,
+    /// The denominator as an expression.
+    below: Expr,
+    /// What numerators are divided by as often as it goes.
+    factors: &'a [Polynomial],
 }
 
 /// The terms of `expr`, multiplied out as far as the coordinate is in sums.
@@ -370,6 +385,83 @@ impl Form<'_> {
         }
         product.push((total, Rational::one()));
         Some(self.graph.product(product))
+    }
+
+    /// `numerator R^least` over the denominator as `(R/p)^n [c_0 + (R - p) (c_1 + ...)]`, where the first of the `c` are free of the
+    /// denominator: the conditions give the value at `p`, and perhaps a slope. Next to `p` no digits are lost then where the denominator
+    /// almost vanishes. Negative powers stay with the rest, which would else be large next to a small inner radius. `None` where there is no
+    /// such place.
+    fn through_given_values(
+        &mut self,
+        numerator: &Polynomial,
+        least: i64,
+        common: &Common<'_>,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
+        let size = |polynomial: &Polynomial| polynomial.terms().count();
+        let coordinate = self.space.power(self.coordinate, 1);
+        let (mut rest, mut power) = (numerator.clone(), least);
+        while let Some(quotient) = rest.divided_by(&coordinate).filter(|q| !q.is_zero()) {
+            (rest, power) = (quotient, power + 1);
+        }
+        let times_power = |polynomial: &Polynomial, base: &Polynomial, power: i64| {
+            (0..power).try_fold(polynomial.clone(), |product, _| product.times(base))
+        };
+        let mut denominator = common.denominator.clone();
+        let mut nested: Vec<(usize, Fraction)> = Vec::new();
+        while !rest.is_zero() && nested.len() <= self.places.len() {
+            let mut best: Option<(usize, Fraction)> = None;
+            for (node, place) in self.places.iter().enumerate() {
+                let (_, value) = rest.divided_by_distance(self.coordinate, place)?;
+                let base = match nested.first() {
+                    Some((first, _)) if power > 0 => &self.places[*first],
+                    _ => place,
+                };
+                let above = times_power(&value, base, power)?;
+                let below = times_power(&denominator, base, -power)?;
+                let value = Fraction::reduced(above, below)?.with_monic_denominator();
+                let is_better = best
+                    .as_ref()
+                    .is_none_or(|(_, known)| size(&value.denominator) < size(&known.denominator));
+                if size(&value.denominator) < size(common.denominator) && is_better {
+                    best = Some((node, value));
+                }
+            }
+            let Some((node, value)) = best else { break };
+            if power < 0 {
+                let own = times_power(&value.numerator, &coordinate, -power)?;
+                rest = rest.times(&value.denominator)?.minus(&own.times(&denominator)?);
+                denominator = denominator.times(&value.denominator)?;
+                let whole = Fraction { numerator: rest, denominator }.with_monic_denominator();
+                (rest, denominator) = (whole.numerator, whole.denominator);
+            }
+            (rest, _) = rest.divided_by_distance(self.coordinate, &self.places[node])?;
+            nested.push((node, value));
+        }
+        let &(first, _) = nested.first()?;
+        let place = self.space.atoms[self.coordinate];
+        let base = self.places[first].clone();
+        let base = self.in_differences(&base, shifts)?;
+        let below = match denominator == *common.denominator {
+            true => common.below,
+            false => self.expression(denominator, common.factors, shifts)?,
+        };
+        let above = self.expression(rest, common.factors, shifts)?;
+        let scale = self.graph.powi(if power < 0 { place } else { base }, power);
+        let scaled = self.graph.mul(above, scale);
+        let mut total = self.graph.div(scaled, below);
+        let roots = self.roots();
+        for (node, value) in nested.into_iter().rev() {
+            let above = self.in_differences(&value.numerator, shifts)?;
+            let below = self.in_differences(&value.denominator, shifts)?;
+            let distance = self.in_differences(&roots[node], shifts)?;
+            let value = self.graph.div(above, below);
+            let step = self.graph.mul(distance, total);
+            total = self.graph.add(value, step);
+        }
+        let ratio = self.graph.div(place, base);
+        let factor = self.graph.powi(ratio, power.max(0));
+        Some(self.graph.mul(factor, total))
     }
 
     /// The polynomial in the differences to the base, in one piece. Distances between the coordinate and the places have the

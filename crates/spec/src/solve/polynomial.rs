@@ -216,7 +216,7 @@ impl Fraction {
         Fraction { numerator, denominator: Polynomial::constant(Rational::one(), variables) }
     }
 
-    fn reduced(numerator: Polynomial, denominator: Polynomial) -> Option<Self> {
+    pub(super) fn reduced(numerator: Polynomial, denominator: Polynomial) -> Option<Self> {
         let common = numerator.gcd(&denominator)?;
         let (numerator, denominator) =
             (numerator.divided_by(&common)?, denominator.divided_by(&common)?);
@@ -225,6 +225,15 @@ impl Fraction {
 
     pub(super) fn is_zero(&self) -> bool {
         self.numerator.is_zero()
+    }
+
+    /// The same with the leading coefficient of the denominator one.
+    pub(super) fn with_monic_denominator(self) -> Self {
+        let leading = self.denominator.terms().last().map(|(_, leading)| Rational::one() / leading);
+        let Some(factor) = leading else { return self };
+        let [numerator, denominator] =
+            [self.numerator, self.denominator].map(|polynomial| polynomial.scaled(&factor));
+        Fraction { numerator, denominator }
     }
 
     pub(super) fn negated(mut self) -> Self {
