@@ -7,6 +7,7 @@
 //! of polynomials in the parameters, kept in lowest terms.
 
 mod factored;
+mod given_values;
 mod polynomial;
 
 use self::factored::{Along, Solution, factored};

@@ -2,16 +2,14 @@
 //!
 //! The strain of a motion that turns, `H + H^T + H H^T`, holds terms such as `-4 s^2 + 4 s^4 + 4 s^2 c^2`, which
 //! are zero since `s^2 + c^2 = 1`. Computed one by one they leave their rounding errors, which are large next to a
-//! small strain. [`Graph::without_vanishing_part`] drops such terms; [`Graph::shortened`] multiplies out what contains
-//! sines and cosines, and keeps the result where terms cancel and it is the shorter form.
+//! small strain. [`Graph::shortened`] multiplies out what contains sines and cosines, and keeps the result where terms
+//! cancel and it is the shorter form.
 
 use super::polynomial::{Monomial, add_to, product};
 use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Sums with more terms than this are not searched for parts that vanish.
-const MOST_PARTS: usize = 8;
 /// What would multiply out to more terms than this is left as it is.
 const MOST_TERMS: usize = 64;
 /// Powers beyond this are not multiplied out.
@@ -21,36 +19,6 @@ const LARGEST_POWER: u32 = 8;
 type Polynomial = super::polynomial::Polynomial<Expr>;
 
 impl Graph {
-    /// The terms without the largest part of them whose sum [vanishes](Graph::vanishes).
-    pub fn without_vanishing_part(&mut self, terms: &[Expr]) -> Vec<Expr> {
-        let terms: Vec<Expr> = terms.iter().copied().filter(|&e| e != Graph::ZERO).collect();
-        if terms.len() > MOST_PARTS {
-            return terms;
-        }
-        let mut parts: Vec<usize> = (1..1_usize << terms.len()).collect();
-        // Stable, so that the choice is definite.
-        parts.sort_by_key(|part| std::cmp::Reverse(part.count_ones()));
-        if !self.sum_is_sampled(&terms) {
-            // With nothing to sort out by, only the whole sum is worth a look.
-            parts.truncate(1);
-        }
-        for part in parts {
-            let of_part = |inside: bool| {
-                let chosen = terms.iter().enumerate();
-                chosen.filter(move |(i, _)| (part >> i & 1 == 1) == inside).map(|(_, &e)| e)
-            };
-            // The sum is not made where a look at one place tells.
-            if self.sum_differs_from_zero(of_part(true)) {
-                continue;
-            }
-            let sum = self.sum_of(of_part(true));
-            if self.vanishes(sum) {
-                return of_part(false).collect();
-            }
-        }
-        terms
-    }
-
     /// `expr` multiplied out in sines and cosines, with `cos^2 = 1 - sin^2`, where terms cancel and the result is
     /// shorter; else `expr` itself.
     ///
@@ -220,7 +188,7 @@ impl Shortening<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_PARTS, MOST_TERMS, Monomial, Polynomial, Shortening};
+    use super::{MOST_TERMS, Monomial, Polynomial, Shortening};
     use crate::{Ast, Expr, Function, Graph, Program};
     use proptest::prelude::*;
     use std::collections::{BTreeMap, BTreeSet};
@@ -228,57 +196,6 @@ mod tests {
     fn build(graph: &mut Graph, text: &str) -> Expr {
         let ast = Ast::parse(text).unwrap();
         graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap()
-    }
-
-    #[test]
-    fn the_rotation_drops_out_of_a_strain() {
-        let mut graph = Graph::new();
-        // 2 H_XX + H_XX^2 + H_XY^2 + H_XZ^2 for H_XX = -2 s^2, H_XY = -2 s c.
-        let texts = [
-            "-2*sin(a)^2",
-            "-2*sin(a)^2",
-            "4*sin(a)^4",
-            "4*sin(a)^2*cos(a)^2",
-            "(x*sin(a)+y*cos(a))^2",
-        ];
-        let terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
-        let left = graph.without_vanishing_part(&terms);
-        assert_eq!(left, [terms[4]]);
-        // Without one of them nothing vanishes.
-        assert_eq!(graph.without_vanishing_part(&terms[1..]), terms[1..]);
-        assert!(graph.without_vanishing_part(&terms[..4]).is_empty());
-    }
-
-    /// A look at one place sorts out what cannot vanish; where a function has no value there, only all terms together
-    /// are worth the search.
-    #[test]
-    fn terms_without_a_value_vanish_together_only() {
-        let mut graph = Graph::new();
-        let mut terms = |texts: &[&str]| -> Vec<Expr> {
-            texts.iter().map(|text| build(&mut graph, text)).collect()
-        };
-        let part = terms(&["arctan(a)", "sin(b)^2", "cos(b)^2", "-1"]);
-        let all = terms(&["arctan(a)*sin(b)^2", "arctan(a)*cos(b)^2", "-arctan(a)"]);
-        assert_eq!(graph.without_vanishing_part(&part), part);
-        assert!(graph.without_vanishing_part(&part[1..]).is_empty());
-        assert!(graph.without_vanishing_part(&all).is_empty());
-    }
-
-    /// The search takes twice as long with each term more.
-    #[test]
-    fn of_many_terms_no_part_is_searched_for() {
-        let mut graph = Graph::new();
-        let mut texts = vec!["sin(a)^2".to_owned(), "cos(a)^2".into(), "-1".into()];
-        texts.extend((1..=5).map(|n| format!("a^{n}")));
-        let mut terms: Vec<Expr> = texts.iter().map(|text| build(&mut graph, text)).collect();
-        assert_eq!(terms.len(), MOST_PARTS);
-        assert_eq!(graph.without_vanishing_part(&terms), terms[3..]);
-        terms.push(build(&mut graph, "a^6"));
-        assert_eq!(graph.without_vanishing_part(&terms), terms);
-        // Zeros do not count.
-        terms.pop();
-        terms.push(Graph::ZERO);
-        assert_eq!(graph.without_vanishing_part(&terms), terms[3..8]);
     }
 
     /// Limits on terms and powers may be reached and not be passed.

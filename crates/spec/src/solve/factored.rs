@@ -124,12 +124,12 @@ pub(super) fn factored(
 }
 
 /// What the terms of a displacement have in common.
-struct Common<'a> {
-    denominator: &'a Polynomial,
+pub(super) struct Common<'a> {
+    pub(super) denominator: &'a Polynomial,
     /// The denominator as an expression.
-    below: Expr,
+    pub(super) below: Expr,
     /// What numerators are divided by as often as it goes.
-    factors: &'a [Polynomial],
+    pub(super) factors: &'a [Polynomial],
 }
 
 /// The terms of `expr`, multiplied out as far as the coordinate is in sums.
@@ -206,8 +206,8 @@ fn spread(graph: &mut Graph, expr: Expr, along: &Along<'_>) -> Option<Vec<Part>>
 }
 
 /// The variables of polynomials.
-struct Space {
-    atoms: Vec<Expr>,
+pub(super) struct Space {
+    pub(super) atoms: Vec<Expr>,
 }
 
 impl Space {
@@ -215,11 +215,11 @@ impl Space {
         self.atoms.binary_search(&atom).ok()
     }
 
-    fn constant(&self, value: Rational) -> Polynomial {
+    pub(super) fn constant(&self, value: Rational) -> Polynomial {
         Polynomial::constant(value, self.atoms.len())
     }
 
-    fn power(&self, variable: usize, power: u32) -> Polynomial {
+    pub(super) fn power(&self, variable: usize, power: u32) -> Polynomial {
         self.constant(Rational::one()).shifted(variable, power)
     }
 
@@ -290,23 +290,23 @@ impl Space {
 }
 
 /// Polynomials become expressions.
-struct Form<'a> {
-    graph: &'a mut Graph,
-    space: Space,
-    coordinate: usize,
+pub(super) struct Form<'a> {
+    pub(super) graph: &'a mut Graph,
+    pub(super) space: Space,
+    pub(super) coordinate: usize,
     /// The places where conditions hold, as far as they are polynomials in symbols.
-    places: Vec<Polynomial>,
+    pub(super) places: Vec<Polynomial>,
 }
 
 /// By which place symbols are diminished that are places too: these are given by their indices among the atoms.
-struct Shifts {
+pub(super) struct Shifts {
     base: Polynomial,
     others: Vec<usize>,
 }
 
 impl Form<'_> {
     /// The coordinate less each place, and itself.
-    fn roots(&self) -> Vec<Polynomial> {
+    pub(super) fn roots(&self) -> Vec<Polynomial> {
         let coordinate = self.space.power(self.coordinate, 1);
         let roots = self.places.iter().map(|place| coordinate.minus(place));
         roots.chain([coordinate.clone()]).collect()
@@ -346,7 +346,7 @@ impl Form<'_> {
     }
 
     /// The polynomial: `factors` as often as they divide it, and the rest in Newton's form.
-    fn expression(
+    pub(super) fn expression(
         &mut self,
         mut polynomial: Polynomial,
         factors: &[Polynomial],
@@ -387,86 +387,13 @@ impl Form<'_> {
         Some(self.graph.product(product))
     }
 
-    /// `numerator R^least` over the denominator as `(R/p)^n [c_0 + (R - p) (c_1 + ...)]`, where the first of the `c` are free of the
-    /// denominator: the conditions give the value at `p`, and perhaps a slope. Next to `p` no digits are lost then where the denominator
-    /// almost vanishes. Negative powers stay with the rest, which would else be large next to a small inner radius. `None` where there is no
-    /// such place.
-    fn through_given_values(
-        &mut self,
-        numerator: &Polynomial,
-        least: i64,
-        common: &Common<'_>,
-        shifts: &Shifts,
-    ) -> Option<Expr> {
-        let size = |polynomial: &Polynomial| polynomial.terms().count();
-        let coordinate = self.space.power(self.coordinate, 1);
-        let (mut rest, mut power) = (numerator.clone(), least);
-        while let Some(quotient) = rest.divided_by(&coordinate).filter(|q| !q.is_zero()) {
-            (rest, power) = (quotient, power + 1);
-        }
-        let times_power = |polynomial: &Polynomial, base: &Polynomial, power: i64| {
-            (0..power).try_fold(polynomial.clone(), |product, _| product.times(base))
-        };
-        let mut denominator = common.denominator.clone();
-        let mut nested: Vec<(usize, Fraction)> = Vec::new();
-        while !rest.is_zero() && nested.len() <= self.places.len() {
-            let mut best: Option<(usize, Fraction)> = None;
-            for (node, place) in self.places.iter().enumerate() {
-                let (_, value) = rest.divided_by_distance(self.coordinate, place)?;
-                let base = match nested.first() {
-                    Some((first, _)) if power > 0 => &self.places[*first],
-                    _ => place,
-                };
-                let above = times_power(&value, base, power)?;
-                let below = times_power(&denominator, base, -power)?;
-                let value = Fraction::reduced(above, below)?.with_monic_denominator();
-                let is_better = best
-                    .as_ref()
-                    .is_none_or(|(_, known)| size(&value.denominator) < size(&known.denominator));
-                if size(&value.denominator) < size(common.denominator) && is_better {
-                    best = Some((node, value));
-                }
-            }
-            let Some((node, value)) = best else { break };
-            if power < 0 {
-                let own = times_power(&value.numerator, &coordinate, -power)?;
-                rest = rest.times(&value.denominator)?.minus(&own.times(&denominator)?);
-                denominator = denominator.times(&value.denominator)?;
-                let whole = Fraction { numerator: rest, denominator }.with_monic_denominator();
-                (rest, denominator) = (whole.numerator, whole.denominator);
-            }
-            (rest, _) = rest.divided_by_distance(self.coordinate, &self.places[node])?;
-            nested.push((node, value));
-        }
-        let &(first, _) = nested.first()?;
-        let place = self.space.atoms[self.coordinate];
-        let base = self.places[first].clone();
-        let base = self.in_differences(&base, shifts)?;
-        let below = match denominator == *common.denominator {
-            true => common.below,
-            false => self.expression(denominator, common.factors, shifts)?,
-        };
-        let above = self.expression(rest, common.factors, shifts)?;
-        let scale = self.graph.powi(if power < 0 { place } else { base }, power);
-        let scaled = self.graph.mul(above, scale);
-        let mut total = self.graph.div(scaled, below);
-        let roots = self.roots();
-        for (node, value) in nested.into_iter().rev() {
-            let above = self.in_differences(&value.numerator, shifts)?;
-            let below = self.in_differences(&value.denominator, shifts)?;
-            let distance = self.in_differences(&roots[node], shifts)?;
-            let value = self.graph.div(above, below);
-            let step = self.graph.mul(distance, total);
-            total = self.graph.add(value, step);
-        }
-        let ratio = self.graph.div(place, base);
-        let factor = self.graph.powi(ratio, power.max(0));
-        Some(self.graph.mul(factor, total))
-    }
-
     /// The polynomial in the differences to the base, in one piece. Distances between the coordinate and the places have the
     /// coordinate's own rounding in common then, which is an error of the coordinate and no more.
-    fn in_differences(&mut self, polynomial: &Polynomial, shifts: &Shifts) -> Option<Expr> {
+    pub(super) fn in_differences(
+        &mut self,
+        polynomial: &Polynomial,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
         let mut meanings = self.space.atoms.clone();
         let coordinate = self.space.power(self.coordinate, 1);
         let sum = if *polynomial == coordinate {

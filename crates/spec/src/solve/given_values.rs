@@ -1,0 +1,213 @@
+//! Displacements whose values at some places are given by the conditions.
+//!
+//! The equations for the coefficients are almost singular for some parameters, and all coefficients are large then. Where a condition gives
+//! the displacement, `u_R(Ro) = T`, it is what it is nevertheless. So the interpolation of the values that are given is set apart, in
+//! which the denominator does not occur.
+
+use super::factored::{Common, Form, Shifts};
+use super::polynomial::{Fraction, Polynomial};
+use mmsmith_expr::{Expr, Graph, Rational};
+use num_traits::One;
+use std::collections::BTreeSet;
+
+/// Values that the conditions give, and `rest R^power` over the denominator, which is left of them.
+struct Given {
+    nodes: Vec<Coefficient>,
+    rest: Polynomial,
+    denominator: Polynomial,
+    power: i64,
+}
+
+/// A coefficient of an interpolation in Newton's form.
+struct Coefficient {
+    /// The index of the place.
+    place: usize,
+    value: Fraction,
+}
+
+impl Form<'_> {
+    /// `numerator R^least` over the denominator, where the conditions give its values `c_0`, `c_1`, ... at places `p`, `q`, ..., perhaps
+    /// with a slope: free of the denominator, which may almost vanish. With their interpolation `I` it is
+    /// `(R/p)^n [I + (R - p) (R - q) ... Q]`. Negative powers stay with `Q`, which would else be large next to a small inner radius.
+    /// `None` where no value is given.
+    pub(super) fn through_given_values(
+        &mut self,
+        numerator: &Polynomial,
+        least: i64,
+        common: &Common<'_>,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
+        let given = self.given_values(numerator, least, common)?;
+        let base = self.places[given.nodes.first()?.place].clone();
+        let base = self.in_differences(&base, shifts)?;
+        let radius = self.space.atoms[self.coordinate];
+        let ratio = self.graph.div(radius, base);
+        let factor = self.graph.powi(ratio, given.power.max(0));
+        let given_at: BTreeSet<usize> = given.nodes.iter().map(|node| node.place).collect();
+        // A value with a slope at one place alone is best gone on from: next to a rim that is near nothing cancels then.
+        let is_slope = given_at.len() == 1 && given.nodes.len() > 1;
+        let other = (0..self.places.len()).find(|place| !is_slope && !given_at.contains(place));
+        let total = match other.and_then(|other| self.between(&given, other, common, shifts)) {
+            Some(total) => total,
+            None => self.beside_the_first(&given, common, shifts)?,
+        };
+        Some(self.graph.mul(factor, total))
+    }
+
+    fn given_values(
+        &self,
+        numerator: &Polynomial,
+        least: i64,
+        common: &Common<'_>,
+    ) -> Option<Given> {
+        let size = |polynomial: &Polynomial| polynomial.terms().count();
+        let coordinate = self.space.power(self.coordinate, 1);
+        let (mut rest, mut power) = (numerator.clone(), least);
+        while let Some(quotient) = rest.divided_by(&coordinate).filter(|q| !q.is_zero()) {
+            (rest, power) = (quotient, power + 1);
+        }
+        let mut denominator = common.denominator.clone();
+        let mut nodes: Vec<Coefficient> = Vec::new();
+        while !rest.is_zero() && nodes.len() <= self.places.len() {
+            let mut best: Option<Coefficient> = None;
+            for (place, at) in self.places.iter().enumerate() {
+                let (_, value) = rest.divided_by_distance(self.coordinate, at)?;
+                let base = match nodes.first() {
+                    Some(first) if power > 0 => &self.places[first.place],
+                    _ => at,
+                };
+                let above = value.times(&self.to_the(base, power)?)?;
+                let below = denominator.times(&self.to_the(base, -power)?)?;
+                let value = Fraction::reduced(above, below)?.with_monic_denominator();
+                let is_better = best
+                    .as_ref()
+                    .is_none_or(|known| size(&value.denominator) < size(&known.value.denominator));
+                if size(&value.denominator) < size(common.denominator) && is_better {
+                    best = Some(Coefficient { place, value });
+                }
+            }
+            let Some(node) = best else { break };
+            if power < 0 {
+                let own = node.value.numerator.times(&self.to_the(&coordinate, -power)?)?;
+                rest = rest.times(&node.value.denominator)?.minus(&own.times(&denominator)?);
+                denominator = denominator.times(&node.value.denominator)?;
+                let whole = Fraction { numerator: rest, denominator }.with_monic_denominator();
+                (rest, denominator) = (whole.numerator, whole.denominator);
+            }
+            (rest, _) = rest.divided_by_distance(self.coordinate, &self.places[node.place])?;
+            nodes.push(node);
+        }
+        Some(Given { nodes, rest, denominator, power })
+    }
+
+    /// A power; one for negative exponents.
+    fn to_the(&self, base: &Polynomial, exponent: i64) -> Option<Polynomial> {
+        let one = self.space.constant(Rational::one());
+        (0..exponent).try_fold(one, |product, _| product.times(base))
+    }
+
+    /// `c_0 + (R - p) (c_1 + (R - q) (... + Q))`.
+    fn beside_the_first(
+        &mut self,
+        given: &Given,
+        common: &Common<'_>,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
+        let first = self.places[given.nodes.first()?.place].clone();
+        let scaled = given.rest.times(&self.to_the(&first, given.power)?)?;
+        let mut total = self.quotient(&scaled, &given.denominator, common, shifts)?;
+        let power = self.graph.powi(self.space.atoms[self.coordinate], given.power.min(0));
+        total = self.graph.mul(total, power);
+        self.newton(&given.nodes, total, shifts)
+    }
+
+    /// Next to a place `o` where nothing is given as well: `(R - o) K + W/W(o) [u(o) + (R - o) ...]`, where `W` is the product of the
+    /// distances to the places with values and `K` interpolates so that these come out.
+    fn between(
+        &mut self,
+        given: &Given,
+        other: usize,
+        common: &Common<'_>,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
+        let x = self.coordinate;
+        let roots = self.roots();
+        let at_other = |polynomial: &Polynomial| -> Option<Polynomial> {
+            Some(polynomial.divided_by_distance(x, &self.places[other])?.1)
+        };
+        let one = self.space.constant(Rational::one());
+        let mut W = one.clone();
+        let (mut above, mut below) = (Polynomial::default(), one);
+        for node in given.nodes.iter().rev() {
+            let value = &node.value;
+            let step = above.times(&roots[node.place])?.times(&value.denominator)?;
+            above = value.numerator.times(&below)?.plus(&step);
+            below = below.times(&value.denominator)?;
+            W = W.times(&roots[node.place])?;
+        }
+        let (W_there, value_there) = (at_other(&W)?, at_other(&above)?);
+        let below = below.times(&W_there)?;
+        // I - W/W(o) I(o) vanishes at o.
+        let vanishing = above.times(&W_there)?.minus(&W.times(&value_there)?);
+        let (mut rest, _) = vanishing.divided_by_distance(x, &self.places[other])?;
+        let mut nodes = Vec::new();
+        for node in &given.nodes {
+            let (quotient, value) = rest.divided_by_distance(x, &self.places[node.place])?;
+            let value = Fraction::reduced(value, below.clone())?.with_monic_denominator();
+            nodes.push(Coefficient { place: node.place, value });
+            rest = quotient;
+        }
+        // I(o)/W(o) + Q.
+        let first = &self.places[given.nodes.first()?.place];
+        let scaled = given.rest.times(&self.to_the(first, given.power)?)?;
+        let coordinate = self.space.power(x, 1);
+        let own = value_there.times(&given.denominator)?;
+        let own = own.times(&self.to_the(&coordinate, -given.power)?)?;
+        let sum = Fraction {
+            numerator: own.plus(&scaled.times(&below)?),
+            denominator: below.times(&given.denominator)?,
+        };
+        let sum = sum.without(&below).with_monic_denominator();
+
+        let interpolated = self.newton(&nodes, Graph::ZERO, shifts)?;
+        let distance = self.in_differences(&roots[other], shifts)?;
+        let interpolated = self.graph.mul(distance, interpolated);
+        let mut factors = vec![self.quotient(&sum.numerator, &sum.denominator, common, shifts)?];
+        factors.push(self.graph.powi(self.space.atoms[x], given.power.min(0)));
+        for node in &given.nodes {
+            factors.push(self.in_differences(&roots[node.place], shifts)?);
+        }
+        let rest = self.graph.product_of(factors);
+        Some(self.graph.add(interpolated, rest))
+    }
+
+    /// `c_0 + (R - p) (c_1 + (R - q) (... + innermost))`.
+    fn newton(&mut self, nodes: &[Coefficient], innermost: Expr, shifts: &Shifts) -> Option<Expr> {
+        let roots = self.roots();
+        let mut total = innermost;
+        for Coefficient { place, value } in nodes.iter().rev() {
+            let above = self.in_differences(&value.numerator, shifts)?;
+            let below = self.in_differences(&value.denominator, shifts)?;
+            let distance = self.in_differences(&roots[*place], shifts)?;
+            let value = self.graph.div(above, below);
+            let step = self.graph.mul(distance, total);
+            total = self.graph.add(value, step);
+        }
+        Some(total)
+    }
+
+    fn quotient(
+        &mut self,
+        above: &Polynomial,
+        below: &Polynomial,
+        common: &Common<'_>,
+        shifts: &Shifts,
+    ) -> Option<Expr> {
+        let above = self.expression(above.clone(), common.factors, shifts)?;
+        let below = match below == common.denominator {
+            true => common.below,
+            false => self.expression(below.clone(), common.factors, shifts)?,
+        };
+        Some(self.graph.div(above, below))
+    }
+}
