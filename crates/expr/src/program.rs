@@ -544,6 +544,11 @@ impl Lowering<'_> {
     }
 
     fn sum(&mut self, constant: Rational, terms: &[(Expr, Rational)]) -> Slot {
+        if let [(term, coefficient)] = terms
+            && let Some(square) = self.graph.as_square(&constant, *term, coefficient)
+        {
+            return self.lower(square);
+        }
         if !constant.is_zero() {
             // The rest as an expression of its own: where it occurs elsewhere, as H does beside 1 + H, it is shared.
             let rest = self.graph.sum(terms.iter().map(|(term, c)| (c.clone(), *term)));
