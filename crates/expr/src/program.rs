@@ -430,6 +430,20 @@ struct Lowering<'a> {
     definitions: &'a [(Expr, Expr)],
 }
 
+/// What an expression depends on, where some symbols have definitions.
+fn dependence(
+    graph: &Graph,
+    inputs: &[(Expr, Dependence)],
+    definitions: &[(Expr, Expr)],
+    expr: Expr,
+) -> Dependence {
+    let symbols = graph.symbols_in(&[expr]);
+    let own = inputs.iter().filter(|(input, _)| symbols.contains(input)).map(|(_, own)| *own);
+    let defined = definitions.iter().filter(|(symbol, _)| symbols.contains(symbol));
+    let defined = defined.map(|(_, meaning)| dependence(graph, inputs, definitions, *meaning));
+    own.chain(defined).fold(Dependence::default(), Dependence::join)
+}
+
 /// A part of a sum.
 enum Part {
     Term(Expr, Rational),
@@ -505,6 +519,10 @@ impl Lowering<'_> {
         {
             return self.log_of_one_and_exponential(arguments[0]);
         }
+        if let (Function::Ln, Some(rest)) = (function, self.beside_one(argument)) {
+            let logarithm = self.graph.call(Function::Ln1p, &[rest]);
+            return self.lower(logarithm);
+        }
         if matches!(function, Function::Sin | Function::Cos) {
             let pi = self.graph.pi();
             let turns = self.graph.div(argument, pi);
@@ -543,11 +561,38 @@ impl Lowering<'_> {
         }
     }
 
+    /// The `x` of `1 + x`, which may be written as a multiple of a sum.
+    fn beside_one(&mut self, expr: Expr) -> Option<Expr> {
+        let (sum, scale) = match self.graph.node(expr) {
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
+                (terms[0].0, terms[0].1.clone())
+            }
+            _ => (expr, Rational::one()),
+        };
+        let Node::Sum { constant, .. } = self.graph.node(sum) else { return None };
+        let constant = constant.clone();
+        if !(&constant * &scale).is_one() {
+            return None;
+        }
+        let constant = self.graph.number(constant);
+        let rest = self.graph.sub(sum, constant);
+        Some(self.graph.sum([(scale, rest)]))
+    }
+
     fn sum(&mut self, constant: Rational, terms: &[(Expr, Rational)]) -> Slot {
-        if let [(term, coefficient)] = terms
-            && let Some(square) = self.graph.as_square(&constant, *term, coefficient)
-        {
-            return self.lower(square);
+        let product = match terms {
+            [(term, coefficient)] => self.graph.constant_and_term(&constant, *term, coefficient),
+            [(a, of_a), (b, of_b)] if constant.is_zero() => {
+                let (inputs, definitions) = (self.inputs, self.definitions);
+                self.graph.two_terms([(*a, of_a), (*b, of_b)], |graph, terms| {
+                    let [a, b] = terms.map(|term| dependence(graph, inputs, definitions, term));
+                    a == b
+                })
+            }
+            _ => None,
+        };
+        if let Some(product) = product {
+            return self.lower(product);
         }
         if !constant.is_zero() {
             // The rest as an expression of its own: where it occurs elsewhere, as H does beside 1 + H, it is shared.

@@ -10,6 +10,7 @@ mod polynomial;
 mod pythagoras;
 mod residue;
 mod reuse;
+mod vanishing;
 
 pub use arrange::arrange;
 pub use cancel::Term;

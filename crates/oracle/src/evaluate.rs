@@ -157,7 +157,8 @@ impl Oracle {
     ///
     /// A value that has not settled at [`Oracle::MOST_BITS`] and is smaller than the largest intermediate result
     /// by a factor of `2^-1024` is rounding error, and is taken for the zero that it approaches. Nor is a zero settled
-    /// before where a sum of other numbers gave it, as `1 - tanh(x)` far from zero does in few bits.
+    /// before where a sum of other numbers gave it, as `1 - tanh(x)` far from zero does in few bits, and no value is
+    /// where a sum had no place for a term, as in `sqrt(1 + x) - 1` next to zero.
     ///
     /// # Errors
     ///
@@ -175,13 +176,14 @@ impl Oracle {
         while !moving.is_empty() && bits < Self::MOST_BITS {
             bits = (2 * bits).min(Self::MOST_BITS);
             let open: Vec<Expr> = moving.iter().map(|&i| expressions[i]).collect();
-            let Evaluated { values: fine, largest, cancelled } =
+            let Evaluated { values: fine, largest, cancelled, lost } =
                 self.evaluate_in(point, &open, bits)?;
             let mut still = Vec::new();
             for (i, fine) in moving.into_iter().zip(fine) {
                 let coarse = std::mem::replace(&mut values[i], fine);
                 let fine = &values[i];
-                let may_be_lost = cancelled && fine.is_zero() && bits < Self::MOST_BITS;
+                let may_be_lost = lost || cancelled && fine.is_zero();
+                let may_be_lost = may_be_lost && bits < Self::MOST_BITS;
                 if !may_be_lost && (fine - &coarse).abs() <= fine.abs() * &tolerance {
                     continue;
                 }
@@ -218,6 +220,7 @@ impl Oracle {
             bits,
             constants: &mut self.constants,
             cancelled: false,
+            lost: false,
         };
         let mut values = Vec::new();
         for &expression in expressions {
@@ -227,8 +230,8 @@ impl Oracle {
         }
         let exponents = evaluation.values.values().filter_map(BigFloat::exponent);
         let largest = exponents.max().and_then(|e| usize::try_from(e).ok()).unwrap_or(0);
-        let cancelled = evaluation.cancelled;
-        Ok(Evaluated { values, largest: power_of_two(largest), cancelled })
+        let (cancelled, lost) = (evaluation.cancelled, evaluation.lost);
+        Ok(Evaluated { values, largest: power_of_two(largest), cancelled, lost })
     }
 }
 
@@ -239,6 +242,8 @@ struct Evaluated {
     largest: Rational,
     /// Whether any sum of numbers that are not zero came out as zero.
     cancelled: bool,
+    /// Whether any sum had no place for one of its terms, as `1 + x` for a small `x`.
+    lost: bool,
 }
 
 /// The values found so far at one point.
@@ -250,6 +255,8 @@ struct Evaluation<'a> {
     constants: &'a mut Consts,
     /// Whether any sum of numbers that are not zero came out as zero.
     cancelled: bool,
+    /// Whether any sum had no place for one of its terms, as `1 + x` for a small `x`.
+    lost: bool,
 }
 
 impl Evaluation<'_> {
@@ -306,11 +313,16 @@ impl Evaluation<'_> {
             Node::Sum { constant, terms } => {
                 let mut sum = to_float(constant, bits);
                 let mut all_zero = sum.is_zero();
+                let mut is_lost = false;
                 for (term, coefficient) in terms {
                     let scaled = scaled(self.value(*term)?, coefficient, bits);
                     all_zero &= scaled.is_zero();
-                    sum = sum.add(&scaled, bits, ROUNDING);
+                    let before = sum;
+                    sum = before.add(&scaled, bits, ROUNDING);
+                    // As in 1 + x, whose logarithm is no zero for that.
+                    is_lost |= !scaled.is_zero() && sum.cmp(&before) == Some(0);
                 }
+                self.lost |= is_lost;
                 self.cancelled |= sum.is_zero() && !all_zero;
                 Ok(sum)
             }

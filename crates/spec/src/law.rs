@@ -9,12 +9,14 @@ mod turn;
 
 use crate::derivation::Derivation;
 use crate::tensor::{
-    Matrix, Vector, cofactor, determinant, matrix_product, principal_minors, transpose,
+    Matrix, Vector, cofactor, determinant, matrix_product, minors_beyond_trace, principal_minors,
+    transpose,
 };
 use crate::{DeriveError, Law};
 use energy::ComponentLaw;
 use mmsmith_expr::{Expr, Function, Graph, Node};
 use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
+use std::collections::BTreeSet;
 use turn::Turn;
 
 /// The deformation of one solution, in physical components.
@@ -105,7 +107,10 @@ impl Deformation {
         let volume_change = match &turn {
             Some(turn) => turn.volume_change(graph),
             None => {
-                let minors = principal_minors(graph, &H);
+                let minors = match is_free_of_divergence(graph, &open, &derivation.variables) {
+                    true => minors_beyond_trace(graph, &H),
+                    false => principal_minors(graph, &H),
+                };
                 graph.sum_of(minors)
             }
         };
@@ -151,6 +156,13 @@ impl Deformation {
     fn is_isochoric(&self) -> bool {
         self.volume_change == Graph::ZERO
     }
+}
+
+/// Whether `tr H` is zero in symbols: a displacement without divergence changes the volume to second order alone.
+fn is_free_of_divergence(graph: &mut Graph, open: &Matrix, variables: &BTreeSet<Expr>) -> bool {
+    let trace = graph.sum_of((0..open.len()).map(|i| open[i][i]));
+    let trace = graph.cancel(trace, variables);
+    graph.vanishes(trace)
 }
 
 /// The stress of a law at a deformation.

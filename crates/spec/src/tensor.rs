@@ -45,8 +45,18 @@ pub(crate) fn cofactor(graph: &mut Graph, A: &Matrix, i: usize, j: usize) -> Exp
 
 /// The determinants of all principal submatrices but the empty one; they add up to `det(I + A) - 1`.
 pub(crate) fn principal_minors(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
+    minors_of_size(graph, A, 1)
+}
+
+/// Those of at least two rows.
+pub(crate) fn minors_beyond_trace(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
+    minors_of_size(graph, A, 2)
+}
+
+fn minors_of_size(graph: &mut Graph, A: &Matrix, least: u32) -> Vec<Expr> {
     let n = A.len();
     (1..1_usize << n)
+        .filter(|subset| subset.count_ones() >= least)
         .map(|subset| {
             let indices: Vec<usize> = (0..n).filter(|i| subset >> i & 1 == 1).collect();
             let minor =

@@ -7,7 +7,7 @@
 
 use super::polynomial::{Monomial, add_to, product};
 use crate::{Expr, Function, Graph, Node, Rational};
-use num_traits::{One, Signed, ToPrimitive, Zero};
+use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What would multiply out to more terms than this is left as it is.
@@ -42,36 +42,6 @@ impl Graph {
         let size = |graph: &Graph, e| graph.reachable(&[e]).len();
         let shorter = size(self, candidate) < size(self, expr);
         if shorter && self.magnitude(candidate) <= self.magnitude(expr) { candidate } else { expr }
-    }
-
-    /// `constant + coefficient * term` as a square, where it is a multiple of `1 - cos(a) = 2 sin(a/2)^2`, `1 + cos(a) = 2 cos(a/2)^2` or
-    /// `1 -+ sin(a)`, which are those of `pi/2 - a`. Next to its zeros the sum would keep no digit.
-    pub(crate) fn as_square(
-        &mut self,
-        constant: &Rational,
-        term: Expr,
-        coefficient: &Rational,
-    ) -> Option<Expr> {
-        let Node::Call(function @ (Function::Sin | Function::Cos), arguments) = self.node(term)
-        else {
-            return None;
-        };
-        if constant.is_zero() || coefficient.abs() != constant.abs() {
-            return None;
-        }
-        let (function, argument) = (*function, arguments[0]);
-        let half = Rational::new(1.into(), 2.into());
-        let half_angle = if function == Function::Sin {
-            let pi = self.pi();
-            self.sum([(Rational::new(1.into(), 4.into()), pi), (-half, argument)])
-        } else {
-            self.sum([(half, argument)])
-        };
-        let is_difference = coefficient.is_negative() != constant.is_negative();
-        let of_half = if is_difference { Function::Sin } else { Function::Cos };
-        let value = self.call(of_half, &[half_angle]);
-        let square = self.powi(value, 2);
-        Some(self.sum([(Rational::from(2) * constant, square)]))
     }
 
     /// The angles of the sines and cosines of which `expr` is a polynomial.

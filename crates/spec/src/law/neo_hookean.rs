@@ -81,8 +81,14 @@ impl NeoHookean<'_> {
         let Some(strain) = self.doubled_strain[i][j] else {
             return graph.add(H[i][j], M[i][j]);
         };
-        let terms: Vec<Expr> = (0..H.len()).map(|k| graph.mul(H[k][i], M[k][j])).collect();
-        let second = graph.sum_of(terms);
+        let second = if H.len() == 2 {
+            // The cofactor is -H_ji there.
+            let change = graph.div(self.deformation.volume_change, self.deformation.J);
+            graph.mul(H[j][i], change)
+        } else {
+            let terms: Vec<Expr> = (0..H.len()).map(|k| graph.mul(H[k][i], M[k][j])).collect();
+            graph.sum_of(terms)
+        };
         graph.sub(strain, second)
     }
 

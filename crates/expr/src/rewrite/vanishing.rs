@@ -1,0 +1,146 @@
+//! Sums of two parts that vanish somewhere, in forms that keep their digits next to there.
+//!
+//! A bump such as `1 - cos(2 Pi X)` has a zero at which its slope is zero too: nothing that its input answers for hides the rounding of the
+//! two parts, of which no digit is left. As `2 sin(Pi X)^2` it is a product. So it is with `1 - 1/(1 + X)`, `sqrt(1 + X) - 1` and
+//! `cos(a) - cos(b)`.
+
+use crate::{Expr, Function, Graph, Node, Rational};
+use num_traits::{One, Signed, Zero};
+use std::collections::BTreeSet;
+
+impl Graph {
+    /// `constant + coefficient * term` as a product, where there is one.
+    pub(crate) fn constant_and_term(
+        &mut self,
+        constant: &Rational,
+        term: Expr,
+        coefficient: &Rational,
+    ) -> Option<Expr> {
+        if constant.is_zero() {
+            return None;
+        }
+        let square = self.square_of_half(constant, term, coefficient);
+        square.or_else(|| self.difference_to_constant(constant, term, coefficient))
+    }
+
+    /// `1 - cos(a) = 2 sin(a/2)^2`, `1 + cos(a) = 2 cos(a/2)^2`, `1 -+ sin(a)`, which are those of `pi/2 - a`, and `1 - cos(a)^2`,
+    /// `1 - sin(a)^2`.
+    fn square_of_half(
+        &mut self,
+        constant: &Rational,
+        term: Expr,
+        coefficient: &Rational,
+    ) -> Option<Expr> {
+        if coefficient.abs() != constant.abs() {
+            return None;
+        }
+        let is_difference = coefficient.is_negative() != constant.is_negative();
+        let (call, is_square) = match self.node(term) {
+            Node::Product(factors) => match &**factors {
+                [(base, power)] if *power == Rational::from(2) => (*base, true),
+                _ => return None,
+            },
+            _ => (term, false),
+        };
+        let Node::Call(function @ (Function::Sin | Function::Cos), arguments) = self.node(call)
+        else {
+            return None;
+        };
+        let (function, argument) = (*function, arguments[0]);
+        let (of_other, other, factor) = if is_square {
+            let other = if function == Function::Sin { Function::Cos } else { Function::Sin };
+            (argument, is_difference.then_some(other)?, Rational::one())
+        } else {
+            let half = Rational::new(1.into(), 2.into());
+            let half_angle = if function == Function::Sin {
+                let pi = self.pi();
+                self.sum([(Rational::new(1.into(), 4.into()), pi), (-half, argument)])
+            } else {
+                self.sum([(half, argument)])
+            };
+            let of_half = if is_difference { Function::Sin } else { Function::Cos };
+            (half_angle, of_half, Rational::from(2))
+        };
+        let value = self.call(other, &[of_other]);
+        let square = self.powi(value, 2);
+        Some(self.sum([(factor * constant, square)]))
+    }
+
+    /// `sqrt(k + r) - sqrt(k)`, `1/k - 1/(k + r)` and the like, which vanish with the terms of `r`.
+    fn difference_to_constant(
+        &mut self,
+        constant: &Rational,
+        term: Expr,
+        coefficient: &Rational,
+    ) -> Option<Expr> {
+        let (value, rest) = self.split_at_constant(term)?;
+        let value = self.sum([(constant.clone(), Graph::ONE), (coefficient.clone(), value)]);
+        (value == Graph::ZERO).then(|| self.sum([(coefficient.clone(), rest)]))
+    }
+
+    /// A power or function of `k + r` with a number `k`, at `r = 0`, and what it is more elsewhere.
+    fn split_at_constant(&mut self, term: Expr) -> Option<(Expr, Expr)> {
+        let inner = match self.node(term) {
+            Node::Product(factors) => match &**factors {
+                [(base, _)] => *base,
+                _ => return None,
+            },
+            Node::Call(_, arguments) => match &**arguments {
+                [argument] => *argument,
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let small: BTreeSet<Expr> = match self.node(inner) {
+            Node::Sum { constant, terms } if !constant.is_zero() => {
+                terms.iter().map(|(term, _)| *term).collect()
+            }
+            _ => return None,
+        };
+        Some(self.split_at_zero(term, &small))
+    }
+
+    /// The sum of two terms as a product, where there is one: `cos(a) -+ cos(b)` and `sin(a) -+ sin(b)`, if `are_alike` says that both are
+    /// computed equally often, and `ln(k + r) - ln(k)`.
+    pub(crate) fn two_terms(
+        &mut self,
+        terms: [(Expr, &Rational); 2],
+        are_alike: impl FnOnce(&mut Self, [Expr; 2]) -> bool,
+    ) -> Option<Expr> {
+        let [(first, of_first), (second, of_second)] = terms;
+        if of_first.abs() != of_second.abs() {
+            return None;
+        }
+        let is_difference = of_first.is_negative() != of_second.is_negative();
+        let (Node::Call(f, a), Node::Call(g, b)) = (self.node(first), self.node(second)) else {
+            return None;
+        };
+        let (f, a, b) = ((f == g).then_some(*f)?, a[0], b[0]);
+        if f == Function::Ln && is_difference {
+            let of =
+                |number: Expr, other: Expr| (self.as_number(number).is_some()).then_some(other);
+            let (sum, known, coefficient) = match (of(b, first), of(a, second)) {
+                (Some(sum), None) => (sum, second, of_first),
+                (None, Some(sum)) => (sum, first, of_second),
+                _ => return None,
+            };
+            let (value, rest) = self.split_at_constant(sum)?;
+            return (value == known).then(|| self.sum([(coefficient.clone(), rest)]));
+        }
+        if !matches!(f, Function::Sin | Function::Cos) || !are_alike(self, [first, second]) {
+            return None;
+        }
+        let half = Rational::new(1.into(), 2.into());
+        let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
+        let apart = self.sum([(half.clone(), a), (-half, b)]);
+        let (of_mean, of_apart, factor) = match (f, is_difference) {
+            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
+            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
+            (_, true) => (Function::Cos, Function::Sin, 2),
+            (_, false) => (Function::Sin, Function::Cos, 2),
+        };
+        let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(of_apart, &[apart]));
+        let product = self.mul(of_mean, of_apart);
+        Some(self.sum([(Rational::from(factor) * of_first, product)]))
+    }
+}
