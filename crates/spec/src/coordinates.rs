@@ -219,10 +219,12 @@ impl Geometry {
     ///
     /// An angle is rounded: near an axis the sine of twice the angle would be lost, while `2 X Y/R^2` keeps its digits.
     pub(crate) fn without_angles(&self, graph: &mut Graph, expr: Expr) -> Expr {
-        let mut known = BTreeMap::new();
         if self.angles.is_empty() {
             return expr;
         }
+        let symbols: Vec<Expr> = self.angles.iter().map(|angle| angle.symbol).collect();
+        let expr = graph.with_half_angles(expr, &symbols);
+        let mut known = BTreeMap::new();
         for call in graph.reachable(&[expr]) {
             let Node::Call(function @ (Function::Cos | Function::Sin | Function::Tan), arguments) =
                 graph.node(call)
