@@ -375,9 +375,10 @@ fn compare(compiler: &mut Command, cases: &[Case]) {
 #[test]
 fn c_and_cpp_give_the_bits_of_the_rust_functions() {
     let cases = cases();
-    compare(c_compiler().args(["-std=c99", "-O2"]), &cases);
+    // With all optimisation, and with none.
+    compare(c_compiler().args(["-std=c99", "-O3"]), &cases);
     if let Some(mut compiler) = cpp_compiler() {
-        compare(compiler.args(["-x", "c++", "-std=c++17", "-O1"]), &cases);
+        compare(compiler.args(["-x", "c++", "-std=c++17", "-O0"]), &cases);
     }
 }
 

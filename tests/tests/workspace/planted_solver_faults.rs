@@ -3,7 +3,7 @@
 //!
 //! The checks are those that users have (`mms converge`, `mms check`) on small grids, and what every scheme has to keep.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use mmsmith_mpm::fault::{self, Fault};
 use mmsmith_mpm::total_lagrangian::{
