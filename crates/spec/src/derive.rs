@@ -235,6 +235,16 @@ pub(crate) fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &[Expr
 /// Physical components to Cartesian ones: `A_ij = sum_ab Q_ia A_ab Q_jb`.
 fn turn_matrix(graph: &mut Graph, geometry: &Geometry, matrix: &Matrix) -> Matrix {
     let n = geometry.dimension();
+    // Entries that are equal at every point leave nothing to their difference, in which turned components are.
+    let mut matrix = matrix.clone();
+    for i in 0..n {
+        for j in 0..i {
+            let difference = graph.sub(matrix[i][i], matrix[j][j]);
+            if !geometry.is_cartesian() && graph.vanishes(difference) {
+                matrix[i][i] = matrix[j][j];
+            }
+        }
+    }
     // With equal diagonal entries for both angles these need not be told apart, which nobody can on the axis.
     let isotropic = geometry.transverse.is_some() && matrix[1][1] == matrix[2][2];
     let mut turned = identity(n);

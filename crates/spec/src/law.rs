@@ -34,6 +34,8 @@ pub(crate) struct Deformation {
     log_J: Expr,
     /// The turn within `H`, where there is one that strains next to it are small.
     turn: Option<Turn>,
+    /// Whether `tr H` is zero in symbols: the volume changes to second order alone.
+    free_of_divergence: bool,
 }
 
 /// A stress, and its divergence in two parts.
@@ -104,10 +106,11 @@ impl Deformation {
         let determinant = determinant(graph, &F);
         let J = graph.whole(determinant);
         // J - 1 as the sum of the principal minors of H, small where H is small.
+        let free_of_divergence = is_free_of_divergence(graph, &open, &derivation.variables);
         let volume_change = match &turn {
             Some(turn) => turn.volume_change(graph),
             None => {
-                let minors = match is_free_of_divergence(graph, &open, &derivation.variables) {
+                let minors = match free_of_divergence {
                     true => minors_beyond_trace(graph, &H),
                     false => principal_minors(graph, &H),
                 };
@@ -142,7 +145,16 @@ impl Deformation {
             let derivative = derivation.graph.sum_of(terms);
             derivation.derivatives.define(log_J, q, derivative);
         }
-        Deformation { open, H, inverse_transpose, J, volume_change, log_J, turn }
+        Deformation {
+            open,
+            H,
+            inverse_transpose,
+            J,
+            volume_change,
+            log_J,
+            turn,
+            free_of_divergence,
+        }
     }
 
     /// `H^T F^-T`.
@@ -158,7 +170,7 @@ impl Deformation {
     }
 }
 
-/// Whether `tr H` is zero in symbols: a displacement without divergence changes the volume to second order alone.
+/// Whether `tr H` is zero in symbols.
 fn is_free_of_divergence(graph: &mut Graph, open: &Matrix, variables: &BTreeSet<Expr>) -> bool {
     let trace = graph.sum_of((0..open.len()).map(|i| open[i][i]));
     let trace = graph.cancel(trace, variables);

@@ -125,7 +125,9 @@ impl Invariants {
             Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
             None => {
                 let squares: Vec<Expr> = H.iter().flatten().map(|&h| graph.powi(h, 2)).collect();
-                graph.sum_of((0..n).flat_map(|i| [H[i][i]; 2]).chain(squares))
+                let twice = (0..n).flat_map(|i| [H[i][i]; 2]);
+                let twice = twice.filter(|_| !deformation.free_of_divergence);
+                graph.sum_of(twice.chain(squares))
             }
         };
         let trace = graph.whole(trace);

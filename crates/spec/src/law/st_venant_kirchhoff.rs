@@ -32,14 +32,17 @@ pub(super) fn stress(
             G
         }
     };
-    let pressure = half_trace_times(graph, &G, lambda);
-    let mut second = isotropic(graph, &G, lambda, mu);
+    // tr G = 2 tr H + H : H.
+    let of_trace = if deformation.free_of_divergence { &products } else { &G };
+    let pressure = half_trace_times(graph, of_trace, lambda);
+    let mut second = isotropic(graph, &G, pressure, mu);
     for entry in second.iter_mut().flatten() {
         *entry = graph.whole(*entry);
     }
     let turned = matrix_product(graph, H, &second);
     let (mut P, mut anisotropic) = (second.clone(), second);
-    let mut remainder = isotropic(graph, &products, lambda, mu);
+    let of_products = half_trace_times(graph, &products, lambda);
+    let mut remainder = isotropic(graph, &products, of_products, mu);
     for i in 0..n {
         for j in 0..n {
             P[i][j] = graph.add(P[i][j], turned[i][j]);
@@ -68,9 +71,8 @@ fn half_trace_times(graph: &mut Graph, G: &Matrix, lambda: Expr) -> Expr {
     graph.mul(lambda, half)
 }
 
-/// `lambda/2 tr(G) I + mu G`.
-fn isotropic(graph: &mut Graph, G: &Matrix, lambda: Expr, mu: Expr) -> Matrix {
-    let pressure = half_trace_times(graph, G, lambda);
+/// `pressure I + mu G`.
+fn isotropic(graph: &mut Graph, G: &Matrix, pressure: Expr, mu: Expr) -> Matrix {
     let mut stress = G.clone();
     for (i, row) in stress.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
