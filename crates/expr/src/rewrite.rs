@@ -5,6 +5,7 @@ mod arrange;
 mod cancel;
 pub(crate) mod constant;
 mod exponential;
+mod multiples;
 mod near_zero;
 mod polynomial;
 mod pythagoras;

@@ -157,6 +157,14 @@ impl Deformation {
         }
     }
 
+    /// `tr H`, open.
+    fn trace(&self, graph: &mut Graph) -> Expr {
+        if self.free_of_divergence {
+            return Graph::ZERO;
+        }
+        graph.sum_of((0..self.open.len()).map(|i| self.open[i][i]))
+    }
+
     /// `H^T F^-T`.
     fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
         matrix_product(graph, &transpose(&self.H), &self.inverse_transpose)
@@ -247,7 +255,7 @@ fn linear_elastic(
     lambda: Expr,
     mu: Expr,
 ) -> Stress {
-    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let linear = linear_divergence(derivation, deformation, lambda, mu);
     let remainder = vec![Graph::ZERO; linear.len()];
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
@@ -271,9 +279,15 @@ fn linear_elastic(
 }
 
 /// The divergence of `lambda tr(H) I + mu (H + H^T)`, with the constants as they are written.
-fn linear_divergence(derivation: &mut Derivation, H: &Matrix, lambda: Expr, mu: Expr) -> Vector {
+fn linear_divergence(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    lambda: Expr,
+    mu: Expr,
+) -> Vector {
+    let H = &deformation.open;
     let n = H.len();
-    let trace = derivation.graph.sum_of((0..n).map(|i| H[i][i]));
+    let trace = deformation.trace(&mut derivation.graph);
     let mut symmetric = H.clone();
     for i in 0..n {
         for j in 0..n {

@@ -103,8 +103,8 @@ impl Graph {
         self.reachable(&[expr]).iter().any(|e| variables.contains(e))
     }
 
-    /// Whether `expr` is identically zero, as far as multiplying out, `cos^2 = 1 - sin^2`, `sqrt(x)^2 = x` and
-    /// `exp(x + y) = exp(x) exp(y)` show.
+    /// Whether `expr` is identically zero, as far as multiplying out, `cos^2 = 1 - sin^2`, the sines and cosines of multiples,
+    /// `sqrt(x)^2 = x` and `exp(x + y) = exp(x) exp(y)` show.
     ///
     /// Quantities kept in one piece are looked into. False where that is not so, or where it grows too large to tell.
     pub fn vanishes(&mut self, expr: Expr) -> bool {
@@ -114,6 +114,7 @@ impl Graph {
         }
         let open = self.open(expr);
         let open = self.in_powers_of_exponentials(open);
+        let open = self.in_common_angles(open);
         // What is not zero modulo a prime is not zero; what is zero there is still to be proved so.
         if self.residue(open).is_some_and(|residue| residue != 0) {
             return false;

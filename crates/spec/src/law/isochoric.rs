@@ -224,7 +224,7 @@ impl Invariants {
             false => graph.add(shear, self.stiffness_at_rest),
         };
         let (open_mu, open_modulus) = (modulus_at_rest(graph, mu), modulus_at_rest(graph, modulus));
-        let trace = graph.sum_of((0..n).map(|i| deformation.open[i][i]));
+        let trace = deformation.trace(graph);
 
         // s W' - W'(0), and of the factor of F^-T g what it is more than at rest.
         let of_power = graph.mul(self.power_change, self.slope);
@@ -265,7 +265,10 @@ impl Invariants {
             true => vec![Graph::ZERO; n],
             false => (0..n)
                 .map(|k| {
-                    let along = derivation.along(deformation.log_J, k);
+                    let along = match deformation.free_of_divergence {
+                        true => derivation.graph.neg(of_M[k]),
+                        false => derivation.along(deformation.log_J, k),
+                    };
                     derivation.graph.whole(along)
                 })
                 .collect(),

@@ -168,7 +168,7 @@ impl NeoHookean<'_> {
         let graph = &mut derivation.graph;
         let modulus = graph.add(lambda, mu);
         let modulus = graph.whole(modulus);
-        let trace = graph.sum_of((0..n).map(|i| deformation.open[i][i]));
+        let trace = deformation.trace(graph);
         let pressure = graph.mul(lambda, deformation.log_J);
         let factor = graph.sub(modulus, pressure);
         let factor = graph.whole(factor);
@@ -176,8 +176,6 @@ impl NeoHookean<'_> {
         let is_isochoric = deformation.is_isochoric();
         let (mut g, mut m) = (Vector::new(), Vector::new());
         for k in 0..n {
-            let along = derivation.along(deformation.log_J, k);
-            g.push(derivation.graph.whole(along));
             let mut terms = Vec::new();
             for i in 0..n {
                 for j in 0..n {
@@ -186,7 +184,13 @@ impl NeoHookean<'_> {
                 }
             }
             let sum = derivation.graph.sum_of(terms);
-            m.push(zero_if_vanishing(&mut derivation.graph, sum));
+            let sum = zero_if_vanishing(&mut derivation.graph, sum);
+            m.push(sum);
+            let along = match deformation.free_of_divergence {
+                true => derivation.graph.neg(sum),
+                false => derivation.along(deformation.log_J, k),
+            };
+            g.push(derivation.graph.whole(along));
         }
         let (open, of_H) = (derivation.divergence(&deformation.open), derivation.divergence(H));
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());

@@ -14,7 +14,7 @@ pub(super) fn stress(
     lambda: Expr,
     mu: Expr,
 ) -> Stress {
-    let linear = linear_divergence(derivation, &deformation.open, lambda, mu);
+    let linear = linear_divergence(derivation, deformation, lambda, mu);
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let H = &deformation.H;
