@@ -43,4 +43,4 @@ pub use program::{
     Dependence, Drafts, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program,
     Scalar, Section, Slot,
 };
-pub use rewrite::{Term, arrange, reuse};
+pub use rewrite::{CosineAndSine, Term, arrange, reuse};

@@ -15,4 +15,5 @@ mod vanishing;
 
 pub use arrange::arrange;
 pub use cancel::Term;
+pub use multiples::CosineAndSine;
 pub use reuse::reuse;

@@ -1,6 +1,6 @@
 //! Coordinate systems: orthogonal coordinates, their unit vectors, and the way to Cartesian components.
 
-use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
+use mmsmith_expr::{CosineAndSine, Expr, Function, Graph, Node, Rational};
 use std::collections::BTreeMap;
 
 /// The coordinates in which a solution is stated.
@@ -144,7 +144,7 @@ impl Geometry {
             rotation,
             cartesian,
             definitions: vec![(R, radius), (theta, angle)],
-            angles: vec![Angle { symbol: theta, cosine, sine }],
+            angles: vec![Angle { symbol: theta, values: CosineAndSine { cosine, sine } }],
             transverse: None,
         }
     }
@@ -203,8 +203,8 @@ impl Geometry {
             cartesian,
             definitions: vec![(R, radius), (s, from_axis), (theta, colatitude), (phi, longitude)],
             angles: vec![
-                Angle { symbol: theta, cosine: Z_over_R, sine: s_over_R },
-                Angle { symbol: phi, cosine: cos_phi, sine: sin_phi },
+                Angle { symbol: theta, values: CosineAndSine { cosine: Z_over_R, sine: s_over_R } },
+                Angle { symbol: phi, values: CosineAndSine { cosine: cos_phi, sine: sin_phi } },
             ],
             transverse: Some(transverse),
         }
@@ -232,7 +232,7 @@ impl Geometry {
                 continue;
             };
             let (function, argument) = (*function, arguments[0]);
-            if let Some(Turn { cosine, sine }) = self.turn(graph, argument) {
+            if let Some(CosineAndSine { cosine, sine }) = self.multiple(graph, argument) {
                 let value = match function {
                     Function::Cos => cosine,
                     Function::Sin => sine,
@@ -245,7 +245,7 @@ impl Geometry {
     }
 
     /// The cosine and the sine of a whole multiple of an angle, or of a sum with one.
-    fn turn(&self, graph: &mut Graph, argument: Expr) -> Option<Turn> {
+    fn multiple(&self, graph: &mut Graph, argument: Expr) -> Option<CosineAndSine> {
         self.angles.iter().find_map(|angle| {
             let multiple = match graph.node(argument) {
                 Node::Sum { terms, .. } => {
@@ -258,15 +258,15 @@ impl Geometry {
             let times = times.filter(|times: &i64| times.unsigned_abs() <= MULTIPLES)?;
             let own = graph.sum([(multiple, angle.symbol)]);
             let rest = graph.sub(argument, own);
-            let own = Turn { cosine: angle.cosine, sine: angle.sine }.times(graph, times);
+            let own = angle.values.times(graph, times);
             if rest == Graph::ZERO {
                 return Some(own);
             }
-            let rest = self.turn(graph, rest).unwrap_or_else(|| Turn {
+            let rest = self.multiple(graph, rest).unwrap_or_else(|| CosineAndSine {
                 cosine: graph.call(Function::Cos, &[rest]),
                 sine: graph.call(Function::Sin, &[rest]),
             });
-            Some(own.and(graph, &rest))
+            Some(own.plus(graph, rest))
         })
     }
 }
@@ -277,49 +277,7 @@ const MULTIPLES: u64 = 32;
 /// An angle among the coordinates, with its cosine and sine in Cartesian symbols.
 struct Angle {
     symbol: Expr,
-    cosine: Expr,
-    sine: Expr,
-}
-
-/// The cosine and the sine of an angle.
-struct Turn {
-    cosine: Expr,
-    sine: Expr,
-}
-
-impl Turn {
-    /// Of this many times the angle, by halves: each product vanishes where the whole does, or the terms of a sum have one sign there.
-    fn times(&self, graph: &mut Graph, times: i64) -> Turn {
-        match times {
-            ..0 => {
-                let Turn { cosine, sine } = self.times(graph, times.saturating_neg());
-                Turn { cosine, sine: graph.neg(sine) }
-            }
-            0 => Turn { cosine: Graph::ONE, sine: Graph::ZERO },
-            1 => Turn { cosine: self.cosine, sine: self.sine },
-            _ if times % 2 == 0 => {
-                let Turn { cosine, sine } = self.times(graph, times / 2);
-                let (sum, difference) = (graph.add(cosine, sine), graph.sub(cosine, sine));
-                let product = graph.mul(cosine, sine);
-                Turn {
-                    cosine: graph.mul(difference, sum),
-                    sine: graph.sum([(Rational::from_integer(2.into()), product)]),
-                }
-            }
-            _ => {
-                let (less, more) = (self.times(graph, times / 2), self.times(graph, times / 2 + 1));
-                less.and(graph, &more)
-            }
-        }
-    }
-
-    /// Of the sum of two angles.
-    fn and(&self, graph: &mut Graph, other: &Turn) -> Turn {
-        let of = |graph: &mut Graph, a, b| graph.mul(a, b);
-        let (cc, ss) = (of(graph, self.cosine, other.cosine), of(graph, self.sine, other.sine));
-        let (sc, cs) = (of(graph, self.sine, other.cosine), of(graph, self.cosine, other.sine));
-        Turn { cosine: graph.sub(cc, ss), sine: graph.add(sc, cs) }
-    }
+    values: CosineAndSine,
 }
 
 /// Unit vectors that do not turn.

@@ -237,11 +237,13 @@ fn turn_matrix(graph: &mut Graph, geometry: &Geometry, matrix: &Matrix) -> Matri
     let n = geometry.dimension();
     // Entries that are equal at every point leave nothing to their difference, in which turned components are.
     let mut matrix = matrix.clone();
-    for i in 0..n {
-        for j in 0..i {
-            let difference = graph.sub(matrix[i][i], matrix[j][j]);
-            if !geometry.is_cartesian() && graph.vanishes(difference) {
-                matrix[i][i] = matrix[j][j];
+    if !geometry.is_cartesian() {
+        for i in 0..n {
+            for j in 0..i {
+                let difference = graph.sub(matrix[i][i], matrix[j][j]);
+                if graph.vanishes(difference) {
+                    matrix[i][i] = matrix[j][j];
+                }
             }
         }
     }

@@ -32,7 +32,7 @@ pub(crate) struct Deformation {
     /// `J - 1`, small where `H` is small.
     volume_change: Expr,
     log_J: Expr,
-    /// The turn within `H`, where there is one that strains next to it are small.
+    /// The turn within `H`, where there is one.
     turn: Option<Turn>,
     /// Whether `tr H` is zero in symbols: the volume changes to second order alone.
     free_of_divergence: bool,

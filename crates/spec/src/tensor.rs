@@ -53,15 +53,18 @@ pub(crate) fn minors_beyond_trace(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
     minors_of_size(graph, A, 2)
 }
 
-fn minors_of_size(graph: &mut Graph, A: &Matrix, least: u32) -> Vec<Expr> {
-    let n = A.len();
-    (1..1_usize << n)
-        .filter(|subset| subset.count_ones() >= least)
-        .map(|subset| {
-            let indices: Vec<usize> = (0..n).filter(|i| subset >> i & 1 == 1).collect();
+fn minors_of_size(graph: &mut Graph, A: &Matrix, least: usize) -> Vec<Expr> {
+    index_sets(A.len())
+        .filter(|indices| indices.len() >= least)
+        .map(|indices| {
             let minor =
                 indices.iter().map(|&i| indices.iter().map(|&j| A[i][j]).collect()).collect();
             determinant(graph, &minor)
         })
         .collect()
+}
+
+/// The sets of indices below `n`, but for the empty one.
+pub(crate) fn index_sets(n: usize) -> impl Iterator<Item = Vec<usize>> {
+    (1..1_usize << n).map(move |set| (0..n).filter(|i| set >> i & 1 == 1).collect())
 }

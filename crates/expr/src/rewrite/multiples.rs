@@ -28,17 +28,17 @@ impl Graph {
                 continue;
             }
             let base = self.sum([(least.clone(), angle)]);
-            let base = [Function::Cos, Function::Sin].map(|function| self.call(function, &[base]));
+            let base = CosineAndSine {
+                cosine: self.call(Function::Cos, &[base]),
+                sine: self.call(Function::Sin, &[base]),
+            };
             for (multiple, call) in members {
                 let times = &multiple / &least;
                 let times = times.is_integer().then(|| times.to_integer().to_i64()).flatten();
                 let Some(times) = times.filter(|n| n.abs() <= LARGEST) else { continue };
-                let [cosine, sine] = self.of_multiple(base, times.abs());
-                let value = match self.node(call) {
-                    Node::Call(Function::Cos, _) => cosine,
-                    _ if times < 0 => self.neg(sine),
-                    _ => sine,
-                };
+                let CosineAndSine { cosine, sine } = base.times(self, times);
+                let is_cosine = matches!(self.node(call), Node::Call(Function::Cos, _));
+                let value = if is_cosine { cosine } else { sine };
                 known.insert(call, value);
             }
         }
@@ -57,17 +57,50 @@ impl Graph {
         let angle = self.sum([(Rational::one() / &multiple, argument)]);
         (multiple, angle)
     }
+}
 
-    /// The cosine and the sine of so many times an angle, from those of the angle.
-    fn of_multiple(&mut self, [cosine, sine]: [Expr; 2], times: i64) -> [Expr; 2] {
-        let mut total = [Graph::ONE, Graph::ZERO];
-        for _ in 0..times {
-            let [c, s] = total;
-            let (cc, ss) = (self.mul(c, cosine), self.mul(s, sine));
-            let (sc, cs) = (self.mul(s, cosine), self.mul(c, sine));
-            total = [self.sub(cc, ss), self.add(sc, cs)];
+/// The cosine and the sine of an angle.
+#[derive(Clone, Copy, Debug)]
+pub struct CosineAndSine {
+    /// The cosine.
+    pub cosine: Expr,
+    /// The sine.
+    pub sine: Expr,
+}
+
+impl CosineAndSine {
+    /// Of this many times the angle, by halves: each product vanishes where the whole does, or the terms of a sum have one sign there.
+    #[must_use]
+    pub fn times(self, graph: &mut Graph, times: i64) -> Self {
+        match times {
+            ..0 => {
+                let Self { cosine, sine } = self.times(graph, times.saturating_neg());
+                Self { cosine, sine: graph.neg(sine) }
+            }
+            0 => Self { cosine: Graph::ONE, sine: Graph::ZERO },
+            1 => self,
+            _ if times % 2 == 0 => {
+                let Self { cosine, sine } = self.times(graph, times / 2);
+                let (sum, difference) = (graph.add(cosine, sine), graph.sub(cosine, sine));
+                let product = graph.mul(cosine, sine);
+                Self {
+                    cosine: graph.mul(difference, sum),
+                    sine: graph.sum([(Rational::from(2), product)]),
+                }
+            }
+            _ => {
+                let (less, more) = (self.times(graph, times / 2), self.times(graph, times / 2 + 1));
+                less.plus(graph, more)
+            }
         }
-        total
+    }
+
+    /// Of the sum of two angles.
+    #[must_use]
+    pub fn plus(self, graph: &mut Graph, other: Self) -> Self {
+        let (cc, ss) = (graph.mul(self.cosine, other.cosine), graph.mul(self.sine, other.sine));
+        let (sc, cs) = (graph.mul(self.sine, other.cosine), graph.mul(self.cosine, other.sine));
+        Self { cosine: graph.sub(cc, ss), sine: graph.add(sc, cs) }
     }
 }
 

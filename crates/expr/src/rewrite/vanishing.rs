@@ -15,10 +15,12 @@ impl Graph {
         for sum in self.reachable(&[expr]) {
             let Node::Sum { constant, terms } = self.node(sum) else { continue };
             let [(term, coefficient)] = &**terms else { continue };
+            if constant.is_zero() {
+                continue;
+            }
             let (constant, term, coefficient) = (constant.clone(), *term, coefficient.clone());
             let inside = self.symbols_in(&[term]);
             if symbols.iter().any(|symbol| inside.contains(symbol))
-                && !constant.is_zero()
                 && let Some(square) = self.square_of_half(&constant, term, &coefficient)
             {
                 known.insert(sum, square);

@@ -32,9 +32,13 @@ pub(super) fn stress(
     let open = (lambda, mu);
     let graph = &mut derivation.graph;
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
-    let doubled_strain = doubled_strain(graph, deformation, &derivation.variables);
-    let law = NeoHookean { deformation, lambda, mu, doubled_strain };
     let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
+    let doubled_strain = match strain {
+        // By which P is formed then.
+        Some(_) => Vec::new(),
+        None => doubled_strain(graph, deformation, &derivation.variables),
+    };
+    let law = NeoHookean { deformation, lambda, mu, doubled_strain };
     let P = match &strain {
         Some(strain) => law.by_strain(graph, strain),
         None => law.by_gradient(graph),

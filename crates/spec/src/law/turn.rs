@@ -5,7 +5,7 @@
 //! the motion held, and `I + S` a rotation. Then `F F^T - I = N + N^T + S N^T + N S^T + N N^T`.
 
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, determinant, principal_minors, transpose};
+use crate::tensor::{Matrix, Vector, determinant, index_sets, principal_minors, transpose};
 use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -90,14 +90,14 @@ impl Turn {
     /// `J - 1`: what the principal minors of `S + N` have beside those of `S`. A determinant is the sum, over the rows that are taken from
     /// `N`, of the determinants with the other rows from `S`.
     pub(super) fn volume_change(&self, graph: &mut Graph) -> Expr {
-        let n = self.S.len();
         let mut terms = Vec::new();
-        for subset in 1..1_usize << n {
-            let indices: Vec<usize> = (0..n).filter(|i| subset >> i & 1 == 1).collect();
-            for rows in (1..=subset).filter(|rows| rows & subset == *rows) {
-                let of = |&i: &usize| if rows >> i & 1 == 1 { &self.N[i] } else { &self.S[i] };
-                let minor =
-                    indices.iter().map(|i| indices.iter().map(|&j| of(i)[j]).collect()).collect();
+        for indices in index_sets(self.S.len()) {
+            for taken in index_sets(indices.len()) {
+                let row = |k: usize| {
+                    let A = if taken.contains(&k) { &self.N } else { &self.S };
+                    indices.iter().map(|&j| A[indices[k]][j]).collect()
+                };
+                let minor = (0..indices.len()).map(row).collect();
                 terms.push(determinant(graph, &minor));
             }
         }
