@@ -95,10 +95,11 @@ impl Splitting<'_> {
 
     fn power(&mut self, base: Expr, exponent: &Rational) -> Option<(Expr, Expr)> {
         let (value, rest) = self.split(base);
-        let power = self.graph.product([(base, exponent.clone())]);
         if rest == Graph::ZERO {
-            return Some((power, Graph::ZERO));
+            // Not `base`: what is small in it may have cancelled.
+            return Some((self.graph.product([(value, exponent.clone())]), Graph::ZERO));
         }
+        let power = self.graph.product([(base, exponent.clone())]);
         if value == Graph::ZERO {
             // Small to a positive power is small; to a negative one it is infinite.
             let rest = self.graph.product([(rest, exponent.clone())]);
@@ -148,10 +149,10 @@ impl Splitting<'_> {
         function: Function,
         (value, rest): (Expr, Expr),
     ) -> (Expr, Expr) {
-        if rest == Graph::ZERO {
-            return (expr, Graph::ZERO);
-        }
         let at_zero = self.graph.call(function, &[value]);
+        if rest == Graph::ZERO {
+            return (at_zero, Graph::ZERO);
+        }
         if value == Graph::ZERO && at_zero == Graph::ZERO {
             return (Graph::ZERO, self.graph.call(function, &[rest]));
         }
@@ -278,6 +279,15 @@ mod tests {
             // So small that no power of another number makes up for it.
             let small = program.evaluate(&[1e-100, 1.7]);
             prop_assert!(small[2].abs() < 1e-3 * (1.0 + small[1].abs()), "{}: {:?}", text, small);
+        }
+    }
+
+    /// Each of the two parts is as small as `h`, and so their difference is zero.
+    #[test]
+    fn what_cancels_is_not_in_the_value() {
+        for text in ["(log1p(h^2) - ln(1 + h^2))^2", "cos(log1p(h^2) - ln(1 + h^2))"] {
+            let (value, rest, _) = split(text);
+            assert!(!value.contains("h^2") && rest == "0", "{text}: {value}, {rest}");
         }
     }
 
