@@ -435,10 +435,11 @@ mod tests {
             .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
             .collect();
         type Case = (&'static str, fn(f64) -> f64, bool);
-        let cases: [Case; 12] = [
+        let cases: [Case; 13] = [
             ("sin_pi", S::sin_pi, true),
             ("cos_pi", S::cos_pi, true),
             ("log_1p", S::log_1p, false),
+            ("log_1p_minus_x", S::log_1p_minus_x, false),
             ("log_ratio_squared", S::log_ratio_squared, false),
             ("log_ratio_slope", S::log_ratio_slope, false),
             ("log_ratio_curvature", S::log_ratio_curvature, false),
@@ -472,6 +473,9 @@ mod tests {
         }
         assert_eq!(value("log_1p", &[-1.0]), f64::NEG_INFINITY);
         assert!(value("log_1p", &[f64::NAN]).is_nan());
+        for x in [-0.3, -0.5, -0.7, -1.0, f64::INFINITY] {
+            assert_eq!(value("log_1p_minus_x", &[x]), x.log_1p_minus_x(), "{x}");
+        }
     }
 
     /// Whatever generated code calls, the file has.

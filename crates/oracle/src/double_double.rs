@@ -36,6 +36,9 @@ const HALVINGS: i32 = 9;
 /// As [`log ratios`](mmsmith_expr::Function::LogRatioSlope) in doubles: the series in `y = z/(z + 2)` up to 1/4.
 const RATIO_TERMS: u32 = 56;
 const LARGEST_RATIO_IN_SERIES: f64 = 0.25;
+/// Terms of the series of `ln(1 + x) - x` in `x/(2 + x)` up to a fifth.
+const LOGARITHM_TERMS: u32 = 24;
+const LARGEST_LOGARITHM_IN_SERIES: f64 = 0.2;
 /// As [`hyperbolic cosines of roots`](mmsmith_expr::Function::CoshSqrtM1) in doubles: the series in `y` up to 9.
 const ROOT_TERMS: u32 = 28;
 const LARGEST_ROOT_IN_SERIES: f64 = 9.0;
@@ -295,6 +298,19 @@ impl DoubleDouble {
         if n < 0 { Self::ONE / value } else { value }
     }
 
+    /// `ln(1 + x) - x`: with `s = x/(2 + x)` it is `-x s + 2 (s^3/3 + s^5/5 + ...)`.
+    fn ln_1p_minus_x(self) -> Self {
+        let s = self / (self + Self::from(2.0));
+        if s.high.abs() > LARGEST_LOGARITHM_IN_SERIES {
+            return self.ln_1p() - self;
+        }
+        let square = s * s;
+        let series = (1..=LOGARITHM_TERMS).rev().fold(Self::from(0.0), |sum, k| {
+            sum * square + Self::ONE / Self::from(2.0 * f64::from(k) + 1.0)
+        });
+        (series * square * s).scaled(2.0) - self * s
+    }
+
     fn log_ratio(self) -> Self {
         (self + (self * (self + Self::from(2.0))).sqrt()).ln_1p()
     }
@@ -391,6 +407,7 @@ impl DoubleDouble {
             Function::Exp => self.exp(),
             Function::Ln => self.ln(),
             Function::Ln1p => self.ln_1p(),
+            Function::Ln1pMinusX => self.ln_1p_minus_x(),
             Function::Expm1 => self.expm1(),
             Function::LogRatioSquared => {
                 let theta = self.log_ratio();
@@ -483,7 +500,7 @@ mod tests {
         let positive: Vec<f64> = all.iter().map(|x| x.abs()).collect();
         let turns = [all.clone(), vec![1e6 + 0.1, 123_456.789, -12_345_678.9]].concat();
         let inner = [&small[..], &moderate, &[0.999_999, -0.999_9]].concat();
-        let cases: [(&str, &[f64]); 29] = [
+        let cases: [(&str, &[f64]); 31] = [
             ("sin(x)", &turns),
             ("cos(x)", &turns),
             ("tan(x)", &turns),
@@ -502,6 +519,8 @@ mod tests {
             ("ln(1+x^2/1000)", &large),
             ("log1p(x)", &positive),
             ("log1p(-x/40)", &all),
+            ("log1pmx(x)", &positive),
+            ("log1pmx(-x/40)", &all),
             ("x^(1/3)", &positive),
             ("x^(7/5)", &positive),
             ("sqrt(x)", &positive),

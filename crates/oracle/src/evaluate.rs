@@ -393,7 +393,7 @@ impl Evaluation<'_> {
         let minus_one = one.neg();
         let defined = match function {
             Function::Ln => x.is_positive() && !x.is_zero(),
-            Function::Ln1p => x.cmp(&minus_one).is_some_and(|c| c > 0),
+            Function::Ln1p | Function::Ln1pMinusX => x.cmp(&minus_one).is_some_and(|c| c > 0),
             Function::LogRatioSquared
             | Function::LogRatioSlope
             | Function::LogRatioCurvature
@@ -459,6 +459,7 @@ impl Evaluation<'_> {
                     x.exp(wide, ROUNDING, constants).sub(&one, bits, ROUNDING)
                 }
             }
+            Function::Ln1pMinusX => log_1p_minus_x(&x, bits, constants),
             Function::LogRatioSquared => {
                 let theta = log_ratio(&x, 2 * bits + smallness(&x), constants);
                 theta.mul(&theta, bits, ROUNDING)
@@ -633,6 +634,26 @@ fn log_ratio_slope(z: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloa
     let root = squared_sinh(z, wide).sqrt(wide, ROUNDING);
     let ratio = log_ratio(z, wide, constants).div(&root, wide, ROUNDING);
     ratio.sub(&BigFloat::from_word(1, wide), bits, ROUNDING)
+}
+
+/// `ln(1 + x) - x`.
+fn log_1p_minus_x(x: &BigFloat, bits: usize, constants: &mut Consts) -> BigFloat {
+    if x.is_zero() {
+        return x.clone();
+    }
+    let smallness = smallness(x);
+    if smallness > bits {
+        // -x^2/2 + x^3/3: what is left out is below 2^-2bits of the sum.
+        let square = x.mul(x, bits, ROUNDING);
+        let cube = square.mul(x, bits, ROUNDING);
+        let first = scaled(&square, &Rational::new((-1).into(), 2.into()), bits);
+        let second = scaled(&cube, &Rational::new(1.into(), 3.into()), bits);
+        return first.add(&second, bits, ROUNDING);
+    }
+    // As many bits more as the sum with one and the difference take away.
+    let wide = bits + 2 * smallness + GUARD_BITS;
+    let sum = BigFloat::from_word(1, wide).add(x, wide, ROUNDING);
+    sum.ln(wide, ROUNDING, constants).sub(x, bits, ROUNDING)
 }
 
 /// `sinh(s)/s - 1` for `s = sqrt(y)`.

@@ -29,6 +29,11 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
     #[must_use]
     fn log_1p(self) -> Self;
 
+    /// `ln(1 + x) - x`, small as `-x^2/2` where `x` is small. Within four units in the last place, and without a call, as
+    /// [`log_1p`](Self::log_1p).
+    #[must_use]
+    fn log_1p_minus_x(self) -> Self;
+
     /// `ln(y)` of `y = 1 + x`, where `x` is `self`: by `y` where `x < -1/2`, else by `x`.
     ///
     /// A ratio of volumes next to one has its digits in `x`, one next to zero, as a product of stretches, in `y`. Within
@@ -115,6 +120,11 @@ impl ScalarFunctions for f64 {
     }
 
     #[inline(always)]
+    fn log_1p_minus_x(self) -> Self {
+        logarithm::ln_1p_minus_x(self)
+    }
+
+    #[inline(always)]
     fn ln_of_both(self, y: Self) -> Self {
         logarithm::ln_of_both(self, y)
     }
@@ -189,6 +199,11 @@ impl ScalarFunctions for f32 {
     #[inline(always)]
     fn log_1p(self) -> Self {
         f64::from(self).log_1p() as f32
+    }
+
+    #[inline(always)]
+    fn log_1p_minus_x(self) -> Self {
+        f64::from(self).log_1p_minus_x() as f32
     }
 
     #[inline(always)]
@@ -336,6 +351,35 @@ mod tests {
         assert!((-1.5_f64).log_1p().is_nan() && f64::NAN.log_1p().is_nan());
         assert!(f64::NEG_INFINITY.log_1p().is_nan());
         assert_eq!(0.5_f32.log_1p(), 0.5_f32.ln_1p());
+    }
+
+    #[test]
+    fn the_logarithm_less_its_argument_keeps_its_digits() {
+        // To 17 digits by another library of arbitrary precision.
+        for (x, expected) in [
+            (1e-100, -5e-201),
+            (-1e-5, -5.000_033_333_583_335e-11),
+            (0.1, -4.689_820_195_675_14e-3),
+            (-0.1, -5.360_515_657_826_301_2e-3),
+            (0.75, -1.903_842_120_645_773e-1),
+            (-0.49, -1.833_445_532_637_655_6e-1),
+            (-0.99, -3.615_170_185_988_091_4),
+            (3.5, -1.995_922_603_223_726),
+            (1e20, -1e20),
+        ] {
+            let error: f64 = (f64::log_1p_minus_x(x) - expected) / expected;
+            assert!(error.abs() < 4.0 * f64::EPSILON, "{x}: {:e}", f64::log_1p_minus_x(x));
+        }
+        for n in -49..100 {
+            let x = f64::from(n) * 0.01;
+            let difference = x.log_1p_minus_x() - (x.log_1p() - x);
+            assert!(difference.abs() < 2e-16, "{x}: {difference:e}");
+        }
+        assert_eq!(0.0_f64.log_1p_minus_x(), 0.0);
+        assert_eq!((-1.0_f64).log_1p_minus_x(), f64::NEG_INFINITY);
+        assert_eq!(f64::INFINITY.log_1p_minus_x(), f64::NEG_INFINITY);
+        assert!(f64::NAN.log_1p_minus_x().is_nan() && (-1.5_f64).log_1p_minus_x().is_nan());
+        assert_eq!(0.5_f32.log_1p_minus_x(), 0.5_f64.log_1p_minus_x() as f32);
     }
 
     #[test]

@@ -41,6 +41,15 @@ pub fn ln_near_one(x: f64) -> f64 {
     x - (half_square - tail)
 }
 
+/// `ln(1 + x) - x`, within four units in the last place.
+#[inline(always)]
+#[must_use]
+pub fn ln_1p_minus_x(x: f64) -> f64 {
+    let (half_square, tail) = parts_of_logarithm(x);
+    let far = if x == f64::INFINITY { f64::NEG_INFINITY } else { ln_1p(x) - x };
+    if is_near_one(x) { tail - half_square } else { far }
+}
+
 /// `ln(y)` where `by_y`, else `ln(1 + x)`, and where `ALL`, of all numbers, else of those from 1e-307 to 1e308. Reduced as in
 /// Sun's fdlibm, `s_log1p.c`, but for arguments near one, which are taken as they are.
 #[inline(always)]

@@ -99,6 +99,16 @@ fn logarithms_are_the_nearest_numbers() {
         found("ln_of_both by x", both, if x < -0.5 { f64::NAN } else { f64::from(result) }, 0.0);
         // By y, which is every number.
         found("ln_of_both by y", (-0.75_f32).ln_of_both(x), wide.ln(), ROUNDED);
+        let truth = if wide.abs() < 1e-2 {
+            // -x^2 (1/2 - x/3 + x^2/4 - ...)
+            let series = (2..12).rev().fold(0.0, |sum, n| 1.0 / f64::from(n) - wide * sum);
+            -wide * wide * series
+        } else if x == f32::INFINITY {
+            f64::NEG_INFINITY
+        } else {
+            wide.ln_1p() - wide
+        };
+        found("log_1p_minus_x", x.log_1p_minus_x(), truth, NEARLY_ROUNDED);
     }));
 }
 

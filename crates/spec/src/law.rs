@@ -9,8 +9,7 @@ mod turn;
 
 use crate::derivation::Derivation;
 use crate::tensor::{
-    Matrix, Vector, cofactor, determinant, matrix_product, minors_beyond_trace, principal_minors,
-    transpose,
+    Matrix, Vector, cofactor, determinant, matrix_product, minors_beyond_trace, transpose,
 };
 use crate::{DeriveError, Law};
 use energy::ComponentLaw;
@@ -34,8 +33,8 @@ pub(crate) struct Deformation {
     log_J: Expr,
     /// The turn within `H`, where there is one.
     turn: Option<Turn>,
-    /// Whether `tr H` is zero in symbols: the volume changes to second order alone.
-    free_of_divergence: bool,
+    /// The terms of `tr H`; none where it is zero in symbols, and the volume changes to second order alone.
+    dilation: Vec<Expr>,
 }
 
 /// A stress, and its divergence in two parts.
@@ -106,15 +105,13 @@ impl Deformation {
         let determinant = determinant(graph, &F);
         let J = graph.whole(determinant);
         // J - 1 as the sum of the principal minors of H, small where H is small.
-        let free_of_divergence = is_free_of_divergence(graph, &open, &derivation.variables);
+        let dilation =
+            dilation(graph, &open, &H, &derivation.variables, &derivation.geometry.coordinates);
         let volume_change = match &turn {
             Some(turn) => turn.volume_change(graph),
             None => {
-                let minors = match free_of_divergence {
-                    true => minors_beyond_trace(graph, &H),
-                    false => principal_minors(graph, &H),
-                };
-                graph.sum_of(minors)
+                let minors = minors_beyond_trace(graph, &H);
+                graph.sum_of(dilation.iter().copied().chain(minors))
             }
         };
         let volume_change = zero_if_vanishing(graph, volume_change);
@@ -145,21 +142,17 @@ impl Deformation {
             let derivative = derivation.graph.sum_of(terms);
             derivation.derivatives.define(log_J, q, derivative);
         }
-        Deformation {
-            open,
-            H,
-            inverse_transpose,
-            J,
-            volume_change,
-            log_J,
-            turn,
-            free_of_divergence,
-        }
+        Deformation { open, H, inverse_transpose, J, volume_change, log_J, turn, dilation }
+    }
+
+    /// Whether `tr H` is zero in symbols.
+    fn is_free_of_divergence(&self) -> bool {
+        self.dilation.is_empty()
     }
 
     /// `tr H`, open.
     fn trace(&self, graph: &mut Graph) -> Expr {
-        if self.free_of_divergence {
+        if self.is_free_of_divergence() {
             return Graph::ZERO;
         }
         graph.sum_of((0..self.open.len()).map(|i| self.open[i][i]))
@@ -178,11 +171,25 @@ impl Deformation {
     }
 }
 
-/// Whether `tr H` is zero in symbols.
-fn is_free_of_divergence(graph: &mut Graph, open: &Matrix, variables: &BTreeSet<Expr>) -> bool {
-    let trace = graph.sum_of((0..open.len()).map(|i| open[i][i]));
-    let trace = graph.cancel(trace, variables);
-    graph.vanishes(trace)
+/// The terms of `tr H`, none where it is zero in symbols.
+fn dilation(
+    graph: &mut Graph,
+    open: &Matrix,
+    H: &Matrix,
+    variables: &BTreeSet<Expr>,
+    coordinates: &[Expr],
+) -> Vec<Expr> {
+    let n = H.len();
+    let trace = graph.sum_of((0..n).map(|i| open[i][i]));
+    let cancelled = graph.cancel(trace, variables);
+    if graph.vanishes(cancelled) {
+        return Vec::new();
+    }
+    let differences = graph.in_differences(trace, &coordinates.iter().copied().collect());
+    if differences == trace {
+        return (0..n).map(|i| H[i][i]).collect();
+    }
+    vec![graph.whole(differences)]
 }
 
 /// The stress of a law at a deformation.
@@ -214,12 +221,19 @@ pub(crate) fn stress(
                 Formulas::Energy { W } => (W.to_owned(), material.row().is_isotropic),
                 Formulas::Isochoric { W, others } => {
                     let constants = law.constants();
-                    let U = material.volumetric().map_or("0", Volumetric::formula);
                     let graph = &mut derivation.graph;
                     let isochoric = energy::named(graph, W, &constants);
-                    let volumetric = energy::named(graph, &format!("kappa*({U})"), &constants);
+                    let mut part = |text: fn(Volumetric) -> &'static str| {
+                        let text = material.volumetric().map_or("0", text);
+                        energy::named(graph, text, &constants)
+                    };
+                    let volume = isochoric::Volume {
+                        kappa: part(|_| "kappa"),
+                        energy: part(Volumetric::formula),
+                        pressure_beyond_linear: part(Volumetric::pressure_beyond_linear),
+                    };
                     let others = energy::named(graph, others, &constants);
-                    let stress = isochoric::stress(derivation, deformation, isochoric, volumetric);
+                    let stress = isochoric::stress(derivation, deformation, isochoric, volume);
                     if others == Graph::ZERO {
                         return Ok(stress);
                     }
@@ -261,7 +275,7 @@ fn linear_elastic(
     let (lambda, mu) = (graph.whole(lambda), graph.whole(mu));
     let H = &deformation.H;
     let n = H.len();
-    let trace = graph.sum_of((0..n).map(|i| H[i][i]));
+    let trace = graph.sum_of(deformation.dilation.iter().copied());
     let pressure = graph.mul(lambda, trace);
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();

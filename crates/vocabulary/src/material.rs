@@ -69,6 +69,16 @@ impl Volumetric {
         }
     }
 
+    /// `J U' - (J - 1)`, the pressure of unit bulk modulus without its linear part, as an expression of `J`.
+    #[must_use]
+    pub fn pressure_beyond_linear(self) -> &'static str {
+        match self {
+            Self::Logarithmic => "log1pmx(J - 1)",
+            Self::Quadratic => "(J - 1)^2",
+            Self::Mixed => "(J - 1)^2/2",
+        }
+    }
+
     /// The name of the variant.
     #[must_use]
     pub fn variant(self) -> &'static str {

@@ -243,6 +243,17 @@ functions! {
         math_h: Some("log1p"),
         own: Some(("mmsmith_log_1p", CSupport::Logarithm)),
     }
+    /// `ln(1 + x) - x`, accurate for small `x`.
+    Ln1pMinusX {
+        names: &["log1pmx"],
+        differential: "-x/(1 + x)*dx",
+        at_zero: "0",
+        double: ScalarFunctions::log_1p_minus_x,
+        single: ScalarFunctions::log_1p_minus_x,
+        steepness: Some(|x| (x / (1.0 + x)).abs()),
+        rust: RustCall::Method("log_1p_minus_x"),
+        own: Some(("mmsmith_log_1p_minus_x", CSupport::Logarithm)),
+    }
     /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
     /// where `y` has them.
     LnOfBoth {

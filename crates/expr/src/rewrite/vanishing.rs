@@ -120,6 +120,79 @@ impl Graph {
         Some(self.split_at_zero(term, &small))
     }
 
+    /// `expr` with sums of cosines, or of sines, of `places` in which the coefficients add up to zero as differences of them: such a sum
+    /// vanishes where all are equal, as the divergence of standing waves along several axes does.
+    pub fn in_differences(&mut self, expr: Expr, places: &BTreeSet<Expr>) -> Expr {
+        let mut known = BTreeMap::new();
+        for sum in self.reachable(&[expr]) {
+            if let Some(differences) = self.differences(sum, places) {
+                known.insert(sum, differences);
+            }
+        }
+        self.replace(expr, &known)
+    }
+
+    fn differences(&mut self, sum: Expr, places: &BTreeSet<Expr>) -> Option<Expr> {
+        let Node::Sum { constant, terms } = self.node(sum) else { return None };
+        if !constant.is_zero() || terms.len() < 2 {
+            return None;
+        }
+        let mut waves = Vec::new();
+        for (term, coefficient) in terms.clone() {
+            let factors = match self.node(term) {
+                Node::Product(factors) => factors.to_vec(),
+                _ => vec![(term, Rational::one())],
+            };
+            let (of_places, others): (Vec<_>, Vec<_>) =
+                factors.into_iter().partition(|(base, _)| self.depends_on(*base, places));
+            let [(call, power)] = &*of_places else { return None };
+            let Node::Call(function @ (Function::Sin | Function::Cos), arguments) =
+                self.node(*call)
+            else {
+                return None;
+            };
+            let (function, argument) = (*function, arguments[0]);
+            if !power.is_one() {
+                return None;
+            }
+            let others = self.product(others);
+            waves.push((function, argument, self.sum([(coefficient, others)])));
+        }
+        // All are compared with one whose coefficient is a sum, which is zero at no special time: where one of the others is, two waves
+        // are left, and compared with each other.
+        let is_sum = |(_, _, coefficient): &(Function, Expr, Expr)| {
+            let parts = self.reachable(&[*coefficient]);
+            parts
+                .iter()
+                .any(|&part| matches!(self.node(part), Node::Sum { terms, .. } if terms.len() > 1))
+        };
+        let reference = waves.iter().position(is_sum).unwrap_or(0);
+        waves.swap(0, reference);
+        let [(function, first, _), others @ ..] = &*waves else { return None };
+        let coefficients = self.sum_of(waves.iter().map(|(_, _, coefficient)| *coefficient));
+        if others.iter().any(|(other, ..)| other != function) || !self.vanishes(coefficients) {
+            return None;
+        }
+        let differences = others.iter().map(|(_, argument, coefficient)| {
+            let difference = self.difference_of_waves(*function, *argument, *first);
+            self.mul(*coefficient, difference)
+        });
+        let differences: Vec<Expr> = differences.collect();
+        Some(self.sum_of(differences))
+    }
+
+    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`.
+    fn difference_of_waves(&mut self, function: Function, a: Expr, b: Expr) -> Expr {
+        let half = Rational::new(1.into(), 2.into());
+        let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
+        let apart = self.sum([(half.clone(), a), (-half, b)]);
+        let (of_mean, factor) =
+            if function == Function::Cos { (Function::Sin, -2) } else { (Function::Cos, 2) };
+        let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(Function::Sin, &[apart]));
+        let product = self.mul(of_mean, of_apart);
+        self.sum([(Rational::from(factor), product)])
+    }
+
     /// The sum of two terms as a product, where there is one: `cos(a) -+ cos(b)` and `sin(a) -+ sin(b)`, if `are_alike` says that both are
     /// computed equally often, and `ln(k + r) - ln(k)`.
     pub(crate) fn two_terms(
@@ -162,5 +235,33 @@ impl Graph {
         let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(of_apart, &[apart]));
         let product = self.mul(of_mean, of_apart);
         Some(self.sum([(Rational::from(factor) * of_first, product)]))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::Ast;
+
+    #[test]
+    fn waves_with_coefficients_that_add_up_to_zero_are_compared() {
+        let mut graph = Graph::new();
+        let mut built = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap()
+        };
+        let places = BTreeSet::from([built("X"), built("Y"), built("Z")]);
+        let divergence = built(
+            "A*Pi*cos(Pi*X)*sin(c*t) + A*Pi*cos(Pi*Y)*(sqrt(3)*cos(c*t) - sin(c*t))/2 - A*Pi*cos(Pi*Z)*(sqrt(3)*cos(c*t) + sin(c*t))/2",
+        );
+        let left = built("cos(Pi*X)*sin(c*t) - cos(Pi*Y)*cos(c*t)");
+        let compared = graph.in_differences(divergence, &places);
+        assert_eq!(
+            graph.print(compared),
+            "-A*Pi*(2*sin(c*t)*sin(Pi*(X + Y)/2)*sin(Pi*(X - Y)/2) \
+             + (sin(c*t) + sqrt(3)*cos(c*t))*sin(Pi*(Y + Z)/2)*sin(Pi*(Y - Z)/2))"
+        );
+        assert_eq!(graph.in_differences(left, &places), left);
     }
 }

@@ -10,37 +10,47 @@
 //! hundred, and a small sum of them kept a hundredth of its digits' worth of roundings.
 //!
 //! - At rest `K`, `g` and `k` are zero. What is left is formed from `H`: `K = H + H^T F^-T - tr(C - I)/3 F^-T`.
+//! - All that multiplies `F^-T` in `P` is `J U' - 2/3 s W' tr(C - I)`, of which the two parts cancel to first order where `lambda` is
+//!   zero. With `v = J - 1` and `mu = 2 W'(0)` it is
+//!   `lambda v + (J U' - kappa v) + 2/3 mu (v - tr(C - I)/2) - 4/3 (s W' - W'(0)) tr(C - I)/2`, in which all but the first are of
+//!   second order.
 //! - Cube roots replace the power: with `c = J^(1/3)` it is `s - 1 = -(J - 1) (c + 1)/(c^2 (c^2 + c + 1))`, which keeps its digits for
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
 use super::energy::modulus_at_rest;
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, matrix_product};
+use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
 use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The symbol of `I1b - 3` in isochoric energies.
 const EXCESS: &str = "excess";
 
-/// The stress of `isochoric`, an energy in `excess`, and `volumetric`, one in `J`.
+/// A volumetric part, `kappa U(J)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Volume {
+    pub(super) kappa: Expr,
+    /// `U`, in `J`.
+    pub(super) energy: Expr,
+    /// `J U' - (J - 1)`, in `J`.
+    pub(super) pressure_beyond_linear: Expr,
+}
+
+/// The stress of `isochoric`, an energy in `excess`, and of `volume`.
 pub(super) fn stress(
     derivation: &mut Derivation,
     deformation: &Deformation,
     isochoric: Expr,
-    volumetric: Expr,
+    volume: Volume,
 ) -> Stress {
-    let law = Invariants::new(&mut derivation.graph, deformation, isochoric, volumetric);
+    let law = Invariants::new(&mut derivation.graph, deformation, isochoric, volume);
     let Divergence { linear, remainder, whole } = law.divergence(derivation, deformation);
     let graph = &mut derivation.graph;
     let scale = graph.product_of([law.doubled, law.power, law.slope]);
     let scale = graph.whole(scale);
     let pressure = zero_if_vanishing(graph, law.pressure);
-    // All that multiplies F^-T.
-    let of_trace = graph.product_of([scale, law.trace]);
-    let of_trace = graph.sum([(Rational::new((-1).into(), 3.into()), of_trace)]);
-    let normal = graph.add(pressure, of_trace);
-    let normal = graph.whole(normal);
+    let normal = law.normal(graph, deformation);
     let off_diagonal = graph.sub(normal, scale);
     let off_diagonal = graph.whole(off_diagonal);
     let strain = law.strain.is_some();
@@ -69,6 +79,21 @@ pub(super) fn stress(
     Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole, energy }
 }
 
+/// `ln J - (J - 1)`. Next to inversion a product of stretches has digits that `J - 1` lacks: there it is a sum over the stretches.
+fn log_beyond_linear(graph: &mut Graph, deformation: &Deformation) -> Expr {
+    let H = &deformation.H;
+    let n = H.len();
+    let stretches: Vec<Expr> = (0..n).map(|i| graph.add(Graph::ONE, H[i][i])).collect();
+    if n > 1 && graph.product_of(stretches) == deformation.J {
+        let mut terms: Vec<Expr> =
+            (0..n).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
+        let minors = minors_beyond_trace(graph, H);
+        terms.extend(minors.into_iter().map(|minor| graph.neg(minor)));
+        return graph.sum_of(terms);
+    }
+    graph.call(Function::Ln1pMinusX, &[deformation.volume_change])
+}
+
 /// The invariants of a deformation, and the derivatives of both energies there.
 struct Invariants {
     /// The number 2.
@@ -93,18 +118,15 @@ struct Invariants {
     curvature: Expr,
     /// `J U'`, and `J^2 U''` as its value at rest and the rest.
     pressure: Expr,
+    /// `J U' - kappa (J - 1)`, of second order.
+    pressure_beyond_linear: Expr,
     stiffness_at_rest: Expr,
     stiffness_change: Expr,
     energy: Expr,
 }
 
 impl Invariants {
-    fn new(
-        graph: &mut Graph,
-        deformation: &Deformation,
-        isochoric: Expr,
-        volumetric: Expr,
-    ) -> Self {
+    fn new(graph: &mut Graph, deformation: &Deformation, isochoric: Expr, volume: Volume) -> Self {
         let H = &deformation.H;
         let n = H.len();
         let (one, two, three) = (Graph::ONE, graph.integer(2), graph.integer(3));
@@ -125,8 +147,7 @@ impl Invariants {
             Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
             None => {
                 let squares: Vec<Expr> = H.iter().flatten().map(|&h| graph.powi(h, 2)).collect();
-                let twice = (0..n).flat_map(|i| [H[i][i]; 2]);
-                let twice = twice.filter(|_| !deformation.free_of_divergence);
+                let twice = deformation.dilation.iter().flat_map(|&term| [term; 2]);
                 graph.sum_of(twice.chain(squares))
             }
         };
@@ -171,11 +192,14 @@ impl Invariants {
         // In v = J - 1, of which the pressure is small.
         let (J, v) = (graph.symbol("J"), graph.symbol("J - 1"));
         let sum = graph.add(one, v);
-        let volumetric = graph.replace(volumetric, &BTreeMap::from([(J, sum)]));
+        let energy = graph.mul(volume.kappa, volume.energy);
+        let volumetric = graph.replace(energy, &BTreeMap::from([(J, sum)]));
         let small = BTreeSet::from([v]);
         let of_volume = derivatives.of(graph, volumetric, v);
         let of_slope_of_volume = derivatives.of(graph, of_volume, v);
         let pressure = graph.mul(sum, of_volume);
+        let beyond_linear = graph.mul(volume.kappa, volume.pressure_beyond_linear);
+        let beyond_linear = graph.replace(beyond_linear, &BTreeMap::from([(J, sum)]));
         let (_, pressure) = graph.split_at_zero(pressure, &small);
         let stiffness = graph.product_of([sum, sum, of_slope_of_volume]);
         let (stiffness_at_rest, stiffness_change) = graph.split_at_zero(stiffness, &small);
@@ -185,6 +209,7 @@ impl Invariants {
             (v, deformation.volume_change),
             (graph.call(Function::Ln1p, &[v]), deformation.log_J),
             (graph.call(Function::Ln, &[sum]), deformation.log_J),
+            (graph.call(Function::Ln1pMinusX, &[v]), log_beyond_linear(graph, deformation)),
         ]);
         let at = |graph: &mut Graph, expr, values: &BTreeMap<Expr, Expr>| {
             let value = graph.replace(expr, values);
@@ -205,10 +230,72 @@ impl Invariants {
             slope_change: at(graph, slope_change, &actual),
             curvature: at(graph, of_slope, &actual),
             pressure: at(graph, pressure, &of_volume),
+            pressure_beyond_linear: at(graph, beyond_linear, &of_volume),
             stiffness_at_rest,
             stiffness_change: at(graph, stiffness_change, &of_volume),
             energy: graph.sum_of(energies),
         }
+    }
+
+    /// `s W' - W'(0)`.
+    fn scaled_slope_change(&self, graph: &mut Graph) -> Expr {
+        let of_power = graph.mul(self.power_change, self.slope);
+        let change = graph.add(of_power, self.slope_change);
+        graph.whole(change)
+    }
+
+    /// All that multiplies `F^-T` in `P`.
+    fn normal(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
+        let mu = graph.mul(self.doubled, self.slope_at_rest);
+        let third = |n: i64| Rational::new(n.into(), 3.into());
+        let lambda = graph.sum([(1.into(), self.stiffness_at_rest), (third(-2), mu)]);
+        let lambda = modulus_at_rest(graph, lambda);
+        let lambda = graph.whole(lambda);
+        let slope_change = self.scaled_slope_change(graph);
+        let volume = self.volume_beyond_trace(graph, deformation);
+        let normal = [
+            (1.into(), graph.mul(lambda, deformation.volume_change)),
+            (1.into(), self.pressure_beyond_linear),
+            (third(2), graph.mul(mu, volume)),
+            (third(-2), graph.mul(slope_change, self.trace)),
+        ];
+        let normal = graph.sum(normal);
+        let normal = zero_if_vanishing(graph, normal);
+        graph.whole(normal)
+    }
+
+    /// `J - 1 - tr(C - I)/2`, of second order.
+    fn volume_beyond_trace(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
+        let H = &deformation.H;
+        let n = H.len();
+        let half = |numerator: i64| Rational::new(numerator.into(), 2.into());
+        let sum = if let Some(B) = &self.strain {
+            // J^2 = det(I + B)
+            let minors = minors_beyond_trace(graph, B);
+            let square = graph.powi(deformation.volume_change, 2);
+            let minors = minors.into_iter().map(|minor| (half(1), minor));
+            graph.sum(minors.chain([(half(-1), square)]))
+        } else {
+            // For n = 2 two squares, which do not cancel.
+            let mut terms = Vec::new();
+            for i in 0..n {
+                for j in i + 1..n {
+                    let shear = graph.add(H[i][j], H[j][i]);
+                    terms.push((half(-1), graph.powi(shear, 2)));
+                    if i > 0 {
+                        terms.push((2.into(), graph.mul(H[i][i], H[j][j])));
+                    }
+                }
+            }
+            let apart = (0..n).map(|i| (if i == 0 { 1 } else { -1 }.into(), H[i][i]));
+            let apart = graph.sum(apart);
+            terms.push((half(-1), graph.powi(apart, 2)));
+            if n == 3 {
+                terms.push((1.into(), determinant(graph, H)));
+            }
+            graph.sum(terms)
+        };
+        graph.whole(sum)
     }
 
     fn divergence(&self, derivation: &mut Derivation, deformation: &Deformation) -> Divergence {
@@ -226,10 +313,8 @@ impl Invariants {
         let (open_mu, open_modulus) = (modulus_at_rest(graph, mu), modulus_at_rest(graph, modulus));
         let trace = deformation.trace(graph);
 
-        // s W' - W'(0), and of the factor of F^-T g what it is more than at rest.
-        let of_power = graph.mul(self.power_change, self.slope);
-        let slope_change = graph.add(of_power, self.slope_change);
-        let slope_change = graph.whole(slope_change);
+        // Of the factor of F^-T g what it is more than at rest.
+        let slope_change = self.scaled_slope_change(graph);
         let scaled = graph.mul(self.power, self.slope);
         let scaled = graph.whole(scaled);
         let of_trace = graph.mul(scaled, self.trace);
@@ -265,7 +350,7 @@ impl Invariants {
             true => vec![Graph::ZERO; n],
             false => (0..n)
                 .map(|k| {
-                    let along = match deformation.free_of_divergence {
+                    let along = match deformation.is_free_of_divergence() {
                         true => derivation.graph.neg(of_M[k]),
                         false => derivation.along(deformation.log_J, k),
                     };
@@ -307,5 +392,36 @@ impl Invariants {
             whole.push(graph.sum(first.into_iter().chain(second)));
         }
         Divergence { linear, remainder, whole }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmsmith_expr::Ast;
+    use mmsmith_vocabulary::Volumetric;
+
+    /// `J U' = (J - 1) + ...` of each volumetric part.
+    #[test]
+    fn pressures_without_their_linear_parts() {
+        let mut graph = Graph::new();
+        let J = graph.symbol("J");
+        let v = graph.sub(J, Graph::ONE);
+        let logarithm = graph.call(Function::Ln, &[J]);
+        let beyond = graph.sub(logarithm, v);
+        let replacement = BTreeMap::from([(graph.call(Function::Ln1pMinusX, &[v]), beyond)]);
+        for (name, volume) in Volumetric::NAMES {
+            let mut built = |text: &str| {
+                let ast = Ast::parse(text).unwrap();
+                graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap()
+            };
+            let (U, expected) = (built(volume.formula()), built(volume.pressure_beyond_linear()));
+            let expected = graph.replace(expected, &replacement);
+            let slope = Derivatives::limited().of(&mut graph, U, J);
+            let pressure = graph.mul(J, slope);
+            let difference = graph.sub(pressure, v);
+            let difference = graph.sub(difference, expected);
+            assert!(graph.vanishes(difference), "{name}");
+        }
     }
 }

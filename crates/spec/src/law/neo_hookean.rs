@@ -190,7 +190,7 @@ impl NeoHookean<'_> {
             let sum = derivation.graph.sum_of(terms);
             let sum = zero_if_vanishing(&mut derivation.graph, sum);
             m.push(sum);
-            let along = match deformation.free_of_divergence {
+            let along = match deformation.is_free_of_divergence() {
                 true => derivation.graph.neg(sum),
                 false => derivation.along(deformation.log_J, k),
             };

@@ -32,16 +32,20 @@ pub(super) fn stress(
             G
         }
     };
+    let diagonal = |A: &Matrix| -> Vec<Expr> { (0..n).map(|k| A[k][k]).collect() };
     // tr G = 2 tr H + H : H.
-    let of_trace = if deformation.free_of_divergence { &products } else { &G };
-    let pressure = half_trace_times(graph, of_trace, lambda);
+    let mut of_trace = diagonal(if deformation.turn.is_some() { &G } else { &products });
+    if deformation.turn.is_none() {
+        of_trace.extend(deformation.dilation.iter().flat_map(|&term| [term; 2]));
+    }
+    let pressure = half_sum_times(graph, of_trace, lambda);
     let mut second = isotropic(graph, &G, pressure, mu);
     for entry in second.iter_mut().flatten() {
         *entry = graph.whole(*entry);
     }
     let turned = matrix_product(graph, H, &second);
     let (mut P, mut anisotropic) = (second.clone(), second);
-    let of_products = half_trace_times(graph, &products, lambda);
+    let of_products = half_sum_times(graph, diagonal(&products), lambda);
     let mut remainder = isotropic(graph, &products, of_products, mu);
     for i in 0..n {
         for j in 0..n {
@@ -63,9 +67,9 @@ pub(super) fn stress(
     Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole: None, energy: None }
 }
 
-/// `lambda/2 tr(G)`.
-fn half_trace_times(graph: &mut Graph, G: &Matrix, lambda: Expr) -> Expr {
-    let trace = graph.sum_of((0..G.len()).map(|k| G[k][k]));
+/// The sum of `terms`, times `lambda/2`.
+fn half_sum_times(graph: &mut Graph, terms: Vec<Expr>, lambda: Expr) -> Expr {
+    let trace = graph.sum_of(terms);
     let two = graph.integer(2);
     let half = graph.div(trace, two);
     graph.mul(lambda, half)
