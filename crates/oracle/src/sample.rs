@@ -141,6 +141,8 @@ pub struct Sampler<'a> {
     /// The determinant of the deformation gradient, and its entries.
     jacobian: Program,
     gradient: Program,
+    /// The strain energy, which some laws have for deformations up to a limit only.
+    energy: Option<Program>,
     /// The place of the amplitude `A` among the parameters.
     amplitude: Option<usize>,
     isochoric: bool,
@@ -162,6 +164,7 @@ impl<'a> Sampler<'a> {
             constants: fields.program(&outputs),
             jacobian: fields.program(&[fields.J]),
             gradient: fields.program(&fields.F.concat()),
+            energy: fields.W.map(|W| fields.program(&[W])),
             amplitude: spec.parameters.iter().position(|p| p.name == "A"),
             isochoric: fields.J == Graph::ONE,
         }
@@ -195,7 +198,7 @@ impl<'a> Sampler<'a> {
             if class == Class::NearInversion {
                 return self.nearly_inverted(inputs, &mut random);
             }
-            self.is_moderate(&inputs).then_some(inputs)
+            (self.is_moderate(&inputs) && self.has_energy(&inputs)).then_some(inputs)
         })
     }
 
@@ -203,6 +206,11 @@ impl<'a> Sampler<'a> {
         let moderate = |h: &f64| h.abs() < LARGEST_GRADIENT;
         self.jacobian.evaluate(inputs)[0] > LEAST_JACOBIAN
             && self.gradient.evaluate(inputs).iter().all(moderate)
+    }
+
+    /// Whether the law is defined there, as far as its energy tells.
+    fn has_energy(&self, inputs: &[f64]) -> bool {
+        self.energy.as_ref().is_none_or(|energy| !energy.evaluate(inputs)[0].is_nan())
     }
 
     /// Whether inputs that were not drawn are such as [`Sampler::draw`] may give for `class`, but for the deformation, which
@@ -223,10 +231,11 @@ impl<'a> Sampler<'a> {
 
     /// Whether the deformation at the inputs is one of `class`.
     pub(crate) fn deformation_suits(&self, class: Class, inputs: &[f64]) -> bool {
-        match class {
+        let suits = match class {
             Class::NearInversion => NEAR_INVERSION.contains(&self.smallest_stretch(inputs)),
             _ => self.is_moderate(inputs),
-        }
+        };
+        suits && self.has_energy(inputs)
     }
 
     fn parameter_belongs(
@@ -463,7 +472,7 @@ impl<'a> Sampler<'a> {
         let share = bisect(0.0, 1.0, |share| self.smallest_stretch(&between(share)) > wanted);
         let found = between(share);
         let suits = NEAR_INVERSION.contains(&self.smallest_stretch(&found));
-        (suits && self.admits(&found)).then_some(found)
+        (suits && self.admits(&found) && self.has_energy(&found)).then_some(found)
     }
 
     fn admits(&self, inputs: &[f64]) -> bool {
