@@ -2,6 +2,7 @@
 
 pub(crate) mod energy;
 mod isochoric;
+mod kinematics;
 mod neo_hookean;
 mod principal_stretches;
 mod st_venant_kirchhoff;
@@ -208,6 +209,11 @@ pub(crate) fn stress(
             (*W, energy::uses_invariants_only(&mut derivation.graph, *W, n))
         }
         Law::Library(material) => {
+            let with_volume = |graph: &mut Graph, text: String| {
+                let volume = material.volumetric().map(Volumetric::formula);
+                let volume = volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default();
+                energy::named(graph, &(text + &volume), &law.constants())
+            };
             let (text, isotropic) = match material.derivation() {
                 Formulas::NeoHookean { lambda, mu } => {
                     return Ok(neo_hookean::stress(derivation, deformation, lambda, mu));
@@ -247,14 +253,18 @@ pub(crate) fn stress(
                     .stress(derivation, deformation);
                     return Ok(stress.plus(&mut derivation.graph, others));
                 }
+                Formulas::PrincipalStretches(parts)
+                    if principal_stretches::is_coupled_in_plane(&deformation.H) =>
+                {
+                    let text = principal_stretches::energy_in_plane(&parts);
+                    let W = with_volume(&mut derivation.graph, text);
+                    return Ok(principal_stretches::stress_in_plane(derivation, deformation, W));
+                }
                 Formulas::PrincipalStretches(parts) => {
                     principal_stretches::energy(&derivation.graph, &deformation.H, &parts)?
                 }
             };
-            let volume = material.volumetric().map(Volumetric::formula);
-            let volume = volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default();
-            let constants = law.constants();
-            let W = energy::named(&mut derivation.graph, &(text + &volume), &constants);
+            let W = with_volume(&mut derivation.graph, text);
             (W, isotropic)
         }
     };

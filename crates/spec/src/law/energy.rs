@@ -15,6 +15,15 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The names that an energy may use, and the components of `F` and `C` with two indices after them.
 pub(crate) const INVARIANTS: [&str; 3] = ["J", "I1", "I2"];
 
+/// Names in the energies of the library's laws: `I1b - 3`, and `(a - b)^2/(2 a b)` of the principal stretches in a plane.
+pub(super) const EXCESS: &str = "excess";
+pub(super) const RATIO: &str = "ratio";
+
+/// The symbol of such a name, which is none that a specification can have.
+pub(super) fn own_symbol(graph: &mut Graph, name: &str) -> Expr {
+    graph.symbol(&format!("{name} of the law"))
+}
+
 /// The names of the components of a tensor, as `F11`.
 pub(crate) fn component_names(letter: &str, dimension: usize) -> Vec<Vec<String>> {
     let row = |i| (1..=dimension).map(|j| format!("{letter}{i}{j}")).collect();
@@ -224,6 +233,7 @@ pub(super) fn named(
         let constant = constants.iter().find(|(known, _)| known.name == name);
         Ok(match constant {
             Some(&(_, value)) => graph.whole(value),
+            None if [EXCESS, RATIO].contains(&name) => own_symbol(graph, name),
             None => graph.symbol(name),
         })
     });

@@ -17,15 +17,13 @@
 //! - Cube roots replace the power: with `c = J^(1/3)` it is `s - 1 = -(J - 1) (c + 1)/(c^2 (c^2 + c + 1))`, which keeps its digits for
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
-use super::energy::modulus_at_rest;
+use super::energy::{self, EXCESS, modulus_at_rest};
+use super::kinematics::{DilationGradient, Kinematics, log_beyond_linear, row_times, work_along};
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
+use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// The symbol of `I1b - 3` in isochoric energies.
-const EXCESS: &str = "excess";
 
 /// A volumetric part, `kappa U(J)`.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +51,7 @@ pub(super) fn stress(
     let normal = law.normal(graph, deformation);
     let off_diagonal = graph.sub(normal, scale);
     let off_diagonal = graph.whole(off_diagonal);
-    let strain = law.strain.is_some();
+    let strain = law.kinematics.strain.is_some();
     let n = deformation.H.len();
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
@@ -61,7 +59,7 @@ pub(super) fn stress(
         for j in 0..n {
             let f = deformation.inverse_transpose[i][j];
             let (first, factor) = match i == j || strain {
-                true => (law.difference[i][j], normal),
+                true => (law.kinematics.difference[i][j], normal),
                 // H^T F^-T is -F^-T there.
                 false => (deformation.H[i][j], off_diagonal),
             };
@@ -69,7 +67,7 @@ pub(super) fn stress(
             let entry = graph.sum_of(terms);
             P[i][j] = zero_if_vanishing(graph, entry);
             let shear = graph.mul(scale, law.K[i][j]);
-            let turned = graph.mul(pressure, law.M[i][j]);
+            let turned = graph.mul(pressure, law.kinematics.M[i][j]);
             let entry = graph.sub(shear, turned);
             anisotropic[i][j] = zero_if_vanishing(graph, entry);
         }
@@ -79,21 +77,6 @@ pub(super) fn stress(
     Stress { P, isotropic: pressure, anisotropic, linear, remainder, whole, energy }
 }
 
-/// `ln J - (J - 1)`. Next to inversion a product of stretches has digits that `J - 1` lacks: there it is a sum over the stretches.
-fn log_beyond_linear(graph: &mut Graph, deformation: &Deformation) -> Expr {
-    let H = &deformation.H;
-    let n = H.len();
-    let stretches: Vec<Expr> = (0..n).map(|i| graph.add(Graph::ONE, H[i][i])).collect();
-    if n > 1 && graph.product_of(stretches) == deformation.J {
-        let mut terms: Vec<Expr> =
-            (0..n).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
-        let minors = minors_beyond_trace(graph, H);
-        terms.extend(minors.into_iter().map(|minor| graph.neg(minor)));
-        return graph.sum_of(terms);
-    }
-    graph.call(Function::Ln1pMinusX, &[deformation.volume_change])
-}
-
 /// The invariants of a deformation, and the derivatives of both energies there.
 struct Invariants {
     /// The number 2.
@@ -101,16 +84,9 @@ struct Invariants {
     /// `J^(-2/3)`, and what it is more than one.
     power: Expr,
     power_change: Expr,
-    /// `tr(C - I)`.
-    trace: Expr,
-    /// `F F^T - I`, where a turn drops out of it.
-    strain: Option<Matrix>,
-    /// `F - F^-T`.
-    difference: Matrix,
+    kinematics: Kinematics,
     /// `F - I1/3 F^-T`.
     K: Matrix,
-    /// `H^T F^-T = I - F^-T`.
-    M: Matrix,
     /// `W'` with its value at rest and the rest, and `W''`.
     slope: Expr,
     slope_at_rest: Expr,
@@ -127,8 +103,6 @@ struct Invariants {
 
 impl Invariants {
     fn new(graph: &mut Graph, deformation: &Deformation, isochoric: Expr, volume: Volume) -> Self {
-        let H = &deformation.H;
-        let n = H.len();
         let (one, two, three) = (Graph::ONE, graph.integer(2), graph.integer(3));
         let root = graph.product([(deformation.J, Rational::new(1.into(), 3.into()))]);
         let root = graph.whole(root);
@@ -142,41 +116,20 @@ impl Invariants {
         let power_change = graph.neg(change);
         let power_change = graph.whole(power_change);
 
-        let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
-        let trace = match &strain {
-            Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
-            None => {
-                let squares: Vec<Expr> = H.iter().flatten().map(|&h| graph.powi(h, 2)).collect();
-                let twice = deformation.dilation.iter().flat_map(|&term| [term; 2]);
-                graph.sum_of(twice.chain(squares))
-            }
-        };
-        let trace = graph.whole(trace);
-        let third = graph.div(trace, three);
-        let f = &deformation.inverse_transpose;
-        let mut M = deformation.transposed_gradient_times_inverse(graph);
-        let turned = strain.as_ref().map(|B| matrix_product(graph, B, f));
-        let mut difference = M.clone();
-        let mut K = M.clone();
-        for i in 0..n {
-            for j in 0..n {
-                if i != j {
-                    M[i][j] = graph.neg(f[i][j]);
-                }
-                // F - F^-T = (F F^T - I) F^-T
-                difference[i][j] = match &turned {
-                    Some(turned) => turned[i][j],
-                    None => graph.add(H[i][j], M[i][j]),
-                };
-                let mean = graph.mul(third, f[i][j]);
-                let entry = graph.sub(difference[i][j], mean);
-                let entry = zero_if_vanishing(graph, entry);
-                K[i][j] = graph.whole(entry);
+        let kinematics = Kinematics::new(graph, deformation);
+        let third = graph.div(kinematics.trace, three);
+        let mut K = kinematics.difference.clone();
+        for (entries, f) in K.iter_mut().zip(&deformation.inverse_transpose) {
+            for (entry, f) in entries.iter_mut().zip(f) {
+                let mean = graph.mul(third, *f);
+                *entry = graph.sub(*entry, mean);
+                *entry = zero_if_vanishing(graph, *entry);
+                *entry = graph.whole(*entry);
             }
         }
 
-        let excess = graph.symbol(EXCESS);
-        let part = graph.mul(power, trace);
+        let excess = energy::own_symbol(graph, EXCESS);
+        let part = graph.mul(power, kinematics.trace);
         let value = graph.mul(three, power_change);
         let value = graph.add(part, value);
         let value = zero_if_vanishing(graph, value);
@@ -220,11 +173,8 @@ impl Invariants {
             doubled: two,
             power,
             power_change,
-            trace,
-            strain,
-            difference,
+            kinematics,
             K,
-            M,
             slope: at(graph, slope, &actual),
             slope_at_rest,
             slope_change: at(graph, slope_change, &actual),
@@ -252,50 +202,16 @@ impl Invariants {
         let lambda = modulus_at_rest(graph, lambda);
         let lambda = graph.whole(lambda);
         let slope_change = self.scaled_slope_change(graph);
-        let volume = self.volume_beyond_trace(graph, deformation);
+        let volume = self.kinematics.volume_beyond_trace(graph, deformation);
         let normal = [
             (1.into(), graph.mul(lambda, deformation.volume_change)),
             (1.into(), self.pressure_beyond_linear),
             (third(2), graph.mul(mu, volume)),
-            (third(-2), graph.mul(slope_change, self.trace)),
+            (third(-2), graph.mul(slope_change, self.kinematics.trace)),
         ];
         let normal = graph.sum(normal);
         let normal = zero_if_vanishing(graph, normal);
         graph.whole(normal)
-    }
-
-    /// `J - 1 - tr(C - I)/2`, of second order.
-    fn volume_beyond_trace(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
-        let H = &deformation.H;
-        let n = H.len();
-        let half = |numerator: i64| Rational::new(numerator.into(), 2.into());
-        let sum = if let Some(B) = &self.strain {
-            // J^2 = det(I + B)
-            let minors = minors_beyond_trace(graph, B);
-            let square = graph.powi(deformation.volume_change, 2);
-            let minors = minors.into_iter().map(|minor| (half(1), minor));
-            graph.sum(minors.chain([(half(-1), square)]))
-        } else {
-            // For n = 2 two squares, which do not cancel.
-            let mut terms = Vec::new();
-            for i in 0..n {
-                for j in i + 1..n {
-                    let shear = graph.add(H[i][j], H[j][i]);
-                    terms.push((half(-1), graph.powi(shear, 2)));
-                    if i > 0 {
-                        terms.push((2.into(), graph.mul(H[i][i], H[j][j])));
-                    }
-                }
-            }
-            let apart = (0..n).map(|i| (if i == 0 { 1 } else { -1 }.into(), H[i][i]));
-            let apart = graph.sum(apart);
-            terms.push((half(-1), graph.powi(apart, 2)));
-            if n == 3 {
-                terms.push((1.into(), determinant(graph, H)));
-            }
-            graph.sum(terms)
-        };
-        graph.whole(sum)
     }
 
     fn divergence(&self, derivation: &mut Derivation, deformation: &Deformation) -> Divergence {
@@ -317,7 +233,7 @@ impl Invariants {
         let slope_change = self.scaled_slope_change(graph);
         let scaled = graph.mul(self.power, self.slope);
         let scaled = graph.whole(scaled);
-        let of_trace = graph.mul(scaled, self.trace);
+        let of_trace = graph.mul(scaled, self.kinematics.trace);
         let of_slope = graph.mul(three, slope_change);
         let sum = graph.add(of_trace, of_slope);
         let ninths = graph.sum([(Rational::new(2.into(), 9.into()), sum)]);
@@ -332,32 +248,9 @@ impl Invariants {
         let second = graph.product_of([self.curvature, self.power, self.power]);
         let second = graph.whole(second);
 
-        let contracted = |derivation: &mut Derivation, A: &Matrix, k: usize| {
-            let mut terms = Vec::new();
-            for i in 0..n {
-                for j in 0..n {
-                    let derivative = derivation.along(H[i][j], k);
-                    terms.push(derivation.graph.mul(A[i][j], derivative));
-                }
-            }
-            let sum = derivation.graph.sum_of(terms);
-            let sum = zero_if_vanishing(&mut derivation.graph, sum);
-            derivation.graph.whole(sum)
-        };
-        let of_K: Vector = (0..n).map(|k| contracted(derivation, &self.K, k)).collect();
-        let of_M: Vector = (0..n).map(|k| contracted(derivation, &self.M, k)).collect();
-        let g: Vector = match deformation.is_isochoric() {
-            true => vec![Graph::ZERO; n],
-            false => (0..n)
-                .map(|k| {
-                    let along = match deformation.is_free_of_divergence() {
-                        true => derivation.graph.neg(of_M[k]),
-                        false => derivation.along(deformation.log_J, k),
-                    };
-                    derivation.graph.whole(along)
-                })
-                .collect(),
-        };
+        let of_K: Vector = (0..n).map(|k| work_along(derivation, &self.K, H, k)).collect();
+        let DilationGradient { of_M, g } =
+            self.kinematics.dilation_gradient(derivation, deformation);
         let open = derivation.divergence(&deformation.open);
         let of_H = derivation.divergence(H);
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
@@ -366,15 +259,11 @@ impl Invariants {
             let graph = &mut derivation.graph;
             let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
             linear.push(graph.sum_of(first));
-            let times = |graph: &mut Graph, A: &Matrix, x: &Vector| {
-                let terms: Vec<Expr> = (0..n).map(|j| graph.mul(A[i][j], x[j])).collect();
-                graph.sum_of(terms)
-            };
-            let Kg = times(graph, &self.K, &g);
-            let Kk = times(graph, &self.K, &of_K);
-            let Mg = times(graph, &self.M, &g);
-            let fk = times(graph, &deformation.inverse_transpose, &of_K);
-            let fg = times(graph, &deformation.inverse_transpose, &g);
+            let Kg = row_times(graph, &self.K, i, &g);
+            let Kk = row_times(graph, &self.K, i, &of_K);
+            let Mg = row_times(graph, &self.kinematics.M, i, &g);
+            let fk = row_times(graph, &deformation.inverse_transpose, i, &of_K);
+            let fg = row_times(graph, &deformation.inverse_transpose, i, &g);
             let of_volume = graph.add(of_M[i], Mg);
             let second = [
                 (Rational::new((-4).into(), 3.into()), graph.mul(scaled, Kg)),

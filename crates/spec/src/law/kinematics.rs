@@ -1,0 +1,150 @@
+//! Measures of strain that are small where the displacement gradient is, and what laws in invariants need of their gradients.
+
+use super::{Deformation, zero_if_vanishing};
+use crate::derivation::Derivation;
+use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
+use mmsmith_expr::{Expr, Function, Graph, Rational};
+
+/// Measures of the strain of one deformation.
+pub(super) struct Kinematics {
+    /// `tr(C - I)`.
+    pub(super) trace: Expr,
+    /// `F F^T - I`, where a turn drops out of it.
+    pub(super) strain: Option<Matrix>,
+    /// `F - F^-T`.
+    pub(super) difference: Matrix,
+    /// `H^T F^-T = I - F^-T`.
+    pub(super) M: Matrix,
+}
+
+/// The gradient of `ln J`.
+pub(super) struct DilationGradient {
+    /// `M : dH` along each unit vector.
+    pub(super) of_M: Vector,
+    /// `grad ln J = grad tr H - M : grad H`.
+    pub(super) g: Vector,
+}
+
+impl Kinematics {
+    pub(super) fn new(graph: &mut Graph, deformation: &Deformation) -> Self {
+        let H = &deformation.H;
+        let n = H.len();
+        let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
+        let trace = match &strain {
+            Some(B) => graph.sum_of((0..n).map(|i| B[i][i])),
+            None => {
+                let squares: Vec<Expr> = H.iter().flatten().map(|&h| graph.powi(h, 2)).collect();
+                let twice = deformation.dilation.iter().flat_map(|&term| [term; 2]);
+                graph.sum_of(twice.chain(squares))
+            }
+        };
+        let trace = graph.whole(trace);
+        let f = &deformation.inverse_transpose;
+        let mut M = deformation.transposed_gradient_times_inverse(graph);
+        let turned = strain.as_ref().map(|B| matrix_product(graph, B, f));
+        let mut difference = M.clone();
+        for i in 0..n {
+            for j in 0..n {
+                if i != j {
+                    M[i][j] = graph.neg(f[i][j]);
+                }
+                // F - F^-T = (F F^T - I) F^-T
+                difference[i][j] = match &turned {
+                    Some(turned) => turned[i][j],
+                    None => graph.add(H[i][j], M[i][j]),
+                };
+            }
+        }
+        Kinematics { trace, strain, difference, M }
+    }
+
+    /// `J - 1 - tr(C - I)/2`, of second order.
+    pub(super) fn volume_beyond_trace(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
+        let H = &deformation.H;
+        let n = H.len();
+        let half = |numerator: i64| Rational::new(numerator.into(), 2.into());
+        let sum = if let Some(B) = &self.strain {
+            // J^2 = det(I + B)
+            let minors = minors_beyond_trace(graph, B);
+            let square = graph.powi(deformation.volume_change, 2);
+            let minors = minors.into_iter().map(|minor| (half(1), minor));
+            graph.sum(minors.chain([(half(-1), square)]))
+        } else {
+            // For n = 2 two squares, which do not cancel.
+            let mut terms = Vec::new();
+            for i in 0..n {
+                for j in i + 1..n {
+                    let shear = graph.add(H[i][j], H[j][i]);
+                    terms.push((half(-1), graph.powi(shear, 2)));
+                    if i > 0 {
+                        terms.push((2.into(), graph.mul(H[i][i], H[j][j])));
+                    }
+                }
+            }
+            let apart = (0..n).map(|i| (if i == 0 { 1 } else { -1 }.into(), H[i][i]));
+            let apart = graph.sum(apart);
+            terms.push((half(-1), graph.powi(apart, 2)));
+            if n == 3 {
+                terms.push((1.into(), determinant(graph, H)));
+            }
+            graph.sum(terms)
+        };
+        graph.whole(sum)
+    }
+
+    /// The gradient of `ln J`; zero where the volume is constant.
+    pub(super) fn dilation_gradient(
+        &self,
+        derivation: &mut Derivation,
+        deformation: &Deformation,
+    ) -> DilationGradient {
+        let n = deformation.H.len();
+        let of_M: Vector =
+            (0..n).map(|k| work_along(derivation, &self.M, &deformation.H, k)).collect();
+        let along = |k: usize| {
+            let along = match deformation.is_free_of_divergence() {
+                true => derivation.graph.neg(of_M[k]),
+                false => derivation.along(deformation.log_J, k),
+            };
+            derivation.graph.whole(along)
+        };
+        let g = match deformation.is_isochoric() {
+            true => vec![Graph::ZERO; n],
+            false => (0..n).map(along).collect(),
+        };
+        DilationGradient { of_M, g }
+    }
+}
+
+/// `ln J - (J - 1)`. Next to inversion a product of stretches has digits that `J - 1` lacks: there it is a sum over the stretches.
+pub(super) fn log_beyond_linear(graph: &mut Graph, deformation: &Deformation) -> Expr {
+    let H = &deformation.H;
+    let n = H.len();
+    let stretches: Vec<Expr> = (0..n).map(|i| graph.add(Graph::ONE, H[i][i])).collect();
+    if n > 1 && graph.product_of(stretches) == deformation.J {
+        let mut terms: Vec<Expr> =
+            (0..n).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
+        let minors = minors_beyond_trace(graph, H);
+        terms.extend(minors.into_iter().map(|minor| graph.neg(minor)));
+        return graph.sum_of(terms);
+    }
+    graph.call(Function::Ln1pMinusX, &[deformation.volume_change])
+}
+
+/// `A : dH` along the unit vector `e_k`.
+pub(super) fn work_along(derivation: &mut Derivation, A: &Matrix, H: &Matrix, k: usize) -> Expr {
+    let mut terms = Vec::new();
+    for (a, h) in A.iter().flatten().zip(H.iter().flatten()) {
+        let derivative = derivation.along(*h, k);
+        terms.push(derivation.graph.mul(*a, derivative));
+    }
+    let sum = derivation.graph.sum_of(terms);
+    let sum = zero_if_vanishing(&mut derivation.graph, sum);
+    derivation.graph.whole(sum)
+}
+
+/// Entry `i` of `A x`.
+pub(super) fn row_times(graph: &mut Graph, A: &Matrix, i: usize, x: &Vector) -> Expr {
+    let terms: Vec<Expr> = A[i].iter().zip(x).map(|(&a, &x)| graph.mul(a, x)).collect();
+    graph.sum_of(terms)
+}
