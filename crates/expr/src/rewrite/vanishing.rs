@@ -181,15 +181,24 @@ impl Graph {
         Some(self.sum_of(differences))
     }
 
-    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`.
+    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`, as the product of sine and cosine of half the sum and half the difference, each
+    /// written in half the angles: what belongs to one axis stays a factor of its own, as points of a lattice need it.
     fn difference_of_waves(&mut self, function: Function, a: Expr, b: Expr) -> Expr {
         let half = Rational::new(1.into(), 2.into());
-        let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
-        let apart = self.sum([(half.clone(), a), (-half, b)]);
-        let (of_mean, factor) =
-            if function == Function::Cos { (Function::Sin, -2) } else { (Function::Cos, 2) };
-        let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(Function::Sin, &[apart]));
-        let product = self.mul(of_mean, of_apart);
+        let of_half = |graph: &mut Self, angle: Expr| {
+            let angle = graph.sum([(half.clone(), angle)]);
+            [Function::Sin, Function::Cos].map(|function| graph.call(function, &[angle]))
+        };
+        let ([sin_a, cos_a], [sin_b, cos_b]) = (of_half(self, a), of_half(self, b));
+        let [first, second] = [self.mul(sin_a, cos_b), self.mul(cos_a, sin_b)];
+        let apart = self.sub(first, second);
+        let (of_mean, factor) = if function == Function::Cos {
+            (self.add(first, second), -2)
+        } else {
+            let [first, second] = [self.mul(cos_a, cos_b), self.mul(sin_a, sin_b)];
+            (self.sub(first, second), 2)
+        };
+        let product = self.mul(of_mean, apart);
         self.sum([(Rational::from(factor), product)])
     }
 
@@ -259,8 +268,10 @@ mod tests {
         let compared = graph.in_differences(divergence, &places);
         assert_eq!(
             graph.print(compared),
-            "-A*Pi*(2*sin(c*t)*sin(Pi*(X + Y)/2)*sin(Pi*(X - Y)/2) \
-             + (sin(c*t) + sqrt(3)*cos(c*t))*sin(Pi*(Y + Z)/2)*sin(Pi*(Y - Z)/2))"
+            "-A*Pi*(2*sin(c*t)*(sin(X*Pi/2)*cos(Y*Pi/2) - cos(X*Pi/2)*sin(Y*Pi/2))\
+             *(sin(X*Pi/2)*cos(Y*Pi/2) + cos(X*Pi/2)*sin(Y*Pi/2)) \
+             - (sin(c*t) + sqrt(3)*cos(c*t))*(cos(Y*Pi/2)*sin(Z*Pi/2) - sin(Y*Pi/2)*cos(Z*Pi/2))\
+             *(cos(Y*Pi/2)*sin(Z*Pi/2) + sin(Y*Pi/2)*cos(Z*Pi/2)))"
         );
         assert_eq!(graph.in_differences(left, &places), left);
     }

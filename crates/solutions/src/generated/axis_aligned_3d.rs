@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 28],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -134,47 +134,52 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t90 = t89 / t88;
         let t97 = T::nearest(2.0) * parameters.nu;
         let t98 = T::one() - t97;
-        let t108 = t20 * t90;
-        let t112 = parameters.E * parameters.nu;
-        let t113 = t88 * t98;
-        let t114 = t112 / t113;
-        let t130 = parameters.nu * parameters.nu;
-        let t131 = T::nearest(2.0) * parameters.A;
-        let t132 = t131 * t63;
-        let t133 = t132 * parameters.E;
-        let t134 = t133 * t130;
-        let t135 = parameters.rho0 * t88;
-        let t136 = t135 * t98;
-        let t137 = t134 / t136;
-        let t140 = t114 + t90;
-        let t146 = t20 * t140;
-        let t153 = T::one() / parameters.rho0;
-        let t157 = t65 * t130;
-        let t158 = t157 / t136;
-        let t179 = parameters.A * parameters.A;
-        let t180 = t179 * parameters.A;
-        let t181 = t63 * t63;
-        let t182 = t180 * t181;
-        let t183 = t182 * t140;
-        let t184 = t183 / parameters.rho0;
-        let t185 = t63 * T::pi();
-        let t186 = T::nearest(2.0) * t179;
-        let t187 = t186 * t185;
-        let t188 = t187 * t140;
-        let t189 = t188 / parameters.rho0;
-        let t190 = t65 * parameters.nu;
-        let t191 = t190 / t136;
-        let t193 = T::nearest(0.125) * t180;
-        let t194 = t193 * t181;
-        let t195 = t194 * t140;
-        let t196 = t195 / parameters.rho0;
-        let t197 = T::nearest(0.5) * t179;
-        let t198 = t197 * t185;
-        let t199 = t198 * t140;
-        let t200 = t199 / parameters.rho0;
-        let t201 = t71 * parameters.nu;
-        let t202 = t201 / t136;
-        let t203 = T::nearest(2.0) / t6;
+        let t132 = t20 * t90;
+        let t136 = parameters.E * parameters.nu;
+        let t137 = t88 * t98;
+        let t138 = t136 / t137;
+        let t156 = parameters.nu * parameters.nu;
+        let t157 = T::nearest(2.0) * parameters.E;
+        let t158 = t157 * t156;
+        let t159 = parameters.rho0 * t88;
+        let t160 = t159 * t98;
+        let t161 = t158 / t160;
+        let t163 = t138 + t90;
+        let t179 = T::one() / parameters.rho0;
+        let t185 = parameters.E * t156;
+        let t186 = t185 / t160;
+        let t211 = T::nearest(2.0) * parameters.A;
+        let t212 = t211 * t63;
+        let t213 = t212 * parameters.E;
+        let t214 = t213 * t156;
+        let t215 = t214 / t160;
+        let t216 = parameters.A * parameters.A;
+        let t217 = t216 * parameters.A;
+        let t218 = t63 * t63;
+        let t219 = t217 * t218;
+        let t220 = t219 * t163;
+        let t221 = t220 / parameters.rho0;
+        let t222 = t63 * T::pi();
+        let t223 = T::nearest(2.0) * t216;
+        let t224 = t223 * t222;
+        let t225 = t224 * t163;
+        let t226 = t225 / parameters.rho0;
+        let t227 = t65 * parameters.nu;
+        let t228 = t227 / t160;
+        let t229 = t65 * t156;
+        let t230 = t229 / t160;
+        let t232 = T::nearest(0.125) * t217;
+        let t233 = t232 * t218;
+        let t234 = t233 * t163;
+        let t235 = t234 / parameters.rho0;
+        let t236 = T::nearest(0.5) * t216;
+        let t237 = t236 * t222;
+        let t238 = t237 * t163;
+        let t239 = t238 / parameters.rho0;
+        let t240 = t71 * parameters.nu;
+        let t241 = t240 / t160;
+        let t242 = T::nearest(2.0) / t6;
+        let t389 = t20 * T::nearest(2.0);
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -190,20 +195,22 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t70,
                 t72,
                 t90,
-                t108,
-                t114,
-                t137,
-                t140,
-                t146,
-                t153,
-                t158,
-                t184,
-                t189,
-                t191,
-                t196,
-                t200,
-                t202,
-                t203,
+                t132,
+                t138,
+                t161,
+                t163,
+                t179,
+                t186,
+                t215,
+                t221,
+                t226,
+                t228,
+                t230,
+                t235,
+                t239,
+                t241,
+                t242,
+                t389,
             ],
         })
     }
@@ -452,47 +459,71 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t99 = t28 * t36;
-        let t100 = t99 - t31;
-        let t101 = t100 + T::one();
-        let t102 = t8 * t22;
-        let t103 = t102 * t101;
-        let t104 = self.fixed[3] * t103;
-        let t105 = t104 + t99;
-        let t106 = t105 - t31;
-        let t107 = t106.ln_of_both(t38);
-        let t109 = self.fixed[12] * t8;
-        let t110 = t109 * t22;
-        let t111 = t110 * t96;
-        let t115 = t107 * t94;
-        let t116 = self.fixed[13] * t115;
-        let t117 = t111 + t116;
-        let t118 = t95 + T::one();
-        let t119 = t28 * t118;
-        let t120 = self.fixed[11] * t119;
-        let t121 = t107 * t95;
-        let t122 = self.fixed[13] * t121;
-        let t123 = t120 + t122;
-        let t124 = t93 + T::one();
-        let t125 = t32 * t124;
-        let t126 = self.fixed[11] * t125;
-        let t127 = t107 * t93;
-        let t128 = self.fixed[13] * t127;
-        let t129 = t126 + t128;
+        let t99 = T::nearest(0.5) * X[0];
+        let t100 = t99.sin_pi();
+        let t101 = T::nearest(0.5) * X[1];
+        let t102 = t101.cos_pi();
+        let t103 = t99.cos_pi();
+        let t104 = t101.sin_pi();
+        let t105 = t100 * t102;
+        let t106 = t103 * t104;
+        let t107 = t105 - t106;
+        let t108 = t105 + t106;
+        let t109 = T::nearest(0.5) * X[2];
+        let t110 = t109.sin_pi();
+        let t111 = t109.cos_pi();
+        let t112 = t102 * t110;
+        let t113 = t104 * t111;
+        let t114 = t112 - t113;
+        let t115 = t112 + t113;
+        let t116 = T::nearest(2.0) * t8;
+        let t117 = t107 * t108;
+        let t118 = t116 * t117;
+        let t119 = t114 * t115;
+        let t120 = t18 * t119;
+        let t121 = t118 - t120;
+        let t122 = self.fixed[3] * t121;
+        let t123 = t28 * t36;
+        let t124 = t123 - t31;
+        let t125 = t8 * t22;
+        let t126 = t125 * t124;
+        let t127 = self.fixed[3] * t126;
+        let t128 = t28 * t32;
+        let t129 = t127 - t122;
+        let t130 = t129 + t128;
+        let t131 = t130.ln_of_both(t38);
+        let t133 = self.fixed[12] * t8;
+        let t134 = t133 * t22;
+        let t135 = t134 * t96;
+        let t139 = t131 * t94;
+        let t140 = self.fixed[13] * t139;
+        let t141 = t135 + t140;
+        let t142 = t95 + T::one();
+        let t143 = t28 * t142;
+        let t144 = self.fixed[11] * t143;
+        let t145 = t131 * t95;
+        let t146 = self.fixed[13] * t145;
+        let t147 = t144 + t146;
+        let t148 = t93 + T::one();
+        let t149 = t32 * t148;
+        let t150 = self.fixed[11] * t149;
+        let t151 = t131 * t93;
+        let t152 = self.fixed[13] * t151;
+        let t153 = t150 + t152;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t117,
+            t141,
             T::zero(),
             T::zero(),
             T::zero(),
-            t123,
+            t147,
             T::zero(),
             T::zero(),
             T::zero(),
-            t129,
+            t153,
         )
     }
     #[inline]
@@ -531,60 +562,82 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t93 = t37 * t91;
         let t94 = t35 * t92;
         let t95 = t34 * t92;
-        let t99 = t28 * t36;
-        let t100 = t99 - t31;
-        let t101 = t100 + T::one();
-        let t102 = t8 * t22;
-        let t103 = t102 * t101;
-        let t104 = self.fixed[3] * t103;
-        let t105 = t104 + t99;
-        let t106 = t105 - t31;
-        let t107 = t106.ln_of_both(t38);
-        let t118 = t95 + T::one();
-        let t119 = t28 * t118;
-        let t121 = t107 * t95;
-        let t122 = self.fixed[13] * t121;
-        let t124 = t93 + T::one();
-        let t125 = t32 * t124;
-        let t127 = t107 * t93;
-        let t128 = self.fixed[13] * t127;
-        let t138 = self.fixed[14] * t8;
-        let t139 = t138 * t39;
-        let t141 = self.fixed[7] * t8;
-        let t142 = t141 * t39;
-        let t143 = t142 * t94;
-        let t144 = -t143;
-        let t145 = t142 + t143;
-        let t147 = self.fixed[16] * t8;
-        let t148 = t147 * t22;
-        let t149 = t148 * t145;
-        let t150 = t107 * t144;
-        let t151 = self.fixed[13] * t150;
-        let t152 = t149 - t151;
-        let t154 = t152 * t94;
-        let t155 = self.fixed[17] * t154;
-        let t156 = t139 - t155;
-        let t159 = self.fixed[18] * t14;
-        let t160 = t159 * t42;
-        let t161 = self.fixed[9] * t14;
-        let t162 = t161 * t42;
-        let t163 = self.fixed[15] * t119;
-        let t164 = t122 + t163;
-        let t165 = t162 * t164;
-        let t166 = t165 * t95;
-        let t167 = self.fixed[17] * t166;
-        let t168 = t167 - t160;
-        let t169 = self.fixed[18] * t18;
-        let t170 = t169 * t46;
-        let t171 = self.fixed[9] * t18;
-        let t172 = t171 * t46;
-        let t173 = self.fixed[15] * t125;
-        let t174 = t128 + t173;
-        let t175 = t172 * t174;
-        let t176 = t175 * t93;
-        let t177 = self.fixed[17] * t176;
-        let t178 = t177 - t170;
-        crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178)
+        let t99 = T::nearest(0.5) * X[0];
+        let t100 = t99.sin_pi();
+        let t101 = T::nearest(0.5) * X[1];
+        let t102 = t101.cos_pi();
+        let t103 = t99.cos_pi();
+        let t104 = t101.sin_pi();
+        let t105 = t100 * t102;
+        let t106 = t103 * t104;
+        let t107 = t105 - t106;
+        let t108 = t105 + t106;
+        let t109 = T::nearest(0.5) * X[2];
+        let t110 = t109.sin_pi();
+        let t111 = t109.cos_pi();
+        let t112 = t102 * t110;
+        let t113 = t104 * t111;
+        let t114 = t112 - t113;
+        let t115 = t112 + t113;
+        let t116 = T::nearest(2.0) * t8;
+        let t117 = t107 * t108;
+        let t118 = t116 * t117;
+        let t119 = t114 * t115;
+        let t120 = t18 * t119;
+        let t121 = t118 - t120;
+        let t122 = self.fixed[3] * t121;
+        let t142 = t95 + T::one();
+        let t143 = t28 * t142;
+        let t148 = t93 + T::one();
+        let t149 = t32 * t148;
+        let t154 = self.fixed[7] * t8;
+        let t155 = t154 * t39;
+        let t162 = self.fixed[14] * t155;
+        let t164 = t155 * t94;
+        let t165 = -t164;
+        let t166 = t155 + t164;
+        let t167 = t28 * t24;
+        let t168 = t24 - t27;
+        let t169 = t168 + t167;
+        let t170 = t32 * t169;
+        let t171 = t170 - t122;
+        let t172 = t171 + t167;
+        let t173 = t172.ln_of_both(t38);
+        let t174 = t24 * t166;
+        let t175 = self.fixed[15] * t174;
+        let t176 = t165 * t173;
+        let t177 = self.fixed[13] * t176;
+        let t178 = t175 - t177;
+        let t180 = t178 * t94;
+        let t181 = self.fixed[16] * t180;
+        let t182 = t162 - t181;
+        let t183 = self.fixed[7] * t14;
+        let t184 = t183 * t42;
+        let t187 = self.fixed[17] * t184;
+        let t188 = self.fixed[9] * t14;
+        let t189 = t188 * t42;
+        let t190 = self.fixed[15] * t143;
+        let t191 = t173 * t95;
+        let t192 = self.fixed[13] * t191;
+        let t193 = t190 + t192;
+        let t194 = t189 * t193;
+        let t195 = t194 * t95;
+        let t196 = self.fixed[16] * t195;
+        let t197 = t196 - t187;
+        let t198 = self.fixed[7] * t18;
+        let t199 = t198 * t46;
+        let t200 = self.fixed[17] * t199;
+        let t201 = self.fixed[9] * t18;
+        let t202 = t201 * t46;
+        let t203 = self.fixed[15] * t149;
+        let t204 = t173 * t93;
+        let t205 = self.fixed[13] * t204;
+        let t206 = t203 + t205;
+        let t207 = t202 * t206;
+        let t208 = t207 * t93;
+        let t209 = self.fixed[16] * t208;
+        let t210 = t209 - t200;
+        crate::nalgebra::SVector::<T, 3>::new(t182, t197, t210)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t7 = self.fixed[0] * t;
@@ -652,69 +705,104 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t99 = t28 * t36;
-        let t100 = t99 - t31;
-        let t101 = t100 + T::one();
-        let t102 = t8 * t22;
-        let t103 = t102 * t101;
-        let t104 = self.fixed[3] * t103;
-        let t105 = t104 + t99;
-        let t106 = t105 - t31;
-        let t107 = t106.ln_of_both(t38);
-        let t109 = self.fixed[12] * t8;
-        let t110 = t109 * t22;
-        let t111 = t110 * t96;
-        let t115 = t107 * t94;
-        let t116 = self.fixed[13] * t115;
-        let t117 = t111 + t116;
-        let t118 = t95 + T::one();
-        let t119 = t28 * t118;
-        let t120 = self.fixed[11] * t119;
-        let t121 = t107 * t95;
-        let t122 = self.fixed[13] * t121;
-        let t123 = t120 + t122;
-        let t124 = t93 + T::one();
-        let t125 = t32 * t124;
-        let t126 = self.fixed[11] * t125;
-        let t127 = t107 * t93;
-        let t128 = self.fixed[13] * t127;
-        let t129 = t126 + t128;
-        let t138 = self.fixed[14] * t8;
-        let t139 = t138 * t39;
-        let t141 = self.fixed[7] * t8;
-        let t142 = t141 * t39;
-        let t143 = t142 * t94;
-        let t144 = -t143;
-        let t145 = t142 + t143;
-        let t147 = self.fixed[16] * t8;
-        let t148 = t147 * t22;
-        let t149 = t148 * t145;
-        let t150 = t107 * t144;
-        let t151 = self.fixed[13] * t150;
-        let t152 = t149 - t151;
-        let t154 = t152 * t94;
-        let t155 = self.fixed[17] * t154;
-        let t156 = t139 - t155;
-        let t159 = self.fixed[18] * t14;
-        let t160 = t159 * t42;
-        let t161 = self.fixed[9] * t14;
-        let t162 = t161 * t42;
-        let t163 = self.fixed[15] * t119;
-        let t164 = t122 + t163;
-        let t165 = t162 * t164;
-        let t166 = t165 * t95;
-        let t167 = self.fixed[17] * t166;
-        let t168 = t167 - t160;
-        let t169 = self.fixed[18] * t18;
-        let t170 = t169 * t46;
-        let t171 = self.fixed[9] * t18;
-        let t172 = t171 * t46;
-        let t173 = self.fixed[15] * t125;
-        let t174 = t128 + t173;
-        let t175 = t172 * t174;
-        let t176 = t175 * t93;
-        let t177 = self.fixed[17] * t176;
-        let t178 = t177 - t170;
+        let t99 = T::nearest(0.5) * X[0];
+        let t100 = t99.sin_pi();
+        let t101 = T::nearest(0.5) * X[1];
+        let t102 = t101.cos_pi();
+        let t103 = t99.cos_pi();
+        let t104 = t101.sin_pi();
+        let t105 = t100 * t102;
+        let t106 = t103 * t104;
+        let t107 = t105 - t106;
+        let t108 = t105 + t106;
+        let t109 = T::nearest(0.5) * X[2];
+        let t110 = t109.sin_pi();
+        let t111 = t109.cos_pi();
+        let t112 = t102 * t110;
+        let t113 = t104 * t111;
+        let t114 = t112 - t113;
+        let t115 = t112 + t113;
+        let t116 = T::nearest(2.0) * t8;
+        let t117 = t107 * t108;
+        let t118 = t116 * t117;
+        let t119 = t114 * t115;
+        let t120 = t18 * t119;
+        let t121 = t118 - t120;
+        let t122 = self.fixed[3] * t121;
+        let t123 = t28 * t36;
+        let t124 = t123 - t31;
+        let t125 = t8 * t22;
+        let t126 = t125 * t124;
+        let t127 = self.fixed[3] * t126;
+        let t128 = t28 * t32;
+        let t129 = t127 - t122;
+        let t130 = t129 + t128;
+        let t131 = t130.ln_of_both(t38);
+        let t133 = self.fixed[12] * t8;
+        let t134 = t133 * t22;
+        let t135 = t134 * t96;
+        let t139 = t131 * t94;
+        let t140 = self.fixed[13] * t139;
+        let t141 = t135 + t140;
+        let t142 = t95 + T::one();
+        let t143 = t28 * t142;
+        let t144 = self.fixed[11] * t143;
+        let t145 = t131 * t95;
+        let t146 = self.fixed[13] * t145;
+        let t147 = t144 + t146;
+        let t148 = t93 + T::one();
+        let t149 = t32 * t148;
+        let t150 = self.fixed[11] * t149;
+        let t151 = t131 * t93;
+        let t152 = self.fixed[13] * t151;
+        let t153 = t150 + t152;
+        let t154 = self.fixed[7] * t8;
+        let t155 = t154 * t39;
+        let t162 = self.fixed[14] * t155;
+        let t164 = t155 * t94;
+        let t165 = -t164;
+        let t166 = t155 + t164;
+        let t167 = t28 * t24;
+        let t168 = t24 - t27;
+        let t169 = t168 + t167;
+        let t170 = t32 * t169;
+        let t171 = t170 - t122;
+        let t172 = t171 + t167;
+        let t173 = t172.ln_of_both(t38);
+        let t174 = t24 * t166;
+        let t175 = self.fixed[15] * t174;
+        let t176 = t165 * t173;
+        let t177 = self.fixed[13] * t176;
+        let t178 = t175 - t177;
+        let t180 = t178 * t94;
+        let t181 = self.fixed[16] * t180;
+        let t182 = t162 - t181;
+        let t183 = self.fixed[7] * t14;
+        let t184 = t183 * t42;
+        let t187 = self.fixed[17] * t184;
+        let t188 = self.fixed[9] * t14;
+        let t189 = t188 * t42;
+        let t190 = self.fixed[15] * t143;
+        let t191 = t173 * t95;
+        let t192 = self.fixed[13] * t191;
+        let t193 = t190 + t192;
+        let t194 = t189 * t193;
+        let t195 = t194 * t95;
+        let t196 = self.fixed[16] * t195;
+        let t197 = t196 - t187;
+        let t198 = self.fixed[7] * t18;
+        let t199 = t198 * t46;
+        let t200 = self.fixed[17] * t199;
+        let t201 = self.fixed[9] * t18;
+        let t202 = t201 * t46;
+        let t203 = self.fixed[15] * t149;
+        let t204 = t173 * t93;
+        let t205 = self.fixed[13] * t204;
+        let t206 = t203 + t205;
+        let t207 = t202 * t206;
+        let t208 = t207 * t93;
+        let t209 = self.fixed[16] * t208;
+        let t210 = t209 - t200;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v: crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62),
@@ -755,17 +843,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t117,
+                t141,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t123,
+                t147,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t129,
+                t153,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178),
+            b: crate::nalgebra::SVector::<T, 3>::new(t182, t197, t210),
         }
     }
     fn traction(
@@ -793,26 +881,42 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t35 = t28 + T::one();
                 let t36 = t32 + T::one();
-                let t99 = t28 * t36;
-                let t100 = t99 - t31;
-                let t204 = t23 + T::one();
-                let t205 = T::one() / t204;
-                let t206 = t205 + T::one();
-                let t207 = t8 * t100;
-                let t208 = self.fixed[3] * t207;
-                let t209 = t208 + t99;
-                let t210 = t209 - t31;
-                let t211 = t23 + t210;
-                let t212 = t35 * t36;
-                let t213 = t204 * t212;
-                let t214 = t211.ln_of_both(t213);
-                let t215 = t8 * t206;
-                let t216 = self.fixed[12] * t215;
-                let t217 = self.fixed[13] * t205;
-                let t218 = t217 * t214;
-                let t219 = t216 + t218;
-                let t220 = -t219;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t220, T::zero(), T::zero()))
+                let t101 = T::nearest(0.5) * X[1];
+                let t102 = t101.cos_pi();
+                let t104 = t101.sin_pi();
+                let t109 = T::nearest(0.5) * X[2];
+                let t110 = t109.sin_pi();
+                let t111 = t109.cos_pi();
+                let t112 = t102 * t110;
+                let t113 = t104 * t111;
+                let t114 = t112 - t113;
+                let t115 = t112 + t113;
+                let t116 = T::nearest(2.0) * t8;
+                let t119 = t114 * t115;
+                let t120 = t18 * t119;
+                let t123 = t28 * t36;
+                let t124 = t123 - t31;
+                let t128 = t28 * t32;
+                let t243 = t23 + T::one();
+                let t244 = T::one() / t243;
+                let t245 = t244 + T::one();
+                let t246 = t104 * t104;
+                let t247 = t116 * t246;
+                let t248 = t120 + t247;
+                let t249 = t8 * t124;
+                let t250 = t249 + t248;
+                let t251 = self.fixed[3] * t250;
+                let t252 = t251 + t128;
+                let t253 = t35 * t36;
+                let t254 = t243 * t253;
+                let t255 = t252.ln_of_both(t254);
+                let t256 = t8 * t245;
+                let t257 = self.fixed[12] * t256;
+                let t258 = self.fixed[13] * t244;
+                let t259 = t258 * t255;
+                let t260 = t257 + t259;
+                let t261 = -t260;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t261, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -832,26 +936,42 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t35 = t28 + T::one();
                 let t36 = t32 + T::one();
-                let t99 = t28 * t36;
-                let t100 = t99 - t31;
-                let t207 = t8 * t100;
-                let t208 = self.fixed[3] * t207;
-                let t212 = t35 * t36;
-                let t221 = T::one() - t23;
-                let t222 = T::one() / t221;
-                let t223 = t222 + T::one();
-                let t224 = t99 - t208;
-                let t225 = t224 - t31;
-                let t226 = t225 - t23;
-                let t227 = t221 * t212;
-                let t228 = t226.ln_of_both(t227);
-                let t229 = t8 * t223;
-                let t230 = self.fixed[12] * t229;
-                let t231 = self.fixed[13] * t222;
-                let t232 = t231 * t228;
-                let t233 = t230 - t232;
-                let t234 = -t233;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t234, T::zero(), T::zero()))
+                let t101 = T::nearest(0.5) * X[1];
+                let t102 = t101.cos_pi();
+                let t104 = t101.sin_pi();
+                let t109 = T::nearest(0.5) * X[2];
+                let t110 = t109.sin_pi();
+                let t111 = t109.cos_pi();
+                let t112 = t102 * t110;
+                let t113 = t104 * t111;
+                let t114 = t112 - t113;
+                let t115 = t112 + t113;
+                let t116 = T::nearest(2.0) * t8;
+                let t119 = t114 * t115;
+                let t120 = t18 * t119;
+                let t123 = t28 * t36;
+                let t124 = t123 - t31;
+                let t128 = t28 * t32;
+                let t249 = t8 * t124;
+                let t253 = t35 * t36;
+                let t262 = T::one() - t23;
+                let t263 = T::one() / t262;
+                let t264 = t263 + T::one();
+                let t265 = t102 * t102;
+                let t266 = t116 * t265;
+                let t267 = t120 - t266;
+                let t268 = t249 - t267;
+                let t269 = self.fixed[3] * t268;
+                let t270 = t128 - t269;
+                let t271 = t262 * t253;
+                let t272 = t270.ln_of_both(t271);
+                let t273 = t8 * t264;
+                let t274 = self.fixed[12] * t273;
+                let t275 = self.fixed[13] * t263;
+                let t276 = t275 * t272;
+                let t277 = t274 - t276;
+                let t278 = -t277;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t278, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -870,28 +990,39 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
-                let t102 = t8 * t22;
-                let t235 = -t26;
-                let t236 = t235 + T::one();
-                let t237 = T::one() / t236;
-                let t238 = t237 + T::one();
-                let t239 = t32 * t236;
-                let t240 = t239 - t26;
-                let t241 = t240 + T::one();
-                let t242 = t102 * t241;
-                let t243 = self.fixed[3] * t242;
-                let t244 = t243 + t239;
-                let t245 = t244 - t26;
-                let t246 = t34 * t36;
-                let t247 = t236 * t246;
-                let t248 = t245.ln_of_both(t247);
-                let t249 = t235 * t238;
-                let t250 = self.fixed[11] * t249;
-                let t251 = self.fixed[13] * t237;
-                let t252 = t251 * t248;
-                let t253 = t250 + t252;
-                let t254 = -t253;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t254, T::zero()))
+                let t99 = T::nearest(0.5) * X[0];
+                let t100 = t99.sin_pi();
+                let t109 = T::nearest(0.5) * X[2];
+                let t110 = t109.sin_pi();
+                let t116 = T::nearest(2.0) * t8;
+                let t125 = t8 * t22;
+                let t279 = -t26;
+                let t280 = t279 + T::one();
+                let t281 = T::one() / t280;
+                let t282 = t281 + T::one();
+                let t283 = t100 * t100;
+                let t284 = t116 * t283;
+                let t285 = t110 * t110;
+                let t286 = t18 * t285;
+                let t287 = t284 - t286;
+                let t288 = self.fixed[3] * t287;
+                let t289 = t32 * t280;
+                let t290 = t289 - t26;
+                let t291 = t125 * t290;
+                let t292 = self.fixed[3] * t291;
+                let t293 = t279 * t32;
+                let t294 = t292 - t288;
+                let t295 = t294 + t293;
+                let t296 = t34 * t36;
+                let t297 = t280 * t296;
+                let t298 = t295.ln_of_both(t297);
+                let t299 = t279 * t282;
+                let t300 = self.fixed[11] * t299;
+                let t301 = self.fixed[13] * t281;
+                let t302 = t301 * t298;
+                let t303 = t300 + t302;
+                let t304 = -t303;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t304, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -910,26 +1041,36 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
-                let t102 = t8 * t22;
-                let t246 = t34 * t36;
-                let t255 = t26 + T::one();
-                let t256 = T::one() / t255;
-                let t257 = t256 + T::one();
-                let t258 = t32 * t255;
-                let t259 = t26 + t258;
-                let t260 = t259 + T::one();
-                let t261 = t102 * t260;
-                let t262 = self.fixed[3] * t261;
-                let t263 = t262 + t258;
-                let t264 = t26 + t263;
-                let t265 = t255 * t246;
-                let t266 = t264.ln_of_both(t265);
-                let t267 = t26 * t257;
-                let t268 = self.fixed[11] * t267;
-                let t269 = self.fixed[13] * t256;
-                let t270 = t269 * t266;
-                let t271 = t268 + t270;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t271, T::zero()))
+                let t99 = T::nearest(0.5) * X[0];
+                let t103 = t99.cos_pi();
+                let t109 = T::nearest(0.5) * X[2];
+                let t111 = t109.cos_pi();
+                let t116 = T::nearest(2.0) * t8;
+                let t296 = t34 * t36;
+                let t305 = t26 + T::one();
+                let t306 = T::one() / t305;
+                let t307 = t306 + T::one();
+                let t308 = t103 * t103;
+                let t309 = t116 * t308;
+                let t310 = t111 * t111;
+                let t311 = t18 * t310;
+                let t312 = t309 - t311;
+                let t313 = t32 * t305;
+                let t314 = t26 + t313;
+                let t315 = t22 * t314;
+                let t316 = t8 * t315;
+                let t317 = t316 + t312;
+                let t318 = self.fixed[3] * t317;
+                let t319 = t26 * t32;
+                let t320 = t318 + t319;
+                let t321 = t305 * t296;
+                let t322 = t320.ln_of_both(t321);
+                let t323 = t26 * t307;
+                let t324 = self.fixed[11] * t323;
+                let t325 = self.fixed[13] * t306;
+                let t326 = t325 * t322;
+                let t327 = t324 + t326;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t327, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
@@ -949,27 +1090,44 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
-                let t102 = t8 * t22;
-                let t272 = -t30;
-                let t273 = t272 + T::one();
-                let t274 = T::one() / t273;
-                let t275 = t274 + T::one();
-                let t276 = t28 * t273;
-                let t277 = t276 - t30;
-                let t278 = t277 + T::one();
-                let t279 = t102 * t278;
-                let t280 = self.fixed[3] * t279;
-                let t281 = t280 + t276;
-                let t282 = t281 - t30;
-                let t283 = t273 * t37;
-                let t284 = t282.ln_of_both(t283);
-                let t285 = t272 * t275;
-                let t286 = self.fixed[11] * t285;
-                let t287 = self.fixed[13] * t274;
-                let t288 = t287 * t284;
-                let t289 = t286 + t288;
-                let t290 = -t289;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t290))
+                let t99 = T::nearest(0.5) * X[0];
+                let t100 = t99.sin_pi();
+                let t101 = T::nearest(0.5) * X[1];
+                let t102 = t101.cos_pi();
+                let t103 = t99.cos_pi();
+                let t104 = t101.sin_pi();
+                let t105 = t100 * t102;
+                let t106 = t103 * t104;
+                let t107 = t105 - t106;
+                let t108 = t105 + t106;
+                let t116 = T::nearest(2.0) * t8;
+                let t117 = t107 * t108;
+                let t118 = t116 * t117;
+                let t125 = t8 * t22;
+                let t246 = t104 * t104;
+                let t328 = -t30;
+                let t329 = t328 + T::one();
+                let t330 = T::one() / t329;
+                let t331 = t330 + T::one();
+                let t332 = t18 * t246;
+                let t333 = t118 + t332;
+                let t334 = self.fixed[3] * t333;
+                let t335 = t28 * t329;
+                let t336 = t335 - t30;
+                let t337 = t125 * t336;
+                let t338 = self.fixed[3] * t337;
+                let t339 = t328 * t28;
+                let t340 = t338 - t334;
+                let t341 = t340 + t339;
+                let t342 = t329 * t37;
+                let t343 = t341.ln_of_both(t342);
+                let t344 = t328 * t331;
+                let t345 = self.fixed[11] * t344;
+                let t346 = self.fixed[13] * t330;
+                let t347 = t346 * t343;
+                let t348 = t345 + t347;
+                let t349 = -t348;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t349))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
@@ -989,25 +1147,42 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
-                let t102 = t8 * t22;
-                let t291 = t30 + T::one();
-                let t292 = T::one() / t291;
-                let t293 = t292 + T::one();
-                let t294 = t28 * t291;
-                let t295 = t30 + t294;
-                let t296 = t295 + T::one();
-                let t297 = t102 * t296;
-                let t298 = self.fixed[3] * t297;
-                let t299 = t298 + t294;
-                let t300 = t30 + t299;
-                let t301 = t291 * t37;
-                let t302 = t300.ln_of_both(t301);
-                let t303 = t30 * t293;
-                let t304 = self.fixed[11] * t303;
-                let t305 = self.fixed[13] * t292;
-                let t306 = t305 * t302;
-                let t307 = t304 + t306;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t307))
+                let t99 = T::nearest(0.5) * X[0];
+                let t100 = t99.sin_pi();
+                let t101 = T::nearest(0.5) * X[1];
+                let t102 = t101.cos_pi();
+                let t103 = t99.cos_pi();
+                let t104 = t101.sin_pi();
+                let t105 = t100 * t102;
+                let t106 = t103 * t104;
+                let t107 = t105 - t106;
+                let t108 = t105 + t106;
+                let t116 = T::nearest(2.0) * t8;
+                let t117 = t107 * t108;
+                let t118 = t116 * t117;
+                let t125 = t8 * t22;
+                let t265 = t102 * t102;
+                let t350 = t30 + T::one();
+                let t351 = T::one() / t350;
+                let t352 = t351 + T::one();
+                let t353 = t18 * t265;
+                let t354 = t118 - t353;
+                let t355 = self.fixed[3] * t354;
+                let t356 = t28 * t350;
+                let t357 = t30 + t356;
+                let t358 = t125 * t357;
+                let t359 = self.fixed[3] * t358;
+                let t360 = t30 * t28;
+                let t361 = t359 - t355;
+                let t362 = t361 + t360;
+                let t363 = t350 * t37;
+                let t364 = t362.ln_of_both(t363);
+                let t365 = t30 * t352;
+                let t366 = self.fixed[11] * t365;
+                let t367 = self.fixed[13] * t351;
+                let t368 = t367 * t364;
+                let t369 = t366 + t368;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t369))
             }
             _ => None,
         }
@@ -1062,7 +1237,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[26]
     }
     fn has_form_on_lattice(&self) -> bool {
         true
@@ -1077,19 +1252,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 crate::LatticePoints::<Self, T, 3, 15, 2, 5>::new(*self, lattice),
             );
         }
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 15, 6>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 17, 8>::new(*self, X))
     }
     fn state_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 10, 3, 6>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 12, 3, 8>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 8> for AxisAligned3d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 15] {
+    fn body_force_time(&self, t: T) -> [T; 17] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1099,106 +1274,132 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 15, 6> for AxisAligned3d<T> {
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t138 = self.fixed[14] * t8;
-        let t159 = self.fixed[18] * t14;
-        let t169 = self.fixed[18] * t18;
-        let t316 = t8 * t8;
-        let t317 = t316 * t8;
-        let t318 = self.fixed[19] * t317;
-        let t320 = self.fixed[20] * t316;
-        let t330 = self.fixed[21] * t8;
-        let t338 = t14 * t14;
-        let t339 = t338 * t14;
-        let t340 = self.fixed[22] * t339;
-        let t342 = self.fixed[23] * t338;
-        let t345 = self.fixed[24] * t14;
-        let t353 = t18 * t18;
-        let t354 = t353 * t18;
-        let t355 = self.fixed[22] * t354;
-        let t357 = self.fixed[23] * t353;
-        let t360 = self.fixed[24] * t18;
+        let t83 = self.fixed[3] * t18;
+        let t370 = self.fixed[18] * t8;
+        let t379 = t8 * t8;
+        let t380 = t379 * t8;
+        let t381 = self.fixed[19] * t380;
+        let t383 = self.fixed[20] * t379;
+        let t390 = self.fixed[27] * t8;
+        let t398 = self.fixed[21] * t8;
+        let t406 = t14 * t14;
+        let t407 = t406 * t14;
+        let t408 = self.fixed[23] * t407;
+        let t410 = self.fixed[24] * t406;
+        let t413 = self.fixed[25] * t14;
+        let t417 = self.fixed[22] * t14;
+        let t422 = t18 * t18;
+        let t423 = t422 * t18;
+        let t424 = self.fixed[23] * t423;
+        let t426 = self.fixed[24] * t422;
+        let t429 = self.fixed[25] * t18;
+        let t433 = self.fixed[22] * t18;
         [
             t23,
             t26,
             t30,
-            t138,
-            t159,
-            t169,
-            t318,
-            t320,
-            t330,
-            t340,
-            t342,
-            t345,
-            t355,
-            t357,
-            t360,
+            t83,
+            t370,
+            t381,
+            t383,
+            t390,
+            t398,
+            t408,
+            t410,
+            t413,
+            t417,
+            t424,
+            t426,
+            t429,
+            t433,
         ]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
         let t22 = X[0].cos_pi();
         let t25 = X[1].cos_pi();
         let t29 = X[2].cos_pi();
         let t39 = X[0].sin_pi();
         let t42 = X[1].sin_pi();
         let t46 = X[2].sin_pi();
-        [t22, t25, t29, t39, t42, t46]
+        let t99 = T::nearest(0.5) * X[0];
+        let t100 = t99.sin_pi();
+        let t101 = T::nearest(0.5) * X[1];
+        let t102 = t101.cos_pi();
+        let t103 = t99.cos_pi();
+        let t104 = t101.sin_pi();
+        let t105 = t100 * t102;
+        let t106 = t103 * t104;
+        let t107 = t105 - t106;
+        let t108 = t105 + t106;
+        let t109 = T::nearest(0.5) * X[2];
+        let t110 = t109.sin_pi();
+        let t111 = t109.cos_pi();
+        let t112 = t102 * t110;
+        let t113 = t104 * t111;
+        let t114 = t112 - t113;
+        let t115 = t112 + t113;
+        let t117 = t107 * t108;
+        let t119 = t114 * t115;
+        [t22, t25, t29, t39, t42, t46, t117, t119]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 15],
-        point: &[T; 6],
+        time: &[T; 17],
+        point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t24 = time[0] * point[0];
         let t27 = time[1] * point[1];
         let t31 = time[2] * point[2];
         let t34 = t24 + T::one();
-        let t308 = T::one() - t27;
-        let t309 = T::one() - t31;
-        let t310 = t34 * t308;
-        let t311 = t309 * t310;
-        let t312 = T::one() / t311;
-        let t313 = t309 * t312;
-        let t314 = t308 * t313;
-        let t315 = t314 * t314;
-        let t319 = time[6] * point[0];
-        let t321 = t319 + time[7];
-        let t322 = point[0] * t321;
-        let t323 = t27 * t309;
-        let t324 = t323 + t31;
-        let t325 = T::one() - t324;
-        let t326 = t24 * t325;
-        let t327 = t326 - t323;
-        let t328 = t327 - t31;
-        let t329 = t328.ln_of_both_if::<NEAR>(t311);
-        let t331 = time[8] * t329;
-        let t332 = t322 + t331;
-        let t333 = t315 * t332;
-        let t334 = time[3] - t333;
-        let t335 = point[3] * t334;
-        let t336 = t34 * t313;
-        let t337 = t336 * t336;
-        let t341 = time[9] * point[1];
-        let t343 = t341 - time[10];
-        let t344 = point[1] * t343;
-        let t346 = time[11] * t329;
-        let t347 = t344 + t346;
-        let t348 = t337 * t347;
-        let t349 = t348 - time[4];
-        let t350 = point[4] * t349;
-        let t351 = t310 * t312;
-        let t352 = t351 * t351;
-        let t356 = time[12] * point[2];
-        let t358 = t356 - time[13];
-        let t359 = point[2] * t358;
-        let t361 = time[14] * t329;
-        let t362 = t359 + t361;
-        let t363 = t352 * t362;
-        let t364 = t363 - time[5];
-        let t365 = point[5] * t364;
-        crate::nalgebra::SVector::<T, 3>::new(t335, t350, t365)
+        let t371 = T::one() - t27;
+        let t372 = T::one() - t31;
+        let t373 = t34 * t371;
+        let t374 = t372 * t373;
+        let t375 = T::one() / t374;
+        let t376 = t372 * t375;
+        let t377 = t371 * t376;
+        let t378 = t377 * t377;
+        let t382 = time[5] * point[0];
+        let t384 = t382 + time[6];
+        let t385 = point[0] * t384;
+        let t386 = t27 * t372;
+        let t387 = t386 + t31;
+        let t388 = t24 * t387;
+        let t391 = time[7] * point[6];
+        let t392 = time[3] * point[7];
+        let t393 = t391 - t392;
+        let t394 = t388 + t393;
+        let t395 = t27 * t31;
+        let t396 = t395 - t394;
+        let t397 = t396.ln_of_both_if::<NEAR>(t374);
+        let t399 = time[8] * t397;
+        let t400 = t385 + t399;
+        let t401 = t378 * t400;
+        let t402 = time[4] - t401;
+        let t403 = point[3] * t402;
+        let t404 = t34 * t376;
+        let t405 = t404 * t404;
+        let t409 = time[9] * point[1];
+        let t411 = t409 - time[10];
+        let t412 = point[1] * t411;
+        let t414 = time[11] * t397;
+        let t415 = t412 + t414;
+        let t416 = t405 * t415;
+        let t418 = t416 - time[12];
+        let t419 = point[4] * t418;
+        let t420 = t373 * t375;
+        let t421 = t420 * t420;
+        let t425 = time[13] * point[2];
+        let t427 = t425 - time[14];
+        let t428 = point[2] * t427;
+        let t430 = time[15] * t397;
+        let t431 = t428 + t430;
+        let t432 = t421 * t431;
+        let t434 = t432 - time[16];
+        let t435 = point[5] * t434;
+        crate::nalgebra::SVector::<T, 3>::new(t403, t419, t435)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1214,40 +1415,40 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t138 = self.fixed[14] * t8;
-        let t159 = self.fixed[18] * t14;
-        let t169 = self.fixed[18] * t18;
-        let t316 = t8 * t8;
-        let t317 = t316 * t8;
-        let t318 = self.fixed[19] * t317;
-        let t320 = self.fixed[20] * t316;
-        let t330 = self.fixed[21] * t8;
-        let t338 = t14 * t14;
-        let t339 = t338 * t14;
-        let t340 = self.fixed[22] * t339;
-        let t342 = self.fixed[23] * t338;
-        let t345 = self.fixed[24] * t14;
-        let t353 = t18 * t18;
-        let t354 = t353 * t18;
-        let t355 = self.fixed[22] * t354;
-        let t357 = self.fixed[23] * t353;
-        let t360 = self.fixed[24] * t18;
+        let t370 = self.fixed[18] * t8;
+        let t379 = t8 * t8;
+        let t380 = t379 * t8;
+        let t381 = self.fixed[19] * t380;
+        let t383 = self.fixed[20] * t379;
+        let t398 = self.fixed[21] * t8;
+        let t406 = t14 * t14;
+        let t407 = t406 * t14;
+        let t408 = self.fixed[23] * t407;
+        let t410 = self.fixed[24] * t406;
+        let t413 = self.fixed[25] * t14;
+        let t417 = self.fixed[22] * t14;
+        let t422 = t18 * t18;
+        let t423 = t422 * t18;
+        let t424 = self.fixed[23] * t423;
+        let t426 = self.fixed[24] * t422;
+        let t429 = self.fixed[25] * t18;
+        let t433 = self.fixed[22] * t18;
         [
             t23,
             t26,
             t30,
-            t138,
-            t159,
-            t169,
-            t318,
-            t320,
-            t330,
-            t340,
-            t342,
-            t345,
-            t355,
-            t357,
-            t360,
+            t370,
+            t381,
+            t383,
+            t398,
+            t408,
+            t410,
+            t413,
+            t417,
+            t424,
+            t426,
+            t429,
+            t433,
         ]
     }
     #[inline]
@@ -1281,58 +1482,58 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
             0 => {
                 let t24 = time[0] * point[0];
                 let t34 = t24 + T::one();
-                let t319 = time[6] * point[0];
-                let t321 = t319 + time[7];
-                let t322 = point[0] * t321;
-                let t366 = t24.ln_of_both(t34);
-                let t369 = time[8] * t366;
-                let t370 = t322 + t369;
-                let t371 = t34 * t34;
-                let t372 = t370 / t371;
-                let t373 = time[3] - t372;
-                let t384 = point[1] * t373;
-                let t385 = time[8] * point[1];
-                let t386 = t385 / t371;
-                let t391 = time[11] * t366;
-                let t400 = time[14] * t366;
-                [t384, t386, t391, t400, T::zero()]
+                let t382 = time[4] * point[0];
+                let t384 = t382 + time[5];
+                let t385 = point[0] * t384;
+                let t436 = t24.ln_of_both(t34);
+                let t439 = time[6] * t436;
+                let t440 = t385 + t439;
+                let t441 = t34 * t34;
+                let t442 = t440 / t441;
+                let t443 = time[3] - t442;
+                let t454 = point[1] * t443;
+                let t455 = time[6] * point[1];
+                let t456 = t455 / t441;
+                let t461 = time[9] * t436;
+                let t470 = time[13] * t436;
+                [t454, t456, t461, t470, T::zero()]
             }
             1 => {
                 let t27 = time[1] * point[0];
                 let t28 = -t27;
-                let t308 = T::one() - t27;
-                let t341 = time[9] * point[0];
-                let t343 = t341 - time[10];
-                let t344 = point[0] * t343;
-                let t367 = t28.ln_of_both(t308);
-                let t374 = time[11] * t367;
-                let t375 = t344 + t374;
-                let t376 = t308 * t308;
-                let t377 = t375 / t376;
-                let t378 = t377 - time[4];
-                let t392 = point[1] / t376;
-                let t394 = time[11] * point[1];
-                let t395 = t394 / t376;
-                let t397 = point[1] * t378;
-                let t403 = time[14] * t367;
-                [t367, t392, t395, t397, t403]
+                let t371 = T::one() - t27;
+                let t409 = time[7] * point[0];
+                let t411 = t409 - time[8];
+                let t412 = point[0] * t411;
+                let t437 = t28.ln_of_both(t371);
+                let t444 = time[9] * t437;
+                let t445 = t412 + t444;
+                let t446 = t371 * t371;
+                let t447 = t445 / t446;
+                let t448 = t447 - time[10];
+                let t462 = point[1] / t446;
+                let t464 = time[9] * point[1];
+                let t465 = t464 / t446;
+                let t467 = point[1] * t448;
+                let t473 = time[13] * t437;
+                [t437, t462, t465, t467, t473]
             }
             2 => {
                 let t31 = time[2] * point[0];
                 let t32 = -t31;
-                let t309 = T::one() - t31;
-                let t356 = time[12] * point[0];
-                let t358 = t356 - time[13];
-                let t359 = point[0] * t358;
-                let t368 = t32.ln_of_both(t309);
-                let t379 = time[14] * t368;
-                let t380 = t359 + t379;
-                let t381 = t309 * t309;
-                let t382 = t380 / t381;
-                let t383 = t382 - time[5];
-                let t401 = point[1] / t381;
-                let t405 = point[1] * t383;
-                [t368, t401, t405, T::zero(), T::zero()]
+                let t372 = T::one() - t31;
+                let t425 = time[11] * point[0];
+                let t427 = t425 - time[12];
+                let t428 = point[0] * t427;
+                let t438 = t32.ln_of_both(t372);
+                let t449 = time[13] * t438;
+                let t450 = t428 + t449;
+                let t451 = t372 * t372;
+                let t452 = t450 / t451;
+                let t453 = t452 - time[14];
+                let t471 = point[1] / t451;
+                let t475 = point[1] * t453;
+                [t438, t471, t475, T::zero(), T::zero()]
             }
             _ => [T::zero(); 5],
         }
@@ -1343,25 +1544,25 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         time: &[T; 15],
         layers: [&[T; 5]; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t387 = layers[0][1] * layers[1][0];
-        let t388 = layers[0][1] * layers[2][0];
-        let t389 = layers[0][0] - t387;
-        let t390 = t389 - t388;
-        let t393 = layers[0][2] * layers[1][1];
-        let t396 = layers[1][2] * layers[2][0];
-        let t398 = t393 + t396;
-        let t399 = t398 + layers[1][3];
-        let t402 = layers[0][3] * layers[2][1];
-        let t404 = layers[1][4] * layers[2][1];
-        let t406 = t402 + t404;
-        let t407 = t406 + layers[2][2];
-        crate::nalgebra::SVector::<T, 3>::new(t390, t399, t407)
+        let t457 = layers[0][1] * layers[1][0];
+        let t458 = layers[0][1] * layers[2][0];
+        let t459 = layers[0][0] - t457;
+        let t460 = t459 - t458;
+        let t463 = layers[0][2] * layers[1][1];
+        let t466 = layers[1][2] * layers[2][0];
+        let t468 = t463 + t466;
+        let t469 = t468 + layers[1][3];
+        let t472 = layers[0][3] * layers[2][1];
+        let t474 = layers[1][4] * layers[2][1];
+        let t476 = t472 + t474;
+        let t477 = t476 + layers[2][2];
+        crate::nalgebra::SVector::<T, 3>::new(t460, t469, t477)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
     #[inline]
-    fn state_time(&self, t: T) -> [T; 10] {
+    fn state_time(&self, t: T) -> [T; 12] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1376,8 +1577,9 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         let t47 = self.fixed[2] * t18;
         let t78 = self.fixed[3] * t14;
         let t83 = self.fixed[3] * t18;
-        let t109 = self.fixed[12] * t8;
-        [t8, t23, t26, t30, t40, t43, t47, t78, t83, t109]
+        let t116 = T::nearest(2.0) * t8;
+        let t133 = self.fixed[12] * t8;
+        [t8, t18, t23, t26, t30, t40, t43, t47, t78, t83, t116, t133]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 3] {
@@ -1393,21 +1595,40 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         [t51, t56, t60]
     }
     #[inline]
-    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
         let t22 = X[0].cos_pi();
         let t25 = X[1].cos_pi();
         let t29 = X[2].cos_pi();
         let t39 = X[0].sin_pi();
         let t42 = X[1].sin_pi();
         let t46 = X[2].sin_pi();
-        [t22, t25, t29, t39, t42, t46]
+        let t99 = T::nearest(0.5) * X[0];
+        let t100 = t99.sin_pi();
+        let t101 = T::nearest(0.5) * X[1];
+        let t102 = t101.cos_pi();
+        let t103 = t99.cos_pi();
+        let t104 = t101.sin_pi();
+        let t105 = t100 * t102;
+        let t106 = t103 * t104;
+        let t107 = t105 - t106;
+        let t108 = t105 + t106;
+        let t109 = T::nearest(0.5) * X[2];
+        let t110 = t109.sin_pi();
+        let t111 = t109.cos_pi();
+        let t112 = t102 * t110;
+        let t113 = t104 * t111;
+        let t114 = t112 - t113;
+        let t115 = t112 + t113;
+        let t117 = t107 * t108;
+        let t119 = t114 * t115;
+        [t22, t25, t29, t39, t42, t46, t117, t119]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
         &self,
-        time: &[T; 10],
+        time: &[T; 12],
         velocity_time: &[T; 3],
-        point: &[T; 6],
+        point: &[T; 8],
     ) -> crate::State<T, 3> {
         let v = {
             let time = velocity_time;
@@ -1418,25 +1639,25 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
             let t62 = -t61;
             crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62)
         };
-        let t24 = time[1] * point[0];
-        let t27 = time[2] * point[1];
+        let t24 = time[2] * point[0];
+        let t27 = time[3] * point[1];
         let t28 = -t27;
-        let t31 = time[3] * point[2];
+        let t31 = time[4] * point[2];
         let t32 = -t31;
         let t34 = t24 + T::one();
         let t35 = t28 + T::one();
         let t36 = t32 + T::one();
         let t37 = t34 * t35;
         let t38 = t37 * t36;
-        let t41 = time[4] * point[3];
-        let t44 = time[5] * point[4];
+        let t41 = time[5] * point[3];
+        let t44 = time[6] * point[4];
         let t45 = -t44;
-        let t48 = time[6] * point[5];
+        let t48 = time[7] * point[5];
         let t49 = -t48;
-        let t79 = time[7] * point[1];
+        let t79 = time[8] * point[1];
         let t81 = T::nearest(2.0) - t79;
         let t82 = T::nearest(0.5) * t81;
-        let t84 = time[8] * point[2];
+        let t84 = time[9] * point[2];
         let t85 = T::nearest(2.0) - t84;
         let t86 = T::nearest(0.5) * t85;
         let t91 = T::one() / t38;
@@ -1445,32 +1666,36 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t99 = t28 * t36;
-        let t100 = t99 - t31;
-        let t101 = t100 + T::one();
-        let t102 = time[0] * point[0];
-        let t103 = t102 * t101;
-        let t104 = self.fixed[3] * t103;
-        let t105 = t104 + t99;
-        let t106 = t105 - t31;
-        let t107 = t106.ln_of_both_if::<NEAR>(t38);
-        let t110 = time[9] * point[0];
-        let t111 = t110 * t96;
-        let t115 = t107 * t94;
-        let t116 = self.fixed[13] * t115;
-        let t117 = t111 + t116;
-        let t118 = t95 + T::one();
-        let t119 = t28 * t118;
-        let t120 = self.fixed[11] * t119;
-        let t121 = t107 * t95;
-        let t122 = self.fixed[13] * t121;
-        let t123 = t120 + t122;
-        let t124 = t93 + T::one();
-        let t125 = t32 * t124;
-        let t126 = self.fixed[11] * t125;
-        let t127 = t107 * t93;
-        let t128 = self.fixed[13] * t127;
-        let t129 = t126 + t128;
+        let t118 = time[10] * point[6];
+        let t120 = time[1] * point[7];
+        let t121 = t118 - t120;
+        let t122 = self.fixed[3] * t121;
+        let t123 = t28 * t36;
+        let t124 = t123 - t31;
+        let t125 = time[0] * point[0];
+        let t126 = t125 * t124;
+        let t127 = self.fixed[3] * t126;
+        let t128 = t28 * t32;
+        let t129 = t127 - t122;
+        let t130 = t129 + t128;
+        let t131 = t130.ln_of_both_if::<NEAR>(t38);
+        let t134 = time[11] * point[0];
+        let t135 = t134 * t96;
+        let t139 = t131 * t94;
+        let t140 = self.fixed[13] * t139;
+        let t141 = t135 + t140;
+        let t142 = t95 + T::one();
+        let t143 = t28 * t142;
+        let t144 = self.fixed[11] * t143;
+        let t145 = t131 * t95;
+        let t146 = self.fixed[13] * t145;
+        let t147 = t144 + t146;
+        let t148 = t93 + T::one();
+        let t149 = t32 * t148;
+        let t150 = self.fixed[11] * t149;
+        let t151 = t131 * t93;
+        let t152 = self.fixed[13] * t151;
+        let t153 = t150 + t152;
         crate::State {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v,
@@ -1494,15 +1719,15 @@ impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t117,
+                t141,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t123,
+                t147,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t129,
+                t153,
             ),
         }
     }
