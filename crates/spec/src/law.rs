@@ -1,6 +1,7 @@
 //! What the momentum balance needs of a material: the first Piola-Kirchhoff stress and its divergence.
 
 pub(crate) mod energy;
+mod invariants;
 mod isochoric;
 mod kinematics;
 mod neo_hookean;
@@ -268,6 +269,17 @@ pub(crate) fn stress(
             (W, isotropic)
         }
     };
+    let graph = &mut derivation.graph;
+    let n = deformation.H.len();
+    // Where principal directions are those of the coordinates the components are the shorter form.
+    let H = &deformation.H;
+    let is_coupled = (0..n).any(|i| (0..n).any(|j| i != j && H[i][j] != Graph::ZERO));
+    if is_coupled
+        && energy::uses_invariants_only(graph, W, n)
+        && let Some(W) = invariants::in_two_invariants(graph, W, n)
+    {
+        return Ok(invariants::stress(derivation, deformation, W));
+    }
     Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
         .stress(derivation, deformation))
 }

@@ -42,7 +42,8 @@ pub(super) fn stress(
     isochoric: Expr,
     volume: Volume,
 ) -> Stress {
-    let law = Invariants::new(&mut derivation.graph, deformation, isochoric, volume);
+    let kinematics = Kinematics::new(derivation, deformation);
+    let law = Invariants::new(&mut derivation.graph, deformation, kinematics, isochoric, volume);
     let Divergence { linear, remainder, whole } = law.divergence(derivation, deformation);
     let graph = &mut derivation.graph;
     let scale = graph.product_of([law.doubled, law.power, law.slope]);
@@ -51,14 +52,13 @@ pub(super) fn stress(
     let normal = law.normal(graph, deformation);
     let off_diagonal = graph.sub(normal, scale);
     let off_diagonal = graph.whole(off_diagonal);
-    let strain = law.kinematics.strain.is_some();
     let n = deformation.H.len();
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
             let f = deformation.inverse_transpose[i][j];
-            let (first, factor) = match i == j || strain {
+            let (first, factor) = match law.kinematics.is_small[i][j] {
                 true => (law.kinematics.difference[i][j], normal),
                 // H^T F^-T is -F^-T there.
                 false => (deformation.H[i][j], off_diagonal),
@@ -102,7 +102,13 @@ struct Invariants {
 }
 
 impl Invariants {
-    fn new(graph: &mut Graph, deformation: &Deformation, isochoric: Expr, volume: Volume) -> Self {
+    fn new(
+        graph: &mut Graph,
+        deformation: &Deformation,
+        kinematics: Kinematics,
+        isochoric: Expr,
+        volume: Volume,
+    ) -> Self {
         let (one, two, three) = (Graph::ONE, graph.integer(2), graph.integer(3));
         let root = graph.product([(deformation.J, Rational::new(1.into(), 3.into()))]);
         let root = graph.whole(root);
@@ -116,7 +122,6 @@ impl Invariants {
         let power_change = graph.neg(change);
         let power_change = graph.whole(power_change);
 
-        let kinematics = Kinematics::new(graph, deformation);
         let third = graph.div(kinematics.trace, three);
         let mut K = kinematics.difference.clone();
         for (entries, f) in K.iter_mut().zip(&deformation.inverse_transpose) {

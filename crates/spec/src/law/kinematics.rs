@@ -2,8 +2,10 @@
 
 use super::{Deformation, zero_if_vanishing};
 use crate::derivation::Derivation;
+use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
+use std::collections::BTreeSet;
 
 /// Measures of the strain of one deformation.
 pub(super) struct Kinematics {
@@ -13,6 +15,8 @@ pub(super) struct Kinematics {
     pub(super) strain: Option<Matrix>,
     /// `F - F^-T`.
     pub(super) difference: Matrix,
+    /// Whether the entry of that is of first order in strains; else it has the size of `H`, and the two parts are better apart.
+    pub(super) is_small: Vec<Vec<bool>>,
     /// `H^T F^-T = I - F^-T`.
     pub(super) M: Matrix,
 }
@@ -26,7 +30,8 @@ pub(super) struct DilationGradient {
 }
 
 impl Kinematics {
-    pub(super) fn new(graph: &mut Graph, deformation: &Deformation) -> Self {
+    pub(super) fn new(derivation: &mut Derivation, deformation: &Deformation) -> Self {
+        let graph = &mut derivation.graph;
         let H = &deformation.H;
         let n = H.len();
         let strain = deformation.turn.as_ref().map(|turn| turn.strain(graph));
@@ -41,21 +46,31 @@ impl Kinematics {
         let trace = graph.whole(trace);
         let f = &deformation.inverse_transpose;
         let mut M = deformation.transposed_gradient_times_inverse(graph);
-        let turned = strain.as_ref().map(|B| matrix_product(graph, B, f));
-        let mut difference = M.clone();
-        for i in 0..n {
-            for j in 0..n {
-                if i != j {
-                    M[i][j] = graph.neg(f[i][j]);
+        let (difference, is_small) = if let Some(B) = &strain {
+            // F - F^-T = (F F^T - I) F^-T
+            (matrix_product(graph, B, f), vec![vec![true; n]; n])
+        } else {
+            let doubled_strain = doubled_strain(graph, deformation, &derivation.variables);
+            let mut whole = M.clone();
+            let mut is_small = vec![vec![true; n]; n];
+            for i in 0..n {
+                for j in 0..n {
+                    is_small[i][j] = i == j || doubled_strain[i][j].is_some();
+                    whole[i][j] = match is_small[i][j] {
+                        true => difference(graph, deformation, &doubled_strain, &M, [i, j]),
+                        // H^T F^-T is -F^-T there.
+                        false => graph.sub(H[i][j], f[i][j]),
+                    };
                 }
-                // F - F^-T = (F F^T - I) F^-T
-                difference[i][j] = match &turned {
-                    Some(turned) => turned[i][j],
-                    None => graph.add(H[i][j], M[i][j]),
-                };
+            }
+            (whole, is_small)
+        };
+        for i in 0..n {
+            for j in (0..n).filter(|j| *j != i) {
+                M[i][j] = graph.neg(f[i][j]);
             }
         }
-        Kinematics { trace, strain, difference, M }
+        Kinematics { trace, strain, difference, is_small, M }
     }
 
     /// `J - 1 - tr(C - I)/2`, of second order.
@@ -147,4 +162,53 @@ pub(super) fn work_along(derivation: &mut Derivation, A: &Matrix, H: &Matrix, k:
 pub(super) fn row_times(graph: &mut Graph, A: &Matrix, i: usize, x: &Vector) -> Expr {
     let terms: Vec<Expr> = A[i].iter().zip(x).map(|(&a, &x)| graph.mul(a, x)).collect();
     graph.sum_of(terms)
+}
+
+/// Entries of `H + H^T` but for the diagonal, where terms of the sum cancel in symbols. Shear strains are small next to the turn there,
+/// and the entry of `F - F^-T` is `H + H^T - H^T (H^T F^-T)`, whose second part is of second order.
+pub(super) type DoubledStrain = Vec<Vec<Option<Expr>>>;
+
+pub(super) fn doubled_strain(
+    graph: &mut Graph,
+    deformation: &Deformation,
+    variables: &BTreeSet<Expr>,
+) -> DoubledStrain {
+    let open = &deformation.open;
+    let n = open.len();
+    let mut strain = vec![vec![None; n]; n];
+    for i in 0..n {
+        for j in 0..i {
+            let negative = graph.neg(open[j][i]);
+            let sum = graph.sub(open[i][j], negative);
+            let sum = graph.cancel(sum, variables);
+            if is_joined(graph, sum, [open[i][j], negative], variables) {
+                let sum = graph.whole(sum);
+                (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
+            }
+        }
+    }
+    strain
+}
+
+/// An entry of `F - F^-T`, from `M = H^T F^-T`: `H + M`, or `H + H^T - H^T M`.
+pub(super) fn difference(
+    graph: &mut Graph,
+    deformation: &Deformation,
+    doubled_strain: &DoubledStrain,
+    M: &Matrix,
+    [i, j]: [usize; 2],
+) -> Expr {
+    let H = &deformation.H;
+    let Some(strain) = doubled_strain[i][j] else {
+        return graph.add(H[i][j], M[i][j]);
+    };
+    let second = if H.len() == 2 {
+        // The cofactor is -H_ji there.
+        let change = graph.div(deformation.volume_change, deformation.J);
+        graph.mul(H[j][i], change)
+    } else {
+        let terms: Vec<Expr> = (0..H.len()).map(|k| graph.mul(H[k][i], M[k][j])).collect();
+        graph.sum_of(terms)
+    };
+    graph.sub(strain, second)
 }

@@ -4,8 +4,7 @@
 //!   `(F F^T - I) F^-T = F - F^-T = H + H^T F^-T`, it is `P = mu (H + H^T F^-T) + lambda log1p(J - 1) F^-T`. The product
 //!   `tau F^-T` instead would form squares of `H` that the division by `F` takes away again: at large gradients
 //!   that loses digits.
-//! - Where shear strains are small next to the turn, terms of `H + H^T` cancel in symbols. The entry of `F - F^-T` is
-//!   `H + H^T - H^T (H^T F^-T)` then, whose second part is of second order.
+//! - Where shear strains are small next to the turn, terms of `H + H^T` cancel in symbols, see [`DoubledStrain`].
 //! - Where the motion turns as it goes, `H` is large next to the strain, and the turn drops out of the sum
 //!   `F F^T - I = H + H^T + H H^T` alone, in symbols: there `P = tau F^-T` with
 //!   `tau = lambda log1p(J - 1) I + mu (F F^T - I)`.
@@ -14,12 +13,11 @@
 //!   `mu Div H + (lambda + mu) grad tr H` and, with `M = H^T F^-T` and `g = grad tr H - m`, a remainder of second order,
 //!   `-(lambda + mu) (m + M g) - lambda ln J F^-T g`, where `m = M : grad H`.
 
+use super::kinematics::{DoubledStrain, difference, doubled_strain};
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, matrix_product};
 use mmsmith_expr::{Expr, Graph};
-use std::collections::BTreeSet;
 
 pub(super) fn stress(
     derivation: &mut Derivation,
@@ -58,7 +56,7 @@ struct NeoHookean<'a> {
     lambda: Expr,
     mu: Expr,
     /// `H + H^T` without its diagonal, where terms of its parts cancel in symbols.
-    doubled_strain: Vec<Vec<Option<Expr>>>,
+    doubled_strain: DoubledStrain,
 }
 
 impl NeoHookean<'_> {
@@ -69,7 +67,8 @@ impl NeoHookean<'_> {
         let mut P = once.clone();
         for (i, row) in P.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {
-                let shear = self.difference(graph, &once, i, j);
+                let shear =
+                    difference(graph, self.deformation, &self.doubled_strain, &once, [i, j]);
                 let shear = graph.mul(self.mu, shear);
                 let normal = graph.mul(pressure, self.deformation.inverse_transpose[i][j]);
                 *entry = graph.add(shear, normal);
@@ -77,23 +76,6 @@ impl NeoHookean<'_> {
             }
         }
         P
-    }
-
-    /// Entry `ij` of `F - F^-T`, from `M = H^T F^-T`: `H + M`, or `H + H^T - H^T M`.
-    fn difference(&self, graph: &mut Graph, M: &Matrix, i: usize, j: usize) -> Expr {
-        let H = &self.deformation.H;
-        let Some(strain) = self.doubled_strain[i][j] else {
-            return graph.add(H[i][j], M[i][j]);
-        };
-        let second = if H.len() == 2 {
-            // The cofactor is -H_ji there.
-            let change = graph.div(self.deformation.volume_change, self.deformation.J);
-            graph.mul(H[j][i], change)
-        } else {
-            let terms: Vec<Expr> = (0..H.len()).map(|k| graph.mul(H[k][i], M[k][j])).collect();
-            graph.sum_of(terms)
-        };
-        graph.sub(strain, second)
     }
 
     /// `tau F^-T` with `tau = lambda ln J I + mu (F F^T - I)`.
@@ -147,7 +129,8 @@ impl NeoHookean<'_> {
             let once = self.deformation.transposed_gradient_times_inverse(graph);
             for i in 0..n {
                 for j in 0..n {
-                    let shear = self.difference(graph, &once, i, j);
+                    let shear =
+                        difference(graph, self.deformation, &self.doubled_strain, &once, [i, j]);
                     let shear = graph.mul(self.mu, shear);
                     let turned = graph.mul(pressure, once[i][j]);
                     rest[i][j] = graph.sub(shear, turned);
@@ -227,27 +210,4 @@ impl NeoHookean<'_> {
         }
         Divergence { linear, remainder, whole }
     }
-}
-
-/// The entries of `H + H^T`, but for the diagonal, where terms of the sum cancel in symbols.
-fn doubled_strain(
-    graph: &mut Graph,
-    deformation: &Deformation,
-    variables: &BTreeSet<Expr>,
-) -> Vec<Vec<Option<Expr>>> {
-    let open = &deformation.open;
-    let n = open.len();
-    let mut strain = vec![vec![None; n]; n];
-    for i in 0..n {
-        for j in 0..i {
-            let negative = graph.neg(open[j][i]);
-            let sum = graph.sub(open[i][j], negative);
-            let sum = graph.cancel(sum, variables);
-            if is_joined(graph, sum, [open[i][j], negative], variables) {
-                let sum = graph.whole(sum);
-                (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
-            }
-        }
-    }
-    strain
 }

@@ -82,8 +82,8 @@ pub(super) fn stress_in_plane(
     deformation: &Deformation,
     W: Expr,
 ) -> Stress {
+    let kinematics = Kinematics::new(derivation, deformation);
     let graph = &mut derivation.graph;
-    let kinematics = Kinematics::new(graph, deformation);
     let (H, f) = (&deformation.H, &deformation.inverse_transpose);
     let M = deviator(graph, deformation, &kinematics);
     let law = InPlane::new(graph, deformation, &kinematics, W);
