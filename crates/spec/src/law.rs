@@ -237,7 +237,8 @@ pub(crate) fn stress(
                     let volume = isochoric::Volume {
                         kappa: part(|_| "kappa"),
                         energy: part(Volumetric::formula),
-                        pressure_beyond_linear: part(Volumetric::pressure_beyond_linear),
+                        measure: part(|volume| volume.pressure_parts()[0]),
+                        beside: part(|volume| volume.pressure_parts()[1]),
                     };
                     let others = energy::named(graph, others, &constants);
                     let stress = isochoric::stress(derivation, deformation, isochoric, volume);

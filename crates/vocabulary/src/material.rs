@@ -69,13 +69,14 @@ impl Volumetric {
         }
     }
 
-    /// `J U' - (J - 1)`, the pressure of unit bulk modulus without its linear part, as an expression of `J`.
+    /// A measure of the change of volume, `J - 1` to first order, and what `J U'`, the pressure of unit bulk modulus, is beside it:
+    /// both as expressions of `J`.
     #[must_use]
-    pub fn pressure_beyond_linear(self) -> &'static str {
+    pub fn pressure_parts(self) -> [&'static str; 2] {
         match self {
-            Self::Logarithmic => "log1pmx(J - 1)",
-            Self::Quadratic => "(J - 1)^2",
-            Self::Mixed => "(J - 1)^2/2",
+            Self::Logarithmic => ["ln(J)", "0"],
+            Self::Quadratic => ["J - 1", "(J - 1)^2"],
+            Self::Mixed => ["J - 1", "(J - 1)^2/2"],
         }
     }
 

@@ -11,14 +11,14 @@
 //!
 //! - At rest `K`, `g` and `k` are zero. What is left is formed from `H`: `K = H + H^T F^-T - tr(C - I)/3 F^-T`.
 //! - All that multiplies `F^-T` in `P` is `J U' - 2/3 s W' tr(C - I)`, of which the two parts cancel to first order where `lambda` is
-//!   zero. With `v = J - 1` and `mu = 2 W'(0)` it is
-//!   `lambda v + (J U' - kappa v) + 2/3 mu (v - tr(C - I)/2) - 4/3 (s W' - W'(0)) tr(C - I)/2`, in which all but the first are of
+//!   zero. With a measure `m` of the change of volume, `J - 1` or `ln J`, and `mu = 2 W'(0)` it is
+//!   `lambda m + (J U' - kappa m) + 2/3 mu (m - tr(C - I)/2) - 2/3 (s W' - W'(0)) tr(C - I)`, in which all but the first are of
 //!   second order.
 //! - Cube roots replace the power: with `c = J^(1/3)` it is `s - 1 = -(J - 1) (c + 1)/(c^2 (c^2 + c + 1))`, which keeps its digits for
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
-use super::energy::{self, EXCESS, modulus_at_rest};
-use super::kinematics::{DilationGradient, Kinematics, log_beyond_linear, row_times, work_along};
+use super::energy::{EXCESS, modulus_at_rest, own_symbol};
+use super::kinematics::{DilationGradient, Kinematics, row_times, work_along};
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
@@ -31,8 +31,9 @@ pub(super) struct Volume {
     pub(super) kappa: Expr,
     /// `U`, in `J`.
     pub(super) energy: Expr,
-    /// `J U' - (J - 1)`, in `J`.
-    pub(super) pressure_beyond_linear: Expr,
+    /// A measure `m` of the change of volume, `J - 1` to first order, and `J U' - m`, in `J`.
+    pub(super) measure: Expr,
+    pub(super) beside: Expr,
 }
 
 /// The stress of `isochoric`, an energy in `excess`, and of `volume`.
@@ -49,8 +50,12 @@ pub(super) fn stress(
     let scale = graph.product_of([law.doubled, law.power, law.slope]);
     let scale = graph.whole(scale);
     let pressure = zero_if_vanishing(graph, law.pressure);
-    let normal = law.normal(graph, deformation);
-    let off_diagonal = graph.sub(normal, scale);
+    let normal = law.normal(graph);
+    // With an entry of F^-T that is small itself, where no digits are lost to the difference.
+    let of_trace = graph.product_of([scale, law.kinematics.trace]);
+    let of_trace = graph.sum([(Rational::new((-1).into(), 3.into()), of_trace)]);
+    let off_diagonal =
+        graph.sum([(1.into(), pressure), (1.into(), of_trace), ((-1).into(), scale)]);
     let off_diagonal = graph.whole(off_diagonal);
     let n = deformation.H.len();
     let mut P = vec![vec![Graph::ZERO; n]; n];
@@ -94,8 +99,10 @@ struct Invariants {
     curvature: Expr,
     /// `J U'`, and `J^2 U''` as its value at rest and the rest.
     pressure: Expr,
-    /// `J U' - kappa (J - 1)`, of second order.
-    pressure_beyond_linear: Expr,
+    /// The measure `m` of the change of volume, `J U' - kappa m`, and `m - tr(C - I)/2`, both of second order.
+    measure: Expr,
+    pressure_beside: Expr,
+    measure_beyond_trace: Expr,
     stiffness_at_rest: Expr,
     stiffness_change: Expr,
     energy: Expr,
@@ -133,7 +140,7 @@ impl Invariants {
             }
         }
 
-        let excess = energy::own_symbol(graph, EXCESS);
+        let excess = own_symbol(graph, EXCESS);
         let part = graph.mul(power, kinematics.trace);
         let value = graph.mul(three, power_change);
         let value = graph.add(part, value);
@@ -156,8 +163,10 @@ impl Invariants {
         let of_volume = derivatives.of(graph, volumetric, v);
         let of_slope_of_volume = derivatives.of(graph, of_volume, v);
         let pressure = graph.mul(sum, of_volume);
-        let beyond_linear = graph.mul(volume.kappa, volume.pressure_beyond_linear);
-        let beyond_linear = graph.replace(beyond_linear, &BTreeMap::from([(J, sum)]));
+        let in_v = BTreeMap::from([(J, sum)]);
+        let [measure, beside] =
+            [volume.measure, volume.beside].map(|of_J| graph.replace(of_J, &in_v));
+        let beside = graph.mul(volume.kappa, beside);
         let (_, pressure) = graph.split_at_zero(pressure, &small);
         let stiffness = graph.product_of([sum, sum, of_slope_of_volume]);
         let (stiffness_at_rest, stiffness_change) = graph.split_at_zero(stiffness, &small);
@@ -167,11 +176,14 @@ impl Invariants {
             (v, deformation.volume_change),
             (graph.call(Function::Ln1p, &[v]), deformation.log_J),
             (graph.call(Function::Ln, &[sum]), deformation.log_J),
-            (graph.call(Function::Ln1pMinusX, &[v]), log_beyond_linear(graph, deformation)),
         ]);
         let at = |graph: &mut Graph, expr, values: &BTreeMap<Expr, Expr>| {
             let value = graph.replace(expr, values);
             graph.whole(value)
+        };
+        let measure_beyond_trace = match measure == v {
+            true => kinematics.volume_beyond_trace(graph, deformation),
+            false => kinematics.log_beyond_trace(graph, deformation),
         };
         let energies = [at(graph, isochoric, &actual), at(graph, volumetric, &of_volume)];
         Invariants {
@@ -185,7 +197,9 @@ impl Invariants {
             slope_change: at(graph, slope_change, &actual),
             curvature: at(graph, of_slope, &actual),
             pressure: at(graph, pressure, &of_volume),
-            pressure_beyond_linear: at(graph, beyond_linear, &of_volume),
+            measure: at(graph, measure, &of_volume),
+            pressure_beside: at(graph, beside, &of_volume),
+            measure_beyond_trace,
             stiffness_at_rest,
             stiffness_change: at(graph, stiffness_change, &of_volume),
             energy: graph.sum_of(energies),
@@ -200,18 +214,17 @@ impl Invariants {
     }
 
     /// All that multiplies `F^-T` in `P`.
-    fn normal(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
+    fn normal(&self, graph: &mut Graph) -> Expr {
         let mu = graph.mul(self.doubled, self.slope_at_rest);
         let third = |n: i64| Rational::new(n.into(), 3.into());
         let lambda = graph.sum([(1.into(), self.stiffness_at_rest), (third(-2), mu)]);
         let lambda = modulus_at_rest(graph, lambda);
         let lambda = graph.whole(lambda);
         let slope_change = self.scaled_slope_change(graph);
-        let volume = self.kinematics.volume_beyond_trace(graph, deformation);
         let normal = [
-            (1.into(), graph.mul(lambda, deformation.volume_change)),
-            (1.into(), self.pressure_beyond_linear),
-            (third(2), graph.mul(mu, volume)),
+            (1.into(), graph.mul(lambda, self.measure)),
+            (1.into(), self.pressure_beside),
+            (third(2), graph.mul(mu, self.measure_beyond_trace)),
             (third(-2), graph.mul(slope_change, self.kinematics.trace)),
         ];
         let normal = graph.sum(normal);
@@ -295,26 +308,21 @@ mod tests {
     use mmsmith_expr::Ast;
     use mmsmith_vocabulary::Volumetric;
 
-    /// `J U' = (J - 1) + ...` of each volumetric part.
+    /// `J U'` of each volumetric part.
     #[test]
-    fn pressures_without_their_linear_parts() {
+    fn pressures_are_those_of_the_energies() {
         let mut graph = Graph::new();
         let J = graph.symbol("J");
-        let v = graph.sub(J, Graph::ONE);
-        let logarithm = graph.call(Function::Ln, &[J]);
-        let beyond = graph.sub(logarithm, v);
-        let replacement = BTreeMap::from([(graph.call(Function::Ln1pMinusX, &[v]), beyond)]);
         for (name, volume) in Volumetric::NAMES {
             let mut built = |text: &str| {
                 let ast = Ast::parse(text).unwrap();
                 graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap()
             };
-            let (U, expected) = (built(volume.formula()), built(volume.pressure_beyond_linear()));
-            let expected = graph.replace(expected, &replacement);
+            let (U, parts) = (built(volume.formula()), volume.pressure_parts().map(&mut built));
             let slope = Derivatives::limited().of(&mut graph, U, J);
             let pressure = graph.mul(J, slope);
-            let difference = graph.sub(pressure, v);
-            let difference = graph.sub(difference, expected);
+            let expected = graph.sum_of(parts);
+            let difference = graph.sub(pressure, expected);
             assert!(graph.vanishes(difference), "{name}");
         }
     }

@@ -107,6 +107,25 @@ impl Kinematics {
         graph.whole(sum)
     }
 
+    /// `ln J - tr(C - I)/2`, of second order. Next to inversion a product of stretches has digits that `J - 1` lacks: there it is a sum
+    /// over the stretches.
+    pub(super) fn log_beyond_trace(&self, graph: &mut Graph, deformation: &Deformation) -> Expr {
+        let sum = match of_stretches(graph, deformation) {
+            Some(beyond) => {
+                let half = Rational::new((-1).into(), 2.into());
+                let squares = deformation.H.iter().flatten().map(|&h| (half.clone(), h));
+                let squares: Vec<_> = squares.map(|(half, h)| (half, graph.powi(h, 2))).collect();
+                graph.sum([(1.into(), beyond)].into_iter().chain(squares))
+            }
+            None => {
+                let beyond = graph.call(Function::Ln1pMinusX, &[deformation.volume_change]);
+                let volume = self.volume_beyond_trace(graph, deformation);
+                graph.add(beyond, volume)
+            }
+        };
+        graph.whole(sum)
+    }
+
     /// The gradient of `ln J`; zero where the volume is constant.
     pub(super) fn dilation_gradient(
         &self,
@@ -131,19 +150,16 @@ impl Kinematics {
     }
 }
 
-/// `ln J - (J - 1)`. Next to inversion a product of stretches has digits that `J - 1` lacks: there it is a sum over the stretches.
-pub(super) fn log_beyond_linear(graph: &mut Graph, deformation: &Deformation) -> Expr {
+/// The sum of `ln(1 + x) - x` over the entries `x` of a diagonal displacement gradient.
+fn of_stretches(graph: &mut Graph, deformation: &Deformation) -> Option<Expr> {
     let H = &deformation.H;
     let n = H.len();
-    let stretches: Vec<Expr> = (0..n).map(|i| graph.add(Graph::ONE, H[i][i])).collect();
-    if n > 1 && graph.product_of(stretches) == deformation.J {
-        let mut terms: Vec<Expr> =
+    let is_diagonal = (0..n).all(|i| (0..n).all(|j| i == j || H[i][j] == Graph::ZERO));
+    is_diagonal.then(|| {
+        let terms: Vec<Expr> =
             (0..n).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
-        let minors = minors_beyond_trace(graph, H);
-        terms.extend(minors.into_iter().map(|minor| graph.neg(minor)));
-        return graph.sum_of(terms);
-    }
-    graph.call(Function::Ln1pMinusX, &[deformation.volume_change])
+        graph.sum_of(terms)
+    })
 }
 
 /// `A : dH` along the unit vector `e_k`.

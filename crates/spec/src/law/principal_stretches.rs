@@ -14,7 +14,7 @@
 //! diagonal `P` is formed as `(phi - psi (J - 1)) F^-T + psi (F - F^-T)`, whose factor of `F^-T` is `lambda (J - 1)` to first order.
 
 use super::energy::{RATIO, modulus_at_rest, own_symbol};
-use super::kinematics::{DilationGradient, Kinematics, log_beyond_linear, row_times, work_along};
+use super::kinematics::{DilationGradient, Kinematics, row_times, work_along};
 use super::{Deformation, Stress, zero_if_vanishing};
 use crate::DeriveError;
 use crate::derivation::Derivation;
@@ -232,15 +232,21 @@ impl InPlane {
         let (psi_by_v, psi_by_z) = (derivatives.of(graph, psi, v), derivatives.of(graph, psi, z));
         let (_, energy) = graph.split_at_zero(W, &small);
 
-        let normal = match beyond_linear(graph, phi, v, z) {
-            Some(beyond) => {
+        let normal = match beside_logarithm(graph, phi, v, z) {
+            Some(beside) => {
                 let lambda = graph.sub(chi_at_rest, psi_at_rest);
                 let lambda = modulus_at_rest(graph, lambda);
                 let lambda = graph.whole(lambda);
-                let terms = [graph.mul(lambda, v), beyond];
-                let first = graph.sum_of(terms);
+                let logarithm = graph.call(Function::Ln1p, &[v]);
+                let beyond = graph.call(Function::Ln1pMinusX, &[v]);
                 let of_shear = graph.mul(psi_change, v);
-                graph.sub(first, of_shear)
+                let terms = [
+                    (1, graph.mul(lambda, logarithm)),
+                    (1, graph.mul(psi_at_rest, beyond)),
+                    (1, beside),
+                    (-1, of_shear),
+                ];
+                graph.sum(terms.map(|(sign, term)| (Rational::from(sign), term)))
             }
             None => {
                 let of_shear = graph.mul(psi, v);
@@ -255,7 +261,6 @@ impl InPlane {
             (z, ratio),
             (graph.call(Function::Ln1p, &[v]), deformation.log_J),
             (graph.call(Function::Ln, &[sum]), deformation.log_J),
-            (graph.call(Function::Ln1pMinusX, &[v]), log_beyond_linear(graph, deformation)),
         ]);
         let mut at = |expr| {
             let value = graph.replace(expr, &actual);
@@ -279,8 +284,8 @@ impl InPlane {
     }
 }
 
-/// `phi` without its term linear in `v = J - 1`, where `phi` is linear in `ln J` and otherwise of second order.
-fn beyond_linear(graph: &mut Graph, phi: Expr, v: Expr, z: Expr) -> Option<Expr> {
+/// `phi` without its part linear in `ln J`, where the rest is of second order.
+fn beside_logarithm(graph: &mut Graph, phi: Expr, v: Expr, z: Expr) -> Option<Expr> {
     let sum = graph.add(Graph::ONE, v);
     let log_J = graph.symbol("ln J");
     let logarithms = [(Function::Ln1p, v), (Function::Ln, sum)];
@@ -291,12 +296,8 @@ fn beyond_linear(graph: &mut Graph, phi: Expr, v: Expr, z: Expr) -> Option<Expr>
     let rest = graph.replace(phi, &BTreeMap::from([(log_J, Graph::ZERO)]));
     let of_rest = derivatives.of(graph, rest, v);
     let (of_rest, _) = graph.split_at_zero(of_rest, &BTreeSet::from([v, z]));
-    if graph.depends_on(slope, &BTreeSet::from([log_J, v, z])) || !graph.vanishes(of_rest) {
-        return None;
-    }
-    let beyond = graph.call(Function::Ln1pMinusX, &[v]);
-    let of_volume = graph.mul(slope, beyond);
-    Some(graph.add(of_volume, rest))
+    let is_linear = !graph.depends_on(slope, &BTreeSet::from([log_J, v, z]));
+    (is_linear && graph.vanishes(of_rest)).then_some(rest)
 }
 
 /// `z = (a - b)^2/(2 a b)` of the principal stretches `a` and `b`, as sums of squares over what is positive.
