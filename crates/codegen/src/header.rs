@@ -21,6 +21,9 @@ const ROUNDING: &str = include_str!("rounding.h");
 /// The logarithm of one plus a small number, as the crate of the solutions computes it.
 const LOGARITHM: &str = include_str!("logarithm.h");
 
+/// The logarithm of one plus a small number less that number, by the functions of the former.
+const LOGARITHM_REST: &str = include_str!("logarithm_rest.h");
+
 /// What laws need that have the logarithm of the stretch.
 const LOG_RATIO: &str = include_str!("log_ratio.h");
 
@@ -77,11 +80,16 @@ impl Header<'_> {
         }
         for (support, text) in [
             (CSupport::Logarithm, LOGARITHM),
+            (CSupport::LogarithmRest, LOGARITHM_REST),
             (CSupport::LogRatio, LOG_RATIO),
             (CSupport::CoshSqrt, COSH_SQRT),
             (CSupport::PositivePart, POSITIVE_PART),
         ] {
-            if self.code.calls(|function| function.c_support() == Some(support)) {
+            let needs = |needed: CSupport| {
+                needed == support
+                    || needed == CSupport::LogarithmRest && support == CSupport::Logarithm
+            };
+            if self.code.calls(|function| function.c_support().is_some_and(needs)) {
                 self.text += text;
             }
         }

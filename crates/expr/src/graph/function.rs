@@ -31,6 +31,8 @@ pub enum RustCall {
 pub enum CSupport {
     /// Logarithms of sums with one.
     Logarithm,
+    /// Logarithms of sums with one, less the other term; they call the former.
+    LogarithmRest,
     /// Squared logarithms of ratios.
     LogRatio,
     /// Hyperbolic cosines of roots.
@@ -252,7 +254,7 @@ functions! {
         single: ScalarFunctions::log_1p_minus_x,
         steepness: Some(|x| (x / (1.0 + x)).abs()),
         rust: RustCall::Method("log_1p_minus_x"),
-        own: Some(("mmsmith_log_1p_minus_x", CSupport::Logarithm)),
+        own: Some(("mmsmith_log_1p_minus_x", CSupport::LogarithmRest)),
     }
     /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
     /// where `y` has them.

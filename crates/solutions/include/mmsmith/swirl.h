@@ -195,15 +195,6 @@ MMSMITH_FN double mmsmith_log_1p(double x)
     return mmsmith_logarithm(x, x, 0);
 }
 
-/* ln(1 + x) - x, within four units in the last place. */
-MMSMITH_FN double mmsmith_log_1p_minus_x(double x)
-{
-    if (x >= -0.5 && x < 1.0) {
-        return -mmsmith_rest_of_logarithm(x);
-    }
-    return x == HUGE_VAL ? -HUGE_VAL : mmsmith_logarithm(x, x, 0) - x;
-}
-
 /* ln(y) of y = 1 + x: by y where x < -1/2, else by x. */
 MMSMITH_FN double mmsmith_ln_of_both(double x, double y)
 {
