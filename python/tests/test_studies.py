@@ -81,7 +81,13 @@ def test_ctrl_c_ends_a_long_call():
         print(mmsmith.run("ring", cells=8, periods=0.01)["result"]["status"])
         """
     )
-    child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    # What runs in the background of a shell ignores the signal, and so would its children.
+    child = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     assert child.stdout is not None and child.stdout.readline() == "begun\n"
     time.sleep(1.0)
     child.send_signal(signal.SIGINT)
