@@ -147,6 +147,12 @@ impl Deformation {
         Deformation { open, H, inverse_transpose, J, volume_change, log_J, turn, dilation }
     }
 
+    /// Whether the principal directions are those of the coordinates.
+    fn is_diagonal(&self) -> bool {
+        let n = self.H.len();
+        (0..n).all(|i| (0..n).all(|j| i == j || self.H[i][j] == Graph::ZERO))
+    }
+
     /// Whether `tr H` is zero in symbols.
     fn is_free_of_divergence(&self) -> bool {
         self.dilation.is_empty()
@@ -256,7 +262,7 @@ pub(crate) fn stress(
                     return Ok(stress.plus(&mut derivation.graph, others));
                 }
                 Formulas::PrincipalStretches(parts)
-                    if principal_stretches::is_coupled_in_plane(&deformation.H) =>
+                    if principal_stretches::is_coupled_in_plane(deformation) =>
                 {
                     let text = principal_stretches::energy_in_plane(&parts);
                     let W = with_volume(&mut derivation.graph, text);
@@ -273,9 +279,7 @@ pub(crate) fn stress(
     let graph = &mut derivation.graph;
     let n = deformation.H.len();
     // Where principal directions are those of the coordinates the components are the shorter form.
-    let H = &deformation.H;
-    let is_coupled = (0..n).any(|i| (0..n).any(|j| i != j && H[i][j] != Graph::ZERO));
-    if is_coupled
+    if !deformation.is_diagonal()
         && energy::uses_invariants_only(graph, W, n)
         && let Some(W) = invariants::in_two_invariants(graph, W, n)
     {

@@ -9,12 +9,12 @@
 //!
 //! since the divergence of `J F^-T` is zero (Piola's identity). At rest `S = mu` and `chi = lambda + mu`.
 
-use super::energy::{modulus_at_rest, own_symbol};
-use super::kinematics::{DilationGradient, Kinematics, row_times, work_along};
-use super::{Deformation, Stress, zero_if_vanishing};
+use super::energy::own_symbol;
+use super::kinematics::{ChainRule, Kinematics, volume_symbols, volume_values, work_along};
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::Vector;
-use mmsmith_expr::{Derivatives, Expr, Function, Graph};
+use mmsmith_expr::{Derivatives, Expr, Graph};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// `W` with nothing but `J` and `I1`, where a deformation in `dimension` directions leaves no other invariant.
@@ -59,11 +59,11 @@ pub(super) fn stress(derivation: &mut Derivation, deformation: &Deformation, W: 
         }
     }
 
-    let DilationGradient { of_M, g } = kinematics.dilation_gradient(derivation, deformation);
+    let dilation = kinematics.dilation_gradient(derivation, deformation);
     let d: Vector = (0..n).map(|k| work_along(derivation, D, H, k)).collect();
     let graph = &mut derivation.graph;
     let mut combined = |of_g: Expr, of_d: Expr| -> Vector {
-        let terms = g.iter().zip(&d).map(|(&g, &d)| {
+        let terms = dilation.g.iter().zip(&d).map(|(&g, &d)| {
             let terms = [graph.mul(of_g, g), graph.mul(of_d, d)];
             let sum = graph.sum_of(terms);
             let sum = zero_if_vanishing(graph, sum);
@@ -74,35 +74,18 @@ pub(super) fn stress(derivation: &mut Derivation, deformation: &Deformation, W: 
     let of_S = combined(law.S_by_volume, law.S_by_strain);
     let change = combined(law.chi_change, law.N_by_strain);
     let all = combined(law.chi, law.N_by_strain);
-    let modulus = match deformation.is_isochoric() {
-        true => Graph::ZERO,
-        false => law.chi_at_rest,
+    let rule = ChainRule {
+        A: D,
+        S: law.S,
+        S_at_rest: law.S_at_rest,
+        S_change: law.S_change,
+        of_S,
+        modulus: law.chi_at_rest,
+        change,
+        all,
     };
-    let open = derivation.divergence(&deformation.open);
-    let of_H = derivation.divergence(H);
-    let trace = deformation.trace(&mut derivation.graph);
-    let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
-    for i in 0..n {
-        let dilation = derivation.along(trace, i);
-        let graph = &mut derivation.graph;
-        let open_mu = modulus_at_rest(graph, law.S_at_rest);
-        let open_modulus = modulus_at_rest(graph, modulus);
-        let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
-        linear.push(graph.sum_of(first));
-        let Mg = row_times(graph, &kinematics.M, i, &g);
-        let of_volume = graph.add(of_M[i], Mg);
-        let of_volume = graph.mul(modulus, of_volume);
-        let of_S = row_times(graph, D, i, &of_S);
-        let rest = [
-            row_times(graph, f, i, &change),
-            graph.neg(of_volume),
-            of_S,
-            graph.mul(law.S_change, of_H[i]),
-        ];
-        remainder.push(graph.sum_of(rest));
-        let parts = [row_times(graph, f, i, &all), of_S, graph.mul(law.S, of_H[i])];
-        whole.push(graph.sum_of(parts));
-    }
+    let Divergence { linear, remainder, whole } =
+        rule.divergence(derivation, deformation, &kinematics, &dilation);
     let (isotropic, energy) = (law.N, Some(law.energy));
     Stress { P, isotropic, anisotropic, linear, remainder, whole: Some(whole), energy }
 }
@@ -126,7 +109,8 @@ struct Law {
 
 impl Law {
     fn new(graph: &mut Graph, deformation: &Deformation, kinematics: &Kinematics, W: Expr) -> Self {
-        let (J, v) = (graph.symbol("J"), graph.symbol("J - 1"));
+        let J = graph.symbol("J");
+        let [v, sum] = volume_symbols(graph);
         let (I1, I) = (graph.symbol("I1"), own_symbol(graph, "I1 - 3"));
         let three = graph.integer(3);
         let first = graph.add(three, I);
@@ -151,20 +135,14 @@ impl Law {
         let less_N = graph.neg(N);
         let chi = graph.sum_of([N_by_log, N_by_strain, S, less_N]);
 
-        let sum = graph.add(Graph::ONE, v);
         let small = BTreeSet::from([v, I]);
         let split = |graph: &mut Graph, expr| {
             let expr = graph.replace(expr, &BTreeMap::from([(J, sum)]));
             let (at_rest, change) = graph.split_at_zero(expr, &small);
             (zero_if_vanishing(graph, at_rest), change)
         };
-        let actual = BTreeMap::from([
-            (sum, deformation.J),
-            (v, deformation.volume_change),
-            (I, kinematics.trace),
-            (graph.call(Function::Ln1p, &[v]), deformation.log_J),
-            (graph.call(Function::Ln, &[sum]), deformation.log_J),
-        ]);
+        let mut actual = volume_values(graph, deformation);
+        actual.insert(I, kinematics.trace);
         let at = |graph: &mut Graph, expr| {
             let value = graph.replace(expr, &actual);
             let value = zero_if_vanishing(graph, value);

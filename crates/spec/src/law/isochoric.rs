@@ -18,11 +18,13 @@
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
 use super::energy::{EXCESS, modulus_at_rest, own_symbol};
-use super::kinematics::{DilationGradient, Kinematics, row_times, work_along};
+use super::kinematics::{
+    DilationGradient, Kinematics, row_times, volume_symbols, volume_values, work_along,
+};
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
+use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A volumetric part, `kappa U(J)`.
@@ -97,12 +99,13 @@ struct Invariants {
     slope_at_rest: Expr,
     slope_change: Expr,
     curvature: Expr,
-    /// `J U'`, and `J^2 U''` as its value at rest and the rest.
+    /// `J U'`.
     pressure: Expr,
     /// The measure `m` of the change of volume, `J U' - kappa m`, and `m - tr(C - I)/2`, both of second order.
     measure: Expr,
     pressure_beside: Expr,
     measure_beyond_trace: Expr,
+    /// `J^2 U''` as its value at rest and the rest.
     stiffness_at_rest: Expr,
     stiffness_change: Expr,
     energy: Expr,
@@ -155,28 +158,22 @@ impl Invariants {
         let (_, isochoric) = graph.split_at_zero(isochoric, &small);
 
         // In v = J - 1, of which the pressure is small.
-        let (J, v) = (graph.symbol("J"), graph.symbol("J - 1"));
-        let sum = graph.add(one, v);
+        let J = graph.symbol("J");
+        let [v, sum] = volume_symbols(graph);
         let energy = graph.mul(volume.kappa, volume.energy);
-        let volumetric = graph.replace(energy, &BTreeMap::from([(J, sum)]));
+        let in_v = BTreeMap::from([(J, sum)]);
+        let [volumetric, measure, beside] =
+            [energy, volume.measure, volume.beside].map(|of_J| graph.replace(of_J, &in_v));
         let small = BTreeSet::from([v]);
         let of_volume = derivatives.of(graph, volumetric, v);
         let of_slope_of_volume = derivatives.of(graph, of_volume, v);
         let pressure = graph.mul(sum, of_volume);
-        let in_v = BTreeMap::from([(J, sum)]);
-        let [measure, beside] =
-            [volume.measure, volume.beside].map(|of_J| graph.replace(of_J, &in_v));
         let beside = graph.mul(volume.kappa, beside);
         let (_, pressure) = graph.split_at_zero(pressure, &small);
         let stiffness = graph.product_of([sum, sum, of_slope_of_volume]);
         let (stiffness_at_rest, stiffness_change) = graph.split_at_zero(stiffness, &small);
         let (_, volumetric) = graph.split_at_zero(volumetric, &small);
-        let of_volume = BTreeMap::from([
-            (sum, deformation.J),
-            (v, deformation.volume_change),
-            (graph.call(Function::Ln1p, &[v]), deformation.log_J),
-            (graph.call(Function::Ln, &[sum]), deformation.log_J),
-        ]);
+        let of_volume = volume_values(graph, deformation);
         let at = |graph: &mut Graph, expr, values: &BTreeMap<Expr, Expr>| {
             let value = graph.replace(expr, values);
             graph.whole(value)

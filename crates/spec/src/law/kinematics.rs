@@ -1,11 +1,12 @@
 //! Measures of strain that are small where the displacement gradient is, and what laws in invariants need of their gradients.
 
-use super::{Deformation, zero_if_vanishing};
+use super::energy::modulus_at_rest;
+use super::{Deformation, Divergence, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Measures of the strain of one deformation.
 pub(super) struct Kinematics {
@@ -152,14 +153,85 @@ impl Kinematics {
 
 /// The sum of `ln(1 + x) - x` over the entries `x` of a diagonal displacement gradient.
 fn of_stretches(graph: &mut Graph, deformation: &Deformation) -> Option<Expr> {
-    let H = &deformation.H;
-    let n = H.len();
-    let is_diagonal = (0..n).all(|i| (0..n).all(|j| i == j || H[i][j] == Graph::ZERO));
-    is_diagonal.then(|| {
+    deformation.is_diagonal().then(|| {
+        let H = &deformation.H;
         let terms: Vec<Expr> =
-            (0..n).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
+            (0..H.len()).map(|i| graph.call(Function::Ln1pMinusX, &[H[i][i]])).collect();
         graph.sum_of(terms)
     })
+}
+
+/// The symbol of `v = J - 1` in energies, and `1 + v`.
+pub(super) fn volume_symbols(graph: &mut Graph) -> [Expr; 2] {
+    let v = graph.symbol("J - 1");
+    [v, graph.add(Graph::ONE, v)]
+}
+
+/// What stands for `v`, `1 + v` and logarithms of it at a deformation.
+pub(super) fn volume_values(graph: &mut Graph, deformation: &Deformation) -> BTreeMap<Expr, Expr> {
+    let [v, sum] = volume_symbols(graph);
+    BTreeMap::from([
+        (sum, deformation.J),
+        (v, deformation.volume_change),
+        (graph.call(Function::Ln1p, &[v]), deformation.log_J),
+        (graph.call(Function::Ln, &[sum]), deformation.log_J),
+    ])
+}
+
+/// Of a stress `S A + N F^-T` with `A = F` less a multiple of `F^-T`, all that its divergence is made of,
+/// `Div P = S Div F + A grad S + F^-T (...)`.
+pub(super) struct ChainRule<'a> {
+    pub(super) A: &'a Matrix,
+    /// `S`, at rest and what it is more, and its gradient.
+    pub(super) S: Expr,
+    pub(super) S_at_rest: Expr,
+    pub(super) S_change: Expr,
+    pub(super) of_S: Vector,
+    /// The factor of `F^-T g` at rest, and all that `F^-T` is applied to, without that and with it.
+    pub(super) modulus: Expr,
+    pub(super) change: Vector,
+    pub(super) all: Vector,
+}
+
+impl ChainRule<'_> {
+    pub(super) fn divergence(
+        self,
+        derivation: &mut Derivation,
+        deformation: &Deformation,
+        kinematics: &Kinematics,
+        DilationGradient { of_M, g }: &DilationGradient,
+    ) -> Divergence {
+        let f = &deformation.inverse_transpose;
+        let open = derivation.divergence(&deformation.open);
+        let of_H = derivation.divergence(&deformation.H);
+        let graph = &mut derivation.graph;
+        let trace = deformation.trace(graph);
+        // With J = 1 everywhere, what belongs to the change of volume adds up to zero.
+        let modulus = if deformation.is_isochoric() { Graph::ZERO } else { self.modulus };
+        let open_mu = modulus_at_rest(graph, self.S_at_rest);
+        let open_modulus = modulus_at_rest(graph, modulus);
+        let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
+        for i in 0..f.len() {
+            let dilation = derivation.along(trace, i);
+            let graph = &mut derivation.graph;
+            let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
+            linear.push(graph.sum_of(first));
+            let Mg = row_times(graph, &kinematics.M, i, g);
+            let of_volume = graph.add(of_M[i], Mg);
+            let of_volume = graph.mul(modulus, of_volume);
+            let of_S = row_times(graph, self.A, i, &self.of_S);
+            let rest = [
+                row_times(graph, f, i, &self.change),
+                graph.neg(of_volume),
+                of_S,
+                graph.mul(self.S_change, of_H[i]),
+            ];
+            remainder.push(graph.sum_of(rest));
+            let all = [row_times(graph, f, i, &self.all), of_S, graph.mul(self.S, of_H[i])];
+            whole.push(graph.sum_of(all));
+        }
+        Divergence { linear, remainder, whole }
+    }
 }
 
 /// `A : dH` along the unit vector `e_k`.

@@ -14,8 +14,8 @@
 //! diagonal `P` is formed as `(phi - psi (J - 1)) F^-T + psi (F - F^-T)`, whose factor of `F^-T` is `lambda (J - 1)` to first order.
 
 use super::energy::{RATIO, modulus_at_rest, own_symbol};
-use super::kinematics::{DilationGradient, Kinematics, row_times, work_along};
-use super::{Deformation, Stress, zero_if_vanishing};
+use super::kinematics::{ChainRule, Kinematics, volume_symbols, volume_values, work_along};
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::DeriveError;
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
@@ -66,8 +66,8 @@ pub(super) fn energy(
 }
 
 /// Whether the deformation is one in the plane whose principal directions are not those of the coordinates.
-pub(super) fn is_coupled_in_plane(H: &Matrix) -> bool {
-    H.len() == 2 && (H[0][1] != Graph::ZERO || H[1][0] != Graph::ZERO)
+pub(super) fn is_coupled_in_plane(deformation: &Deformation) -> bool {
+    deformation.H.len() == 2 && !deformation.is_diagonal()
 }
 
 /// The energy of a deformation in the plane as text in `J` and [`RATIO`].
@@ -109,11 +109,9 @@ pub(super) fn stress_in_plane(
         }
     }
 
-    let DilationGradient { of_M, g } = kinematics.dilation_gradient(derivation, deformation);
-    let mut of_z = Vector::new();
-    let mut of_psi = Vector::new();
-    let mut of_phi = (Vector::new(), Vector::new());
-    for (k, &g) in g.iter().enumerate() {
+    let dilation = kinematics.dilation_gradient(derivation, deformation);
+    let (mut of_psi, mut change, mut all) = (Vector::new(), Vector::new(), Vector::new());
+    for (k, &g) in dilation.g.iter().enumerate() {
         let of_M = work_along(derivation, &M, H, k);
         let graph = &mut derivation.graph;
         let first = graph.div(of_M, deformation.J);
@@ -121,49 +119,31 @@ pub(super) fn stress_in_plane(
         let along = graph.sub(first, second);
         let along = zero_if_vanishing(graph, along);
         let along = graph.whole(along);
-        of_z.push(along);
         let of_volume = graph.product_of([law.psi_by_v, deformation.J, g]);
         let of_ratio = graph.mul(law.psi_by_z, along);
         let sum = graph.add(of_volume, of_ratio);
         of_psi.push(graph.whole(sum));
         // Of grad phi - phi g: but for its value at rest, and all.
         let of_ratio = graph.mul(law.phi_by_z, along);
-        let change = graph.mul(law.chi_change, g);
-        let rest = graph.add(change, of_ratio);
+        let of_volume = graph.mul(law.chi_change, g);
+        let rest = graph.add(of_volume, of_ratio);
         let at_rest = graph.mul(law.chi_at_rest, g);
-        let all = graph.add(at_rest, rest);
-        of_phi.0.push(graph.whole(rest));
-        of_phi.1.push(graph.whole(all));
+        let sum = graph.add(at_rest, rest);
+        change.push(graph.whole(rest));
+        all.push(graph.whole(sum));
     }
-    let open = derivation.divergence(&deformation.open);
-    let of_H = derivation.divergence(H);
-    let trace = deformation.trace(&mut derivation.graph);
-    let modulus = match deformation.is_isochoric() {
-        true => Graph::ZERO,
-        false => law.chi_at_rest,
+    let rule = ChainRule {
+        A: &M,
+        S: law.psi,
+        S_at_rest: law.psi_at_rest,
+        S_change: law.psi_change,
+        of_S: of_psi,
+        modulus: law.chi_at_rest,
+        change,
+        all,
     };
-    let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
-    for i in 0..n {
-        let dilation = derivation.along(trace, i);
-        let graph = &mut derivation.graph;
-        let (open_mu, open_modulus) =
-            (modulus_at_rest(graph, law.psi_at_rest), modulus_at_rest(graph, modulus));
-        let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
-        linear.push(graph.sum_of(first));
-        let Mg = row_times(graph, &kinematics.M, i, &g);
-        let of_volume = graph.add(of_M[i], Mg);
-        let of_volume = graph.mul(modulus, of_volume);
-        let of_psi = row_times(graph, &M, i, &of_psi);
-        let rest = [
-            row_times(graph, f, i, &of_phi.0),
-            graph.neg(of_volume),
-            of_psi,
-            graph.mul(law.psi_change, of_H[i]),
-        ];
-        remainder.push(graph.sum_of(rest));
-        let all = [row_times(graph, f, i, &of_phi.1), of_psi, graph.mul(law.psi, of_H[i])];
-        whole.push(graph.sum_of(all));
-    }
+    let Divergence { linear, remainder, whole } =
+        rule.divergence(derivation, deformation, &kinematics, &dilation);
     let (isotropic, energy) = (law.phi, Some(law.energy));
     Stress { P, isotropic, anisotropic, linear, remainder, whole: Some(whole), energy }
 }
@@ -212,9 +192,9 @@ struct InPlane {
 
 impl InPlane {
     fn new(graph: &mut Graph, deformation: &Deformation, kinematics: &Kinematics, W: Expr) -> Self {
-        let (J, v) = (graph.symbol("J"), graph.symbol("J - 1"));
+        let J = graph.symbol("J");
+        let [v, sum] = volume_symbols(graph);
         let z = own_symbol(graph, RATIO);
-        let sum = graph.add(Graph::ONE, v);
         let W = graph.replace(W, &BTreeMap::from([(J, sum)]));
         let small = BTreeSet::from([v, z]);
         let mut derivatives = Derivatives::limited();
@@ -255,13 +235,8 @@ impl InPlane {
         };
 
         let ratio = ratio(graph, deformation, kinematics);
-        let actual = BTreeMap::from([
-            (sum, deformation.J),
-            (v, deformation.volume_change),
-            (z, ratio),
-            (graph.call(Function::Ln1p, &[v]), deformation.log_J),
-            (graph.call(Function::Ln, &[sum]), deformation.log_J),
-        ]);
+        let mut actual = volume_values(graph, deformation);
+        actual.insert(z, ratio);
         let mut at = |expr| {
             let value = graph.replace(expr, &actual);
             let value = zero_if_vanishing(graph, value);
