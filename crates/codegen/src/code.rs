@@ -84,12 +84,6 @@ impl<'a> Code<'a> {
         })
     }
 
-    /// Whether any operation asks for what rounding takes from a sum or a product.
-    pub(crate) fn forms_rounding_errors(&self) -> bool {
-        let mut operations = self.staged.program().operations().iter();
-        operations.any(|o| matches!(o, Operation::SumError(..) | Operation::ProductError(..)))
-    }
-
     /// The displacement and the law, a line each.
     pub(crate) fn formulas(&self) -> Vec<String> {
         let spec = self.spec;

@@ -1,12 +1,11 @@
 //! Files in languages that have functions: what they hold, and the text at their heads.
 
 use crate::code::Code;
-use crate::header::{condition, surface_name};
 use crate::runtime::{Routine, WithRuntime, routines};
-use crate::target::Called;
+use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning};
 use mmsmith_expr::{Operation, Slot};
-use mmsmith_spec::Parameter;
+use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Shape};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeSet;
@@ -193,13 +192,87 @@ In two dimensions the deformation is plane strain. Units are those of the parame
         self.spec.parameters.iter().map(about).collect()
     }
 
-    /// What is wrong with a parameter that is not admissible.
-    pub(crate) fn refusal(&self, parameter: &Parameter) -> String {
-        let mut text = format!("{} of {} must be a finite number", parameter.name, self.spec.name);
-        if !parameter.range.is_empty() {
-            text += &format!(" {}", parameter.range);
+    /// The lines that refuse parameters which are not admissible, those of the stage of the parameters, and its values; `named` is
+    /// how the language calls a parameter, by its number.
+    pub(crate) fn admitted<T: Target>(
+        &self,
+        target: &T,
+        margin: &str,
+        places: T::Places,
+        refusal: &Refusal,
+        named: impl Fn(usize) -> String,
+    ) -> Written {
+        let spec = self.spec;
+        let mut lines = String::new();
+        for (index, parameter) in spec.parameters.iter().enumerate() {
+            let name = named(index);
+            let mut condition = with(refusal.finite, &[&name]);
+            for bound in &parameter.bounds {
+                let (sign, limit) = (bound.relation.sign(), target.literal(bound.limit));
+                condition += &format!(" {} {name} {sign} {limit}", refusal.and);
+            }
+            let mut message =
+                format!("{} of {} must be a finite number", parameter.name, spec.name);
+            if !parameter.range.is_empty() {
+                message += &format!(" {}", parameter.range);
+            }
+            lines += &with(refusal.lines, &[&condition, &(refusal.string)(&message)]);
         }
-        text
+        let written = target.block(&self.staged.fixed_stage(), margin, places);
+        lines += &written.lines;
+        let (sides, fixed) = written.outputs.split_at(2 * spec.requirements.len());
+        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
+            let [left, right] = [0, 1].map(|index| with(refusal.side, &[&side[index]]));
+            let condition = format!("{left} {} {right}", requirement.relation.sign());
+            let message =
+                format!("the parameters of {} must satisfy {}", spec.name, requirement.text);
+            lines += &with(refusal.lines, &[&condition, &(refusal.string)(&message)]);
+        }
+        Written { lines, outputs: fixed.to_vec() }
+    }
+}
+
+/// How a language refuses parameters.
+pub(crate) struct Refusal {
+    /// Whether `#` is a finite number.
+    pub(crate) finite: &'static str,
+    /// What joins conditions.
+    pub(crate) and: &'static str,
+    /// A number that two sides of a condition are compared as, for `#`.
+    pub(crate) side: &'static str,
+    /// What happens unless the first `#` holds, with the second as the message.
+    pub(crate) lines: &'static str,
+    /// A literal of text.
+    pub(crate) string: fn(&str) -> String,
+}
+
+/// `template` with a part in the place of each `#`.
+fn with(template: &str, parts: &[&str]) -> String {
+    let mut pieces = template.split('#');
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    for (piece, part) in pieces.zip(parts) {
+        text.extend([*part, piece]);
+    }
+    text
+}
+
+pub(crate) fn surface_name(surface: Surface) -> String {
+    let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
+    match surface {
+        Surface::Lower(i) => format!("{}-lower", axis(i)),
+        Surface::Upper(i) => format!("{}-upper", axis(i)),
+        Surface::Inner => "inner".into(),
+        Surface::Outer => "outer".into(),
+    }
+}
+
+fn condition(boundary: &Boundary) -> &'static str {
+    match boundary.condition {
+        Condition::Sliding => "sliding",
+        Condition::Symmetry => "symmetry",
+        Condition::TractionFree => "traction-free",
+        Condition::PrescribedTraction => "prescribed traction",
+        Condition::PrescribedMotion => "prescribed motion",
     }
 }
 

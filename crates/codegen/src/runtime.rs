@@ -69,6 +69,18 @@ pub(crate) struct Routine {
     pub(crate) steps: Vec<Step>,
     /// Its value.
     pub(crate) result: String,
+    /// The same for languages in which a function can end early: nothing is computed that its value does not need.
+    pub(crate) body: Vec<Line>,
+}
+
+/// A line of a function that can end early.
+pub(crate) enum Line {
+    /// A statement that names a value.
+    Step(Step),
+    /// Lines that end the function where the condition holds.
+    If(String, Vec<Line>),
+    /// The value of the function.
+    Return(String),
 }
 
 /// A statement that names a value.
@@ -110,18 +122,79 @@ fn visit<T: WithRuntime>(
     for name in called {
         visit(target, name, done, routines);
     }
-    let step = |(name, term): &(String, Term)| Step {
-        name: name.clone(),
-        value: term.spell(target),
-        is_condition: matches!(term, Term::Primitive(p, _) if p.is_condition()),
-    };
+    let mut body = Vec::new();
+    function.lines(target, &function.result, &mut vec![false; function.steps.len()], &mut body);
     routines.push(Routine {
         name,
         about: function.about,
         arguments: function.arguments.clone(),
-        steps: function.steps.iter().map(step).collect(),
+        steps: function.steps.iter().map(|step| spelled(target, step)).collect(),
         result: function.result.spell(target),
+        body,
     });
+}
+
+fn spelled<T: WithRuntime>(target: &T, (name, term): &(String, Term)) -> Step {
+    Step {
+        name: name.clone(),
+        value: term.spell(target),
+        is_condition: matches!(term, Term::Primitive(p, _) if p.is_condition()),
+    }
+}
+
+impl Function {
+    /// The lines that return `term`; `done` says which steps have a line before them.
+    fn lines<T: WithRuntime>(
+        &self,
+        target: &T,
+        term: &Term,
+        done: &mut [bool],
+        lines: &mut Vec<Line>,
+    ) {
+        let branched = term.choice().filter(|[_, first, second]| {
+            // Where both need the same and call nothing, the choice is one of values.
+            self.needs(first) != self.needs(second) || first.works() || second.works()
+        });
+        let now = if branched.is_some() { self.always_needs(term) } else { self.needs(term) };
+        for ((step, done), _) in self.steps.iter().zip(&mut *done).zip(now).filter(|(_, now)| *now)
+        {
+            if !std::mem::replace(done, true) {
+                lines.push(Line::Step(spelled(target, step)));
+            }
+        }
+        let Some([condition, first, second]) = branched else {
+            return lines.push(Line::Return(term.spell(target)));
+        };
+        let mut then = Vec::new();
+        self.lines(target, first, &mut done.to_vec(), &mut then);
+        lines.push(Line::If(condition.spell(target), then));
+        self.lines(target, second, done, lines);
+    }
+
+    /// Which steps a term is made of.
+    fn needs(&self, term: &Term) -> Vec<bool> {
+        let mut needed = vec![false; self.steps.len()];
+        self.need(term, &mut needed);
+        needed
+    }
+
+    /// Those of them that it is made of whatever its choices are.
+    fn always_needs(&self, term: &Term) -> Vec<bool> {
+        let Some([condition, first, second]) = term.choice() else { return self.needs(term) };
+        let ways = self.always_needs(first).into_iter().zip(self.always_needs(second));
+        let both = ways.map(|(first, second)| first && second);
+        self.needs(condition).into_iter().zip(both).map(|(now, both)| now || both).collect()
+    }
+
+    fn need(&self, term: &Term, needed: &mut [bool]) {
+        if let Term::Name(name) = term
+            && let Some(index) = self.steps.iter().position(|(step, _)| step == name)
+            && !std::mem::replace(&mut needed[index], true)
+        {
+            self.need(&self.steps[index].1, needed);
+        }
+        term.parts().iter().for_each(|part| self.need(part, needed));
+    }
 }
 
 impl Primitive {
@@ -159,6 +232,24 @@ impl Term {
             _ => {}
         }
         self.parts().iter().for_each(|part| part.calls(log1p, names));
+    }
+
+    /// The condition and the two values of a choice.
+    fn choice(&self) -> Option<&[Term; 3]> {
+        match self {
+            Term::Primitive(Primitive::Choose, parts) => parts[..].try_into().ok(),
+            _ => None,
+        }
+    }
+
+    /// Whether it is more than a name or a number with a sign.
+    fn works(&self) -> bool {
+        match self {
+            Term::Number(_) | Term::Name(_) => false,
+            Term::Negative(part) => part.works(),
+            Term::Primitive(Primitive::Choose, parts) => parts[1..].iter().any(Term::works),
+            _ => true,
+        }
     }
 
     /// How strongly it binds.

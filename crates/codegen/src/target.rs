@@ -122,9 +122,9 @@ pub(crate) enum Called {
 
 impl Called {
     pub(crate) fn of(function: Function) -> Self {
-        match function.c_support() {
-            Some(_) => Called::Support(function.c().strip_prefix("mmsmith_").unwrap_or_default()),
-            None => Called::Library(function.c()),
+        match function.own() {
+            Some(name) => Called::Support(name),
+            None => Called::Library(function.math_h().unwrap_or_default()),
         }
     }
 

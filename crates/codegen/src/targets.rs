@@ -1,6 +1,7 @@
 //! The hosts that files are written for: a row each.
 
 mod abaqus;
+mod c;
 mod cpp;
 mod febio;
 mod fortran;

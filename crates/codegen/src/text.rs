@@ -1,5 +1,6 @@
 //! Text from specifications, made harmless, and pieces of code joined.
 
+use crate::function::digits;
 use mmsmith_expr::{Operation, Slot};
 use std::fmt::Write;
 
@@ -37,6 +38,16 @@ pub(crate) fn spell(
         }
         text.push_str(piece);
     }
+}
+
+/// `template` with the text of each place between two signs `@`, by the name that stands there.
+pub(crate) fn filled(template: &str, place: impl Fn(&str) -> String) -> String {
+    let pieces = template.split('@').enumerate();
+    let text = |(index, piece): (usize, &str)| match index % 2 {
+        0 => piece.to_owned(),
+        _ => place(piece),
+    };
+    pieces.map(text).collect()
 }
 
 /// Writes an index in decimal digits.
@@ -77,6 +88,13 @@ pub(crate) fn comment(text: &str) -> String {
         safe.push(c);
     }
     safe
+}
+
+/// A double of C; negative ones with a minus sign.
+pub(crate) fn c_number(value: f64) -> String {
+    let sign = if value.is_sign_negative() { "-" } else { "" };
+    let size = if value.is_infinite() { "HUGE_VAL".into() } else { digits(value.abs()) };
+    format!("{sign}{size}")
 }
 
 /// A C string literal.

@@ -11,7 +11,7 @@ mod replacement;
 
 pub use build::BuildError;
 pub use derivative::Derivatives;
-pub use function::{CSupport, Function, RustCall};
+pub use function::{Function, RustCall};
 pub use parse::{Ast, AstKind, ParseError};
 pub use rational::{Rational, nearest_f64};
 pub use replacement::Replacement;

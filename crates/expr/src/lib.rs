@@ -36,8 +36,8 @@ mod program;
 mod rewrite;
 
 pub use graph::{
-    Ast, AstKind, BuildError, CSupport, Derivatives, Expr, Function, Graph, Node, ParseError,
-    Rational, Replacement, RustCall, nearest_f64,
+    Ast, AstKind, BuildError, Derivatives, Expr, Function, Graph, Node, ParseError, Rational,
+    Replacement, RustCall, nearest_f64,
 };
 pub use program::{
     Dependence, Drafts, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program,

@@ -2,7 +2,7 @@
 
 use super::fortran::{module, module_name, with_head};
 use crate::code::Code;
-use crate::header::surface_name;
+use crate::listing::surface_name;
 use crate::target::Unwritable;
 use mmsmith_stage::Measures;
 

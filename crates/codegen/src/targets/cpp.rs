@@ -2,12 +2,11 @@
 
 use crate::c_names::{c_name, members};
 use crate::code::Code;
-use crate::function::digits;
-use crate::listing::{Given, Item, commented};
-use crate::module::Names;
+use crate::listing::{Given, Item, Refusal, commented};
+use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
-use crate::text::{c_string, push_index};
+use crate::text::{c_number, c_string, push_index};
 use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
 
@@ -145,13 +144,7 @@ impl Target for Cpp {
     const STATEMENT: [&'static str; 2] = ["const auto ", ";\n"];
 
     fn literal(&self, value: f64) -> String {
-        let sign = if value.is_sign_negative() { "-" } else { "" };
-        let size = value.abs();
-        if size.is_infinite() {
-            format!("{sign}HUGE_VAL")
-        } else {
-            format!("{sign}{}", digits(size))
-        }
+        c_number(value)
     }
 
     fn function(&self, function: Called) -> Cow<'static, str> {
@@ -188,6 +181,14 @@ impl WithRuntime for Cpp {
     }
 }
 
+const REFUSAL: Refusal = Refusal {
+    finite: "std::isfinite(#)",
+    and: "&&",
+    side: "#",
+    lines: "        if (!(#)) {\n            throw std::invalid_argument(#);\n        }\n",
+    string: c_string,
+};
+
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let spec = code.spec;
     let space = c_name(&Names::of(&spec.name).module);
@@ -221,30 +222,11 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         spec.dimension
     );
     text += "    explicit Solution(const Parameters &parameters = Parameters()) : par(parameters), fixed()\n    {\n";
-    for (parameter, member) in spec.parameters.iter().zip(&cpp.members) {
-        let bounds = parameter
-            .bounds
-            .iter()
-            .map(|b| format!(" && par.{member} {} {}", b.relation.sign(), cpp.literal(b.limit)));
-        text += &format!(
-            "        if (!(std::isfinite(par.{member}){})) {{\n            throw std::invalid_argument({});\n        }}\n",
-            bounds.collect::<String>(),
-            c_string(&code.refusal(parameter))
-        );
-    }
-    let Written { lines, outputs } = cpp.block(&code.staged.fixed_stage(), "        ", ());
+    let Written { lines, outputs: fixed } =
+        code.admitted(&cpp, "        ", (), &REFUSAL, |index| {
+            format!("par.{}", cpp.members[index])
+        });
     text += &lines;
-    let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
-    for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-        let message = format!("the parameters of {} must satisfy {}", spec.name, requirement.text);
-        text += &format!(
-            "        if (!({} {} {})) {{\n            throw std::invalid_argument({});\n        }}\n",
-            side[0],
-            requirement.relation.sign(),
-            side[1],
-            c_string(&message)
-        );
-    }
     for (index, value) in fixed.iter().enumerate() {
         text += &format!("        fixed[{index}] = {value};\n");
     }

@@ -2,8 +2,8 @@
 
 use crate::code::Code;
 use crate::function::digits;
-use crate::listing::{Given, Item, commented};
-use crate::module::Names;
+use crate::listing::{Given, Item, Refusal, commented};
+use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
 use crate::text::one_line;
@@ -100,6 +100,15 @@ fn string(text: &str) -> String {
     pieces.collect::<Vec<_>>().join(" // &\n            ")
 }
 
+const REFUSAL: Refusal = Refusal {
+    // Bounds hold for infinite numbers, and none for what is no number.
+    finite: "abs(#) <= huge(1.0_dp)",
+    and: ".and.",
+    side: "#",
+    lines: "    if (.not. (#)) then\n      message = #\n      return\n    end if\n",
+    string,
+};
+
 pub(super) fn module_name(code: &Code<'_>) -> String {
     format!("mms_{}", Names::of(&code.spec.name).module).chars().take(50).collect()
 }
@@ -173,7 +182,7 @@ pub(super) fn module(code: &Code<'_>) -> String {
 
 impl Fortran {
     fn body(&self, code: &Code<'_>, items: &[Item]) -> String {
-        let (spec, d) = (code.spec, code.spec.dimension);
+        let d = code.spec.dimension;
         let mut text = String::from(
             "
   elemental real(dp) function choose(first, a, b)
@@ -208,31 +217,9 @@ impl Fortran {
         let block = code.staged.fixed_stage();
         text += &temporaries(&block);
         text += "    message = \"\"\n    s%par = p\n";
-        for (parameter, member) in spec.parameters.iter().zip(&self.members) {
-            // Bounds hold for infinite numbers, and none for what is no number.
-            let bounds = parameter.bounds.iter().map(|b| {
-                format!(" .and. p%{member} {} {}", b.relation.sign(), self.literal(b.limit))
-            });
-            text += &format!(
-                "    if (.not. (abs(p%{member}) <= huge(1.0_dp){})) then\n      message = {}\n      return\n    end if\n",
-                bounds.collect::<String>(),
-                string(&code.refusal(parameter))
-            );
-        }
-        let Written { lines, outputs } = self.block(&block, "    ", ());
+        let Written { lines, outputs: fixed } =
+            code.admitted(self, "    ", (), &REFUSAL, |index| format!("p%{}", self.members[index]));
         text += &lines;
-        let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
-        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-            let message = string(&format!(
-                "the parameters of {} must satisfy {}",
-                spec.name, requirement.text
-            ));
-            let sign = requirement.relation.sign();
-            text += &format!(
-                "    if (.not. ({} {sign} {})) then\n      message = {message}\n      return\n    end if\n",
-                side[0], side[1]
-            );
-        }
         for (index, value) in fixed.iter().enumerate() {
             text += &format!("    s%fixed({}) = {value}\n", index + 1);
         }

@@ -2,8 +2,8 @@
 
 use crate::code::Code;
 use crate::function::digits;
-use crate::listing::{Given, Item, commented};
-use crate::module::Names;
+use crate::listing::{Given, Item, Refusal, commented};
+use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
 use crate::text::one_line;
@@ -90,6 +90,14 @@ fn string(text: &str) -> String {
     literal + "\""
 }
 
+const REFUSAL: Refusal = Refusal {
+    finite: "isfinite(#)",
+    and: "&&",
+    side: "#",
+    lines: "    (#) || throw(ArgumentError(#))\n",
+    string,
+};
+
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     if code.calls(|function| function == Function::Erf) {
         let (function, solution) = (Function::Erf.name().to_owned(), code.spec.name.clone());
@@ -134,31 +142,10 @@ function Solution(given::Pair...)
         spec.dimension,
         named.join(", ")
     );
-    for (index, parameter) in spec.parameters.iter().enumerate() {
-        let own = format!("s.par[{}]", index + 1);
-        let bounds = parameter
-            .bounds
-            .iter()
-            .map(|b| format!(" && {own} {} {}", b.relation.sign(), Julia.literal(b.limit)));
-        text += &format!(
-            "    (isfinite({own}){}) || throw(ArgumentError({}))\n",
-            bounds.collect::<String>(),
-            string(&code.refusal(parameter))
-        );
-    }
-    let Written { lines, outputs } = Julia.block(&code.staged.fixed_stage(), "    ", ());
+    let Written { lines, outputs: fixed } =
+        code.admitted(&Julia, "    ", (), &REFUSAL, |index| format!("s.par[{}]", index + 1));
     text += &lines;
-    let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
-    for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-        text += &format!(
-            "    ({} {} {}) || throw(ArgumentError({}))\n",
-            side[0],
-            requirement.relation.sign(),
-            side[1],
-            string(&format!("the parameters of {} must satisfy {}", spec.name, requirement.text))
-        );
-    }
-    text += &format!("    return Solution(s.par, {})\nend\n", tuple(fixed));
+    text += &format!("    return Solution(s.par, {})\nend\n", tuple(&fixed));
     for item in code.functions() {
         text += &julia_item(code, &item);
     }

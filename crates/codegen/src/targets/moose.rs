@@ -3,7 +3,7 @@
 use super::strings::{Field, Strings, head};
 use crate::code::Code;
 use crate::listing::commented;
-use crate::module::Names;
+use crate::names::Names;
 use crate::target::Unwritable;
 
 const REMARKS: &str = "\

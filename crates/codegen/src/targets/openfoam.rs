@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::listing::commented;
-use crate::module::Names;
+use crate::names::Names;
 use crate::target::Unwritable;
 
 const REMARKS: &str = "\

@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::function::digits;
-use crate::listing::{Given, Item, commented};
+use crate::listing::{Given, Item, Refusal, commented};
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Written};
 use crate::text::{one_line, push_index};
@@ -85,6 +85,14 @@ fn string(text: &str) -> String {
     literal + "\""
 }
 
+const REFUSAL: Refusal = Refusal {
+    finite: "math.isfinite(#)",
+    and: "and",
+    side: "float(#)",
+    lines: "        if not (#):\n            raise ValueError(#)\n",
+    string,
+};
+
 impl Python {
     /// The text of a module.
     pub(crate) fn source(&self, code: &Code<'_>) -> String {
@@ -115,31 +123,9 @@ impl Python {
                 raise TypeError(f\"{self.NAME} has no parameter {name!r}; it has {', '.join(self.DEFAULTS)}\")
         par = [float(x) for x in {**self.DEFAULTS, **parameters}.values()]
         self.par, self.fixed = par, []\n";
-        for (index, parameter) in spec.parameters.iter().enumerate() {
-            let bounds = parameter.bounds.iter().map(|b| {
-                format!(" and par[{index}] {} {}", b.relation.sign(), self.literal(b.limit))
-            });
-            text += &format!(
-                "        if not (math.isfinite(par[{index}]){}):\n            raise ValueError({})\n",
-                bounds.collect::<String>(),
-                string(&code.refusal(parameter))
-            );
-        }
-        let Written { lines, outputs } = self.block(&code.staged.fixed_stage(), "        ", ());
+        let Written { lines, outputs: fixed } =
+            code.admitted(self, "        ", (), &REFUSAL, |index| format!("par[{index}]"));
         text += &lines;
-        let (sides, fixed) = outputs.split_at(2 * spec.requirements.len());
-        for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-            text += &format!(
-                "        if not (float({}) {} float({})):\n            raise ValueError({})\n",
-                side[0],
-                requirement.relation.sign(),
-                side[1],
-                string(&format!(
-                    "the parameters of {} must satisfy {}",
-                    spec.name, requirement.text
-                ))
-            );
-        }
         text += &format!("        self.fixed = [float(x) for x in [{}]]\n", fixed.join(", "));
         for item in code.functions() {
             text += &self.item(code, &item);

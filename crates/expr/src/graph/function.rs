@@ -26,21 +26,6 @@ pub enum RustCall {
     Library(&'static str),
 }
 
-/// Functions that C lacks, or has with other bits than Rust: a header defines them where it calls them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CSupport {
-    /// Logarithms of sums with one.
-    Logarithm,
-    /// Logarithms of sums with one, less the other term; they call the former.
-    LogarithmRest,
-    /// Squared logarithms of ratios.
-    LogRatio,
-    /// Hyperbolic cosines of roots.
-    CoshSqrt,
-    /// Positive parts.
-    PositivePart,
-}
-
 /// What is known of a function.
 struct Row {
     /// What text calls it: the name that it is printed with, then other spellings.
@@ -63,8 +48,8 @@ struct Row {
     rust: RustCall,
     /// The function of `math.h`, if there is one; listings in C may call it.
     math_h: Option<&'static str>,
-    /// What a header calls instead of it.
-    own: Option<(&'static str, CSupport)>,
+    /// What languages that lack the function, or have it with other bits than Rust, call instead: a function of the project.
+    own: Option<&'static str>,
 }
 
 impl Row {
@@ -243,7 +228,7 @@ functions! {
         steepness: Some(|x| 1.0 / (1.0 + x).abs()),
         rust: RustCall::Method("log_1p"),
         math_h: Some("log1p"),
-        own: Some(("mmsmith_log_1p", CSupport::Logarithm)),
+        own: Some("log_1p"),
     }
     /// `ln(1 + x) - x`, accurate for small `x`.
     Ln1pMinusX {
@@ -254,7 +239,7 @@ functions! {
         single: ScalarFunctions::log_1p_minus_x,
         steepness: Some(|x| (x / (1.0 + x)).abs()),
         rust: RustCall::Method("log_1p_minus_x"),
-        own: Some(("mmsmith_log_1p_minus_x", CSupport::LogarithmRest)),
+        own: Some("log_1p_minus_x"),
     }
     /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: accurate next to one, where `x` has the digits, and next to zero,
     /// where `y` has them.
@@ -268,7 +253,7 @@ functions! {
         single: ScalarFunctions::log_1p,
         steepness: Some(|x| 1.0 / (1.0 + x).abs()),
         rust: RustCall::Method("ln_of_both"),
-        own: Some(("mmsmith_ln_of_both", CSupport::Logarithm)),
+        own: Some("ln_of_both"),
     }
     /// `exp(x) - 1`, accurate for small `x`.
     Expm1 {
@@ -308,7 +293,7 @@ functions! {
         double: ScalarFunctions::log_ratio_squared,
         single: ScalarFunctions::log_ratio_squared,
         rust: RustCall::Method("log_ratio_squared"),
-        own: Some(("mmsmith_log_ratio_squared", CSupport::LogRatio)),
+        own: Some("log_ratio_squared"),
     }
     /// Half the slope of [`Function::LogRatioSquared`] less one, `arcosh(1 + z)/sqrt(z (z + 2)) - 1`.
     LogRatioSlope {
@@ -318,7 +303,7 @@ functions! {
         double: ScalarFunctions::log_ratio_slope,
         single: ScalarFunctions::log_ratio_slope,
         rust: RustCall::Method("log_ratio_slope"),
-        own: Some(("mmsmith_log_ratio_slope", CSupport::LogRatio)),
+        own: Some("log_ratio_slope"),
     }
     /// The derivative of [`Function::LogRatioSlope`].
     LogRatioCurvature {
@@ -329,7 +314,7 @@ functions! {
         double: ScalarFunctions::log_ratio_curvature,
         single: ScalarFunctions::log_ratio_curvature,
         rust: RustCall::Method("log_ratio_curvature"),
-        own: Some(("mmsmith_log_ratio_curvature", CSupport::LogRatio)),
+        own: Some("log_ratio_curvature"),
     }
     /// `cosh(sqrt(y)) - 1` for `y` from zero on, smooth at zero: for `y = n^2 lnratio2(z)` it is `((a/b)^n + (b/a)^n)/2 - 1`.
     CoshSqrtM1 {
@@ -339,7 +324,7 @@ functions! {
         double: ScalarFunctions::cosh_sqrt_m1,
         single: ScalarFunctions::cosh_sqrt_m1,
         rust: RustCall::Method("cosh_sqrt_m1"),
-        own: Some(("mmsmith_cosh_sqrt_m1", CSupport::CoshSqrt)),
+        own: Some("cosh_sqrt_m1"),
     }
     /// Twice the slope of [`Function::CoshSqrtM1`] less one, `sinh(sqrt(y))/sqrt(y) - 1`.
     CoshSqrtM1Slope {
@@ -349,7 +334,7 @@ functions! {
         double: ScalarFunctions::cosh_sqrt_m1_slope,
         single: ScalarFunctions::cosh_sqrt_m1_slope,
         rust: RustCall::Method("cosh_sqrt_m1_slope"),
-        own: Some(("mmsmith_cosh_sqrt_m1_slope", CSupport::CoshSqrt)),
+        own: Some("cosh_sqrt_m1_slope"),
     }
     /// The derivative of [`Function::CoshSqrtM1Slope`].
     CoshSqrtM1Curvature {
@@ -360,7 +345,7 @@ functions! {
         double: ScalarFunctions::cosh_sqrt_m1_curvature,
         single: ScalarFunctions::cosh_sqrt_m1_curvature,
         rust: RustCall::Method("cosh_sqrt_m1_curvature"),
-        own: Some(("mmsmith_cosh_sqrt_m1_curvature", CSupport::CoshSqrt)),
+        own: Some("cosh_sqrt_m1_curvature"),
     }
     /// `max(x, 0)`.
     PositivePart {
@@ -371,7 +356,7 @@ functions! {
         single: ScalarFunctions::positive_part,
         steepness: Some(|_| 1.0),
         rust: RustCall::Method("positive_part"),
-        own: Some(("mmsmith_positive_part", CSupport::PositivePart)),
+        own: Some("positive_part"),
     }
     /// The derivative of [`Function::PositivePart`]: one for `x > 0`, else zero.
     PositivePartSlope {
@@ -382,7 +367,7 @@ functions! {
         double: ScalarFunctions::positive_part_slope,
         single: ScalarFunctions::positive_part_slope,
         rust: RustCall::Method("positive_part_slope"),
-        own: Some(("mmsmith_positive_part_slope", CSupport::PositivePart)),
+        own: Some("positive_part_slope"),
     }
 }
 
@@ -420,17 +405,11 @@ impl Function {
         self.row().rust
     }
 
-    /// The name by which generated C calls it.
+    /// The function of the project that generated code has for it where a language lacks it, or has it with other bits than
+    /// Rust; `None` where that of `math.h` is called.
     #[must_use]
-    pub fn c(self) -> &'static str {
-        let row = self.row();
-        row.own.map(|(name, _)| name).or(row.math_h).unwrap_or_default()
-    }
-
-    /// What a header has to define to call it; `None` where `math.h` is enough.
-    #[must_use]
-    pub fn c_support(self) -> Option<CSupport> {
-        self.row().own.map(|(_, support)| support)
+    pub fn own(self) -> Option<&'static str> {
+        self.row().own
     }
 
     /// Its name in `math.h`, if it has one.
@@ -588,7 +567,7 @@ mod tests {
         for (name, function) in Function::names() {
             assert!(seen.insert(name), "{name} twice");
             assert_eq!(Function::from_name(name), Some(function));
-            assert!(!function.c().is_empty(), "{name} in C");
+            assert!(function.own().or(function.math_h()).is_some(), "{name} in C");
         }
         for &function in Function::ALL {
             assert_eq!(Function::from_name(function.name()), Some(function));
