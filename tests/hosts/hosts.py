@@ -2,7 +2,7 @@
 
     python hosts.py MMS FOLDER [--solutions NAME|FILE,...] HOST...
 
-Hosts: cpp, fortran, abaqus, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
+Hosts: cpp, fortran, abaqus, calculix, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
 
 Differences are told in units of 2^-52 of the largest entry of the field over all points; LARGEST says what a host may have. Zero
 means the same bits.
@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 SPECS = HERE.parents[1] / "mms-specs"
 FIELDS = {"u": 1, "v": 1, "a": 1, "H": 2, "F": 2, "J": 0, "P": 2, "b": 1}
 POINTS = 1000
-LARGEST = {"cpp": 0, "fortran": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32}
+LARGEST = {"cpp": 0, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
 
 
 class Refused(Exception):
@@ -142,7 +142,7 @@ def fortran_program(case, source, driver, points):
     place = source.parent / source.stem
     place.mkdir(exist_ok=True)
     module = re.search(r"(?m)^module (\w+)$", source.read_text())[1]
-    (place / "driver.f90").write_text((HERE / driver).read_text().replace("MODULE", module))
+    (place / "driver.f90").write_text((HERE / driver).read_text().replace("MODULE", module).replace("DIMENSION", str(case.dimension)))
     strict = ["-std=f2008", "-O1", "-ffp-contract=off", "-Wall", "-Wno-unused-dummy-argument", "-Wno-unused-function", "-Werror"]
     call(["gfortran", *strict, source, "driver.f90", "-o", "program"], cwd=place)
     points.tofile(place / "points.bin")
@@ -168,6 +168,11 @@ def abaqus(case):
     if not largest <= 1e-12 * scale:
         raise SystemExit(f"abaqus: {case.name}: the force at current positions is off by {largest}")
     return {}
+
+
+def calculix(case):
+    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
+    return case.unpacked(fortran_program(case, case.generate("calculix", "_calculix.f90"), "calculix.f90", points), {"rho0_b": 1})
 
 
 def python_fields(solution, X, t):
@@ -367,18 +372,42 @@ def febio(case):
     for field in ALL:
         entries = root.findall(f"field[@name='{field}']/entry")
         found[field] = np.column_stack([value(entry.text) for entry in entries])
-    load = root.find("body_load")
-    minus_b = [value(load.find(axis).text) for axis in "xyz"[: case.dimension]]
+    # FEBio ends a component at a comma outside of parentheses.
+    components, depth = [""], 0
+    for letter in root.find("body_load/force").text:
+        depth += {"(": 1, ")": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            components.append("")
+        else:
+            components[-1] += letter
+    assert len(components) == 3, case.name
+    minus_b = [value(text) for text in components[: case.dimension]]
     assert np.array_equal(np.column_stack(minus_b), -found["b"]), f"{case.name}: the load is not -b"
     return found
 
 
 def julia(case):
-    """No host here: the syntax, by a parser of Julia."""
+    """In the Julia that the variable JULIA names, a command; without it the syntax alone, by a parser."""
+    text = case.generate("julia", ".jl").read_bytes()
+    if "JULIA" in os.environ:
+        module = re.search(rb"(?m)^module (\w+)$", text)[1].decode()
+        numbers = " ".join(repr(number) for number in np.column_stack([case.X, case.t]).ravel().tolist())
+        driver = f"""
+            using .{module}: {", ".join(ALL)}
+            s = {module}.Solution()
+            flat(value) = value isa Number ? [value] : reduce(vcat, map(flat, collect(value)))
+            points = reshape(parse.(Float64, split("{numbers}")), {case.dimension + 1}, :)
+            for k in 1:size(points, 2)
+                X, t = Tuple(points[1:{case.dimension}, k]), points[end, k]
+                for field in ({", ".join(ALL)},)
+                    write(stdout, Float64.(flat(field(s, X, t))))
+                end
+            end
+            """
+        return case.unpacked(call([*os.environ["JULIA"].split(), "-e", "include_string(Main, read(stdin, String))"], input=text + driver.encode()), ALL)
     import tree_sitter
     import tree_sitter_julia
 
-    text = case.generate("julia", ".jl").read_bytes()
     tree = tree_sitter.Parser(tree_sitter.Language(tree_sitter_julia.language())).parse(text)
     assert not tree.root_node.has_error, f"{case.name}: no Julia"
     functions = set(re.findall(rb"(?m)^function (\w+)\(s, X, t\)", text))
@@ -431,7 +460,7 @@ def main():
                 moose_program(folder)
             run = tried(globals()[host])
             chosen = cases
-            compiled = host in ("cpp", "fortran", "openfoam", "abaqus", "moose")
+            compiled = host in ("cpp", "fortran", "openfoam", "abaqus", "calculix", "moose")
             results = list((pool.map if compiled else map)(run, chosen))
             refused = [case.name for case, found in zip(chosen, results) if found is None]
             chosen, results = [c for c, f in zip(chosen, results) if f is not None], [f for f in results if f is not None]
@@ -439,7 +468,7 @@ def main():
                 print(f"{host:9}refuses {len(refused)} solutions: {' '.join(refused)}")
             if not chosen:
                 continue
-            if host not in LARGEST:
+            if host not in LARGEST or not any(results):
                 print(f"{host:9}{len(chosen)} solutions")
                 continue
             worst = {case.name: case.compare(found) for case, found in zip(chosen, results)}

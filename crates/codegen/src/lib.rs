@@ -14,20 +14,19 @@
 mod c_names;
 mod code;
 mod fault;
-mod function;
 mod listing;
-mod module;
 mod names;
 mod registry;
 mod runtime;
+mod rust;
 mod target;
 mod targets;
 mod text;
 
 pub use code::{Code, Origin};
 pub use fault::{Fault, NoEffect, UnknownFault};
-pub use module::items;
 pub use names::Names;
 pub use registry::{NameClash, registry_source};
+pub use rust::items;
 pub use target::{Host, Unwritable};
 pub use targets::HOSTS;

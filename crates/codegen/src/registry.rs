@@ -1,7 +1,7 @@
 //! The module that lists the solutions of the library.
 
-use crate::module::pretty;
 use crate::names::Names;
+use crate::rust::pretty;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 use std::collections::BTreeMap;

@@ -2,6 +2,7 @@
 
 mod abaqus;
 mod c;
+mod calculix;
 mod cpp;
 mod febio;
 mod fortran;
@@ -48,6 +49,12 @@ pub const HOSTS: &[Host] = &[
         about: "user subroutines DLOAD, VDLOAD and UTRACLOAD, which find X from current coordinates",
         ending: "_abaqus.f90",
         write: abaqus::source,
+    },
+    Host {
+        name: "calculix",
+        about: "the user subroutine dload of CalculiX",
+        ending: "_calculix.f90",
+        write: calculix::source,
     },
     Host {
         name: "numpy",

@@ -1,6 +1,5 @@
 //! Text from specifications, made harmless, and pieces of code joined.
 
-use crate::function::digits;
 use mmsmith_expr::{Operation, Slot};
 use std::fmt::Write;
 
@@ -88,6 +87,17 @@ pub(crate) fn comment(text: &str) -> String {
         safe.push(c);
     }
     safe
+}
+
+/// The shortest digits that read back as the same double, in a form that both Rust and C take for floating point.
+pub(crate) fn digits(magnitude: f64) -> String {
+    // The plain notation of very large and very small numbers has hundreds of digits.
+    let text = if magnitude != 0.0 && !(1e-5..1e16).contains(&magnitude) {
+        format!("{magnitude:e}")
+    } else {
+        format!("{magnitude:?}")
+    };
+    if text.contains(['.', 'e']) { text } else { format!("{text}.0") }
 }
 
 /// A double of C; negative ones with a minus sign.

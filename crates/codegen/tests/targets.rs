@@ -84,7 +84,7 @@ fn every_host_writes_or_says_which_function_it_lacks() {
 fn fortran_stays_within_its_lines() {
     for spec in specifications() {
         let code = Code::new(&spec).unwrap();
-        for name in ["fortran", "abaqus"] {
+        for name in ["fortran", "abaqus", "calculix"] {
             let text = host(name).source(&code).unwrap();
             let longest = text.lines().map(|line| line.chars().count()).max().unwrap();
             assert!(longest <= 132, "{name} of {}: {longest}", spec.name);

@@ -266,6 +266,7 @@ const SYNTAX: &[Syntax] = &[
     Syntax { host: "cpp", comments: &[LINE, BLOCK], strings: Strings::Escaped },
     Syntax { host: "fortran", comments: &[EXCLAMATION], strings: Strings::Doubled },
     Syntax { host: "abaqus", comments: &[EXCLAMATION], strings: Strings::Doubled },
+    Syntax { host: "calculix", comments: &[EXCLAMATION], strings: Strings::Doubled },
     Syntax { host: "numpy", comments: &[HASH], strings: Strings::Escaped },
     Syntax { host: "jax", comments: &[HASH], strings: Strings::Escaped },
     Syntax { host: "ufl", comments: &[HASH], strings: Strings::Escaped },

@@ -12,7 +12,6 @@ on surfaces whose names hold X_LOWER, X_UPPER, ..., INNER or OUTER.
 Abaqus hands over CURRENT coordinates x; the force is a function of X. The subroutines solve x = X + u(X, t) for the X of the body by Newton's method with \
 the solution's own F, so that the displacement of the host does not matter: the force is that of the exact motion, which carries X to the same x. As the host's \
 own x is X + u + error, the force is taken at a place that is off by that error, which has the order of the method.
-In CalculiX the routine dload.f has other arguments: put f = force(coords, time(2), i) into it, or force_at_reference(X, t, i) with X from co.
 The force is rho0_b, per reference volume; set per_current_volume = .true. where the host's loads are per current volume, \
 and is_static = .true. in a static step, whose total time is that of the deformation.
 Parameters are those of the type `parameters`; change the defaults there, or write the file anew with --set.";

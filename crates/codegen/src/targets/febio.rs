@@ -7,8 +7,8 @@ use crate::target::Unwritable;
 const REMARKS: &str = "\
 Expressions for FEBio in X, Y, Z (the REFERENCE position) and t. In two dimensions the third component is zero.
 The body load's force is MINUS b: FEBio takes a force per mass, multiplies it by the density and the reference volume, and SUBTRACTS it \
-(as read in its source; try a constant force first). `b` and `rho0_b` are given beside it with their own signs.
-Some versions of FEBio copy an expression into 512 characters without asking: build it with a longer copy where an expression here is longer.";
+(seen in FEBio 4). `b` and `rho0_b` are given beside it with their own signs.
+FEBio 4 copies an expression into 512 characters without asking: where one here is longer, build it with a larger `szcopy` in FECore/MObjBuilder.cpp.";
 
 const FEBIO: Strings = Strings {
     host: "febio",
@@ -48,13 +48,16 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         about.concat()
     );
     let load = fields.iter().find(|field| field.name == "b");
-    text += "  <body_load type=\"non-const\">\n";
-    for (index, axis) in ["x", "y", "z"].iter().enumerate() {
-        let component = load.and_then(|field| field.entries.get(index));
-        let force = component.map_or("0".to_owned(), |entry| format!("0-{}", entry.text));
-        text += &format!("    <{axis}>{force}</{axis}>\n");
-    }
-    text += "  </body_load>\n";
+    let component = |index: usize| {
+        let entry = load.and_then(|field| field.entries.get(index));
+        entry.map_or("0".to_owned(), |entry| format!("0-{}", entry.text))
+    };
+    text += &format!(
+        "  <body_load type=\"body force\">\n    <force type=\"math\">{},{},{}</force>\n  </body_load>\n",
+        component(0),
+        component(1),
+        component(2)
+    );
     for Field { name, about, entries } in &fields {
         text += &format!("  <field name=\"{name}\"> <!-- {} -->\n", escaped(about));
         for entry in entries {

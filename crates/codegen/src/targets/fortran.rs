@@ -1,11 +1,11 @@
 //! Fortran 2008 source: a module.
 
 use crate::code::Code;
-use crate::function::digits;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
+use crate::text::digits;
 use crate::text::one_line;
 use mmsmith_spec::Parameter;
 use mmsmith_stage::{Operand, Shape};

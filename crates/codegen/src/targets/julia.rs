@@ -1,11 +1,11 @@
 //! Julia source.
 
 use crate::code::Code;
-use crate::function::digits;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
+use crate::text::digits;
 use crate::text::one_line;
 use mmsmith_expr::Function;
 use mmsmith_stage::{Operand, Shape};

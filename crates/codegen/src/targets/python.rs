@@ -1,10 +1,10 @@
 //! Python source; its hosts differ in the library that they compute with.
 
 use crate::code::Code;
-use crate::function::digits;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Written};
+use crate::text::digits;
 use crate::text::{one_line, push_index};
 use mmsmith_stage::{Operand, Shape, Stage};
 use std::borrow::Cow;

@@ -1,9 +1,9 @@
 //! Expressions for hosts that read them from an input file: no functions, and the parameters are numbers.
 
 use crate::code::Code;
-use crate::function::digits;
 use crate::listing::Given;
 use crate::target::{Called, Unwritable, arithmetic};
+use crate::text::digits;
 use crate::text::spell;
 use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
 use mmsmith_stage::{Operand, Shape};
@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 pub(crate) const ACCURACY: &str = "\
 The parameters are numbers in the expressions: write the file anew with --set for others. sin(pi x) is formed as it stands, and ln(1 + x) as \
 ln(y) x/(y - 1) with y = 1 + x, which keeps the digits of a small x.";
+
+/// The number zero, as [`number`] writes it.
+const ZERO: &str = "0.0";
 
 /// How a host writes expressions.
 pub(crate) struct Strings {
@@ -192,8 +195,11 @@ impl Strings {
             }
             Operation::LnOfBoth(..) => self.logarithm(code, one())?,
             // What rounding takes is less than what these expressions lose.
-            Operation::SumError(..) | Operation::ProductError(..) => "0.0".to_owned(),
+            Operation::SumError(..) | Operation::ProductError(..) => ZERO.to_owned(),
             Operation::Call(Function::Ln1p, _) => self.logarithm(code, one())?,
+            Operation::Call(Function::Ln1pMinusX, _) => {
+                format!("({} - {})", self.logarithm(code, one())?, one())
+            }
             Operation::Call(Function::PositivePart, _) => format!("(0.5*({0} + abs({0})))", one()),
             Operation::Call(Function::PositivePartSlope, _) => {
                 format!("(0.5 + 0.5*{0}/(abs({0}) + 1e-300))", one())
@@ -204,6 +210,10 @@ impl Strings {
             Operation::Call(function, _) => {
                 self.call(code, Called::of(*function), *function, operands)?
             }
+            // What would be lost in rounding, above all.
+            Operation::Mul(..) if one() == ZERO || other() == ZERO => ZERO.to_owned(),
+            Operation::Add(..) | Operation::Sub(..) if other() == ZERO => one().to_owned(),
+            Operation::Add(..) if one() == ZERO => other().to_owned(),
             other_operation => {
                 let mut operands = [one(), other()].into_iter();
                 let mut text = String::from("(");

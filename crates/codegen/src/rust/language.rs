@@ -1,7 +1,7 @@
 //! Blocks of operations as Rust statements.
 
 use crate::target::{Called, Target, Written, arithmetic};
-use crate::text::push_index;
+use crate::text::{digits, push_index};
 use mmsmith_expr::{Operation, Rational, RustCall, nearest_f64};
 use mmsmith_stage::{Block, Operand, Stage};
 use num_traits::{One, Zero};
@@ -180,17 +180,6 @@ pub(crate) fn float(value: f64) -> TokenStream {
     let text = digits(magnitude);
     let literal = text.parse::<Literal>().unwrap_or_else(|_| Literal::f64_unsuffixed(magnitude));
     quote!(#sign #literal)
-}
-
-/// The shortest digits that read back as the same double, in a form that both Rust and C take for floating point.
-pub(crate) fn digits(magnitude: f64) -> String {
-    // The plain notation of very large and very small numbers has hundreds of digits.
-    let text = if magnitude != 0.0 && !(1e-5..1e16).contains(&magnitude) {
-        format!("{magnitude:e}")
-    } else {
-        format!("{magnitude:?}")
-    };
-    if text.contains(['.', 'e']) { text } else { format!("{text}.0") }
 }
 
 #[cfg(test)]

@@ -1,0 +1,244 @@
+//! What the solver asks a solution in Rust: fields, tractions, law, domain and boundaries.
+
+use super::Generator;
+use mmsmith_expr::Slot;
+use mmsmith_spec::{Boundary, Condition, Surface};
+use mmsmith_stage::{Measures, Shape};
+use mmsmith_vocabulary::{Components, Law, Response, Stated};
+use proc_macro2::{Literal, TokenStream};
+use quote::{format_ident, quote};
+
+impl Generator<'_> {
+    pub(super) fn solution_items(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        let vector = self.vector();
+        let matrix = quote!(#runtime::nalgebra::SMatrix<T, #n, #n>);
+        let mut items = TokenStream::new();
+        for field in &self.staged.fields {
+            let method = format_ident!("{}", field.name.in_code());
+            let block = self.staged.after_parameters(&field.outputs);
+            let (statements, values) = self.translator.statements(&block);
+            let result = self.shaped(field.name.shape(), &values);
+            let result_type = match field.name.shape() {
+                Shape::Scalar => quote!(T),
+                Shape::Vector => vector.clone(),
+                Shape::Matrix => matrix.clone(),
+            };
+            items.extend(quote! {
+                #[inline]
+                fn #method(&self, X: &#vector, t: T) -> #result_type {
+                    #statements
+                    #result
+                }
+            });
+        }
+        let (statements, values) = self.translator.statements(&self.staged.all_fields());
+        let mut values = values.as_slice();
+        let entries: Vec<TokenStream> = self
+            .staged
+            .fields
+            .iter()
+            .map(|field| {
+                let (own, rest) = values.split_at(field.outputs.len());
+                values = rest;
+                let (letter, value) = (
+                    format_ident!("{}", field.name.letter()),
+                    self.shaped(field.name.shape(), own),
+                );
+                quote!(#letter: #value)
+            })
+            .collect();
+        items.extend(quote! {
+            fn fields(&self, X: &#vector, t: T) -> #runtime::Fields<T, #n> {
+                #statements
+                #runtime::Fields { #(#entries,)* }
+            }
+        });
+
+        if let Some(energy) = self.staged.energy {
+            let (statements, values) =
+                self.translator.statements(&self.staged.after_parameters(&[energy]));
+            items.extend(quote! {
+                fn strain_energy(&self, X: &#vector, t: T) -> Option<T> {
+                    #statements
+                    Some(#(#values)*)
+                }
+            });
+        }
+        items.extend(self.traction());
+        let constants = &self.staged.constants;
+        let [cell_length, density, wave_speed, period] =
+            [constants.cell_length, constants.density, constants.wave_speed, constants.period]
+                .map(|slot| self.constant(slot));
+        let law = self.law();
+        let domain = self.domain();
+        let boundaries = self.spec.boundaries.iter().map(|b| boundary(runtime, b));
+        items.extend(quote! {
+            fn domain(&self) -> #runtime::Domain<T, #n> {
+                #domain
+            }
+            fn boundaries(&self) -> &[#runtime::Boundary] {
+                &[#(#boundaries,)*]
+            }
+            fn cell_length(&self) -> T {
+                #cell_length
+            }
+            fn law(&self) -> #runtime::Law<T> {
+                #law
+            }
+            fn density(&self) -> T {
+                #density
+            }
+            fn wave_speed(&self) -> T {
+                #wave_speed
+            }
+            fn period(&self) -> T {
+                #period
+            }
+        });
+        items
+    }
+
+    fn traction(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let n = Literal::usize_unsuffixed(self.spec.dimension);
+        let vector = quote!(#runtime::nalgebra::SVector<T, #n>);
+        let arms = self.staged.tractions.iter().map(|traction| {
+            let pattern = surface_value(runtime, traction.surface);
+            let (statements, values) =
+                self.translator.statements(&self.staged.after_parameters(&traction.outputs));
+            quote! {
+                #pattern => {
+                    #statements
+                    Some(#runtime::nalgebra::SVector::<T, #n>::new(#(#values),*))
+                }
+            }
+        });
+        quote! {
+            fn traction(
+                &self,
+                surface: #runtime::Surface,
+                X: &#vector,
+                t: T,
+            ) -> Option<#vector> {
+                match surface {
+                    #(#arms)*
+                    _ => None,
+                }
+            }
+        }
+    }
+
+    /// A parameter-only scalar as an expression: a number, a parameter or a kept value.
+    fn constant(&self, slot: Slot) -> TokenStream {
+        let (statements, values) =
+            self.translator.statements(&self.staged.after_parameters(&[slot]));
+        if statements.is_empty() {
+            quote!(#(#values)*)
+        } else {
+            quote!({ #statements #(#values)* })
+        }
+    }
+
+    fn law(&self) -> TokenStream {
+        let runtime = self.runtime;
+        match &self.staged.constants.law {
+            Law::Library(material) => {
+                let row = material.row();
+                let variant = format_ident!("{}", row.variant);
+                let constants = row.constants.iter().zip(material.values());
+                let constants = constants.map(|(constant, slot)| {
+                    let (name, value) = (format_ident!("{}", constant.name), self.constant(slot));
+                    quote!(#name: #value,)
+                });
+                let volumetric = material.volumetric().map(|chosen| {
+                    let chosen = format_ident!("{}", chosen.variant());
+                    quote!(volumetric: #runtime::Volumetric::#chosen,)
+                });
+                quote! {
+                    #runtime::Law::Library(#runtime::Material::#variant { #(#constants)* #volumetric })
+                }
+            }
+            Law::Stated(Stated { response, components, constants }) => {
+                let response = match response {
+                    Response::Energy(W) => quote!(Energy(#W.to_owned())),
+                    Response::Stress(P) => {
+                        let rows = P.iter().map(|row| quote!(vec![#(#row.to_owned()),*]));
+                        quote!(Stress(vec![#(#rows),*]))
+                    }
+                };
+                let components = match components {
+                    Components::Cartesian => quote!(Cartesian),
+                    Components::Curvilinear => quote!(Curvilinear),
+                };
+                let constants = constants.iter().map(|(name, slot)| {
+                    let value = self.constant(*slot);
+                    quote!((#name.to_owned(), #value))
+                });
+                quote! {
+                    #runtime::Law::Stated(#runtime::Stated {
+                        response: #runtime::Response::#response,
+                        components: #runtime::Components::#components,
+                        constants: vec![#(#constants),*],
+                    })
+                }
+            }
+        }
+    }
+
+    fn domain(&self) -> TokenStream {
+        let runtime = self.runtime;
+        let constants = |slots: &[Slot]| -> Vec<TokenStream> {
+            slots.iter().map(|slot| self.constant(*slot)).collect()
+        };
+        match &self.staged.constants.domain {
+            Measures::Box { lower, upper } => {
+                let (lower, upper) = (constants(lower), constants(upper));
+                quote! {
+                    #runtime::Domain::Box {
+                        lower: #runtime::nalgebra::SVector::from([#(#lower),*]),
+                        upper: #runtime::nalgebra::SVector::from([#(#upper),*]),
+                    }
+                }
+            }
+            Measures::Annulus { inner, outer } => {
+                let (inner, outer) = (self.constant(*inner), self.constant(*outer));
+                quote!(#runtime::Domain::Annulus { inner: #inner, outer: #outer })
+            }
+        }
+    }
+}
+
+fn boundary(runtime: &TokenStream, boundary: &Boundary) -> TokenStream {
+    let surface = surface_value(runtime, boundary.surface);
+    let condition = match boundary.condition {
+        Condition::Sliding => quote!(Sliding),
+        Condition::Symmetry => quote!(Symmetry),
+        Condition::TractionFree => quote!(TractionFree),
+        Condition::PrescribedTraction => quote!(PrescribedTraction),
+        Condition::PrescribedMotion => quote!(PrescribedMotion),
+    };
+    quote! {
+        #runtime::Boundary {
+            surface: #surface,
+            condition: #runtime::Condition::#condition,
+        }
+    }
+}
+
+/// A surface as an expression, and as a pattern.
+fn surface_value(runtime: &TokenStream, surface: Surface) -> TokenStream {
+    match surface {
+        Surface::Lower(axis) => {
+            let axis = Literal::usize_unsuffixed(axis);
+            quote!(#runtime::Surface::Lower(#axis))
+        }
+        Surface::Upper(axis) => {
+            let axis = Literal::usize_unsuffixed(axis);
+            quote!(#runtime::Surface::Upper(#axis))
+        }
+        Surface::Inner => quote!(#runtime::Surface::Inner),
+        Surface::Outer => quote!(#runtime::Surface::Outer),
+    }
+}
