@@ -1,11 +1,13 @@
 //! A simulation: set up once, then stepped.
 
 use std::fmt;
+use std::ops::Range;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::body::{Body, Mesh};
+use crate::body::{self, Annulus, Body, Mesh};
 use crate::body_force::BodyForce;
+use crate::clip::{self, Clip, Facet};
 use crate::corner_exchange::Exchange;
 use crate::decomposition::{Arrangement, Part, Share, admit};
 use crate::error::{SetupError, StepError};
@@ -54,6 +56,28 @@ pub trait Simulated<const D: usize>: Stressed<D> {
         share: Option<Share>,
     ) -> Result<Simulation<Self, D>, SetupError>;
 
+    /// [`Body::clipped`].
+    #[doc(hidden)]
+    fn body_clipped(
+        grid: &Grid<f64, D>,
+        per_cell: usize,
+        density: f64,
+        clip: &Clip<D>,
+    ) -> Result<(Body<Self, D>, Vec<Facet<D>>), SetupError>;
+
+    /// [`Body::annulus`].
+    #[doc(hidden)]
+    fn body_annulus(
+        ring: &Annulus<Self>,
+        spacing: Self,
+        per_cell: usize,
+        density: Self,
+    ) -> Result<Body<Self, D>, SetupError>;
+
+    /// [`Body::part`].
+    #[doc(hidden)]
+    fn body_part(body: &Body<Self, D>, own: &Range<usize>) -> Body<Self, D>;
+
     /// [`Simulation::step`].
     #[doc(hidden)]
     fn step(
@@ -73,6 +97,28 @@ macro_rules! simulated {
                 share: Option<Share>,
             ) -> Result<Simulation<Self, $D>, SetupError> {
                 Simulation::set_up(grid, body, law, settings, share)
+            }
+
+            fn body_clipped(
+                grid: &Grid<f64, $D>,
+                per_cell: usize,
+                density: f64,
+                clip: &Clip<$D>,
+            ) -> Result<(Body<Self, $D>, Vec<Facet<$D>>), SetupError> {
+                clip::body(grid, per_cell, density, clip)
+            }
+
+            fn body_annulus(
+                ring: &Annulus<Self>,
+                spacing: Self,
+                per_cell: usize,
+                density: Self,
+            ) -> Result<Body<Self, $D>, SetupError> {
+                body::annulus(ring, spacing, per_cell, density)
+            }
+
+            fn body_part(body: &Body<Self, $D>, own: &Range<usize>) -> Body<Self, $D> {
+                body::part(body, own)
             }
 
             fn step(

@@ -2,12 +2,15 @@
 
 use nalgebra::SVector;
 
+use crate::body::Body;
 use crate::body_force::BodyForce;
-use crate::decomposition::Arrangement;
+use crate::decomposition::{Arrangement, Share};
 use crate::error::{SetupError, StepError};
+use crate::grid::Grid;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::saved_state::{SavedState, SavedStateError};
+use crate::scheme::Settings;
 use crate::simulation::{Simulated, Simulation};
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
@@ -97,6 +100,19 @@ struct DrivenBody<'a, const D: usize> {
 
 /// The precisions of the solver: `f64` and `f32`.
 pub trait Scalar<const D: usize>: Simulated<D> {
+    /// [`Simulation::new`], or [`Simulation::shared_out`] where there is a share.
+    ///
+    /// # Errors
+    ///
+    /// As these.
+    fn updated_lagrangian(
+        grid: Grid<Self, D>,
+        body: Body<Self, D>,
+        law: Law<Self, D>,
+        settings: Settings<Self>,
+        share: Option<Share>,
+    ) -> Result<Box<dyn Solver<Self, D>>, SetupError>;
+
     /// A simulation in the total Lagrangian formulation.
     ///
     /// # Errors
@@ -112,6 +128,16 @@ macro_rules! scalar {
     ($($T:tt: $($D:literal)*;)*) => {
         $($(
             impl Scalar<$D> for $T {
+                fn updated_lagrangian(
+                    grid: Grid<Self, $D>,
+                    body: Body<Self, $D>,
+                    law: Law<Self, $D>,
+                    settings: Settings<Self>,
+                    share: Option<Share>,
+                ) -> Result<Box<dyn Solver<Self, $D>>, SetupError> {
+                    Ok(Box::new(Simulation::set_up(grid, body, law, settings, share)?))
+                }
+
                 fn total_lagrangian<'a>(
                     set_up: TotalSetUp<'_, $D>,
                     boundary: Box<dyn BoundaryData<$D> + 'a>,

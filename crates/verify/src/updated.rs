@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_mpm::{
-    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Share, Side, Simulation, Solver,
+    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Share, Side, Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
@@ -60,7 +60,7 @@ pub(crate) fn bytes_expected<const D: usize>(
 }
 
 /// A body that a lattice clipped with its boundary makes, at rest.
-fn clipped<T: Real, const D: usize>(
+fn clipped<T: Precision<D>, const D: usize>(
     scene: &Scene<D>,
     placement: Placement,
     per_cell: usize,
@@ -151,7 +151,7 @@ fn numbers(share: &Share) -> Range<usize> {
 
 /// The body of a case at rest in the reference configuration; where there are several processes, the share of it that this one begins
 /// with.
-fn body<T: Real, const D: usize>(
+fn body<T: Precision<D>, const D: usize>(
     scene: &Scene<D>,
     updated: &Updated,
     per_cell: usize,
@@ -245,11 +245,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
     };
     let (grid, law) = (scene.grid(), law(model.law())?);
-    let simulation = match share {
-        None => Simulation::new(grid, body, law, settings)?,
-        Some(share) => Simulation::shared_out(grid, body, share, law, settings)?,
-    };
-    Ok(Box::new(simulation))
+    Ok(T::updated_lagrangian(grid, body, law, settings, share)?)
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -20,6 +20,7 @@ use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::polygons::Polygons;
+use crate::simulation::Simulated;
 use crate::tensor::real;
 
 /// What is left of a box with less than this share of its volume is a sliver.
@@ -231,7 +232,7 @@ fn at_rest<T: RealField + Copy, const D: usize>(
     Body { particles, half_edges: Vec::new(), mesh: None, polygons: Some(polygons) }
 }
 
-impl<T: RealField + Copy, const D: usize> Body<T, D> {
+impl<T: Simulated<D>, const D: usize> Body<T, D> {
     /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
     /// clipped with its sides; and its boundary, facet by facet, but for what lies on the grid's walls. `grid` is in its own axes.
     ///
@@ -244,11 +245,21 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         density: f64,
         clip: &Clip<D>,
     ) -> Result<(Self, Vec<Facet<D>>), SetupError> {
-        match D {
-            2 => Ok(plane::body(grid, per_cell.max(1), density, clip)),
-            3 => Ok(space::body(grid, per_cell.max(1), density, clip)),
-            _ => Err(SetupError::PolygonDimension { dimension: D }),
-        }
+        T::body_clipped(grid, per_cell, density, clip)
+    }
+}
+
+/// See [`Body::clipped`].
+pub(crate) fn body<T: RealField + Copy, const D: usize>(
+    grid: &Grid<f64, D>,
+    per_cell: usize,
+    density: f64,
+    clip: &Clip<D>,
+) -> Result<(Body<T, D>, Vec<Facet<D>>), SetupError> {
+    match D {
+        2 => Ok(plane::body(grid, per_cell.max(1), density, clip)),
+        3 => Ok(space::body(grid, per_cell.max(1), density, clip)),
+        _ => Err(SetupError::PolygonDimension { dimension: D }),
     }
 }
 

@@ -78,7 +78,10 @@ fn grid<const D: usize>() -> Grid<f64, D> {
 fn clipped<const D: usize>(
     form: Form<D>,
     (angle, offset): (f64, f64),
-) -> (Body<f64, D>, Vec<Facet<D>>) {
+) -> (Body<f64, D>, Vec<Facet<D>>)
+where
+    f64: Scalar<D>,
+{
     let (sin, cos) = angle.to_radians().sin_cos();
     let turn = if angle == 0.0 { [1.0, 0.0] } else { [cos, sin] };
     let clip = Clip { sides: form.sides(), turn, offset };
@@ -132,7 +135,10 @@ fn enclosed<const D: usize>(x: &[SVector<f64, D>], facets: &[Vec<u32>]) -> f64 {
     facets.iter().map(of_facet).sum()
 }
 
-fn masses_and_slivers<const D: usize>() {
+fn masses_and_slivers<const D: usize>()
+where
+    f64: Scalar<D>,
+{
     for (form, lattice) in each_form::<D>() {
         let (body, _) = clipped(form, lattice);
         let (what, p) = (format!("{form:?} {lattice:?}"), &body.particles);
@@ -165,7 +171,10 @@ fn clipped_lattices_have_the_mass_of_the_body_and_no_slivers() {
 }
 
 /// Every facet lies between two particles, which have it in opposite directions, or on one side of the body.
-fn shared_facets<const D: usize>() {
+fn shared_facets<const D: usize>()
+where
+    f64: Scalar<D>,
+{
     // From the lowest corner on, which tells the direction of a face; an edge has it as it is.
     let from_lowest = |facet: &[u32]| {
         let lowest = (0..facet.len()).min_by_key(|k| facet[*k]).unwrap();
@@ -296,7 +305,10 @@ fn a_constant_stress_gives_no_force_to_rounding() {
     patch_test::<3>(&[Integrator::Cd, Integrator::Usf]);
 }
 
-fn moving<const D: usize>(form: Form<D>, lattice: (f64, f64)) -> Body<f64, D> {
+fn moving<const D: usize>(form: Form<D>, lattice: (f64, f64)) -> Body<f64, D>
+where
+    f64: Scalar<D>,
+{
     let (mut body, _) = clipped(form, lattice);
     let p = &mut body.particles;
     for k in 0..p.len() {

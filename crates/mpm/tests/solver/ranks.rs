@@ -462,7 +462,10 @@ fn messages_have_the_bytes_that_the_formula_says() {
 }
 
 /// A high grid without walls, and a ring or a shell of polygons with loads that flies up in it, its lattice turned.
-fn polygons<const D: usize>(speed: f64) -> (Grid<f64, D>, Body<f64, D>) {
+fn polygons<const D: usize>(speed: f64) -> (Grid<f64, D>, Body<f64, D>)
+where
+    f64: Scalar<D>,
+{
     let mut grid = Grid {
         lower: SVector::repeat(-1.5),
         spacing: if D == 2 { 0.125 } else { 0.25 },
