@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytemuck::Pod;
+use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
 use mmsmith_ranks::{Ranks, announce, exchange, gather, share};
 use nalgebra::RealField;
 
@@ -210,14 +210,14 @@ pub(crate) struct Move {
 impl Move {
     /// The move of particles `ids` to the processes `to(place)`, to each of several or to none, and the numbers of those that are here
     /// afterwards, ascending. A call of all.
-    pub(crate) fn new<I: IntoIterator<Item = usize>>(
+    pub(crate) fn new<'a>(
         ranks: Option<&Arc<dyn Ranks>>,
         ids: &[u64],
-        to: impl Fn(usize) -> I,
+        to: &dyn Fn(usize) -> &'a [usize],
     ) -> (Self, Vec<u64>) {
         let mut out = vec![Vec::new(); ranks.map_or(1, |ranks| ranks.count())];
         for p in 0..ids.len() {
-            to(p).into_iter().for_each(|rank| out[rank].push(p as u32));
+            to(p).iter().for_each(|&rank| out[rank].push(p as u32));
         }
         let stay = std::mem::take(&mut out[ranks.map_or(0, |ranks| ranks.rank())]);
         let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
@@ -235,45 +235,66 @@ impl Move {
     }
 
     pub(crate) fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
-        let others = self.coming(elements);
-        let of = |&place: &u32| {
-            let place = place as usize;
-            *elements.get(place).unwrap_or_else(|| &others[place - elements.len()])
-        };
-        self.order.iter().map(of).collect()
+        let mut all = vec![E::zeroed(); self.len()];
+        self.fill(cast_slice_mut(&mut all), cast_slice(elements), size_of::<E>());
+        all
     }
 
-    /// The elements that come, in the order in which they do.
-    fn coming<E: Pod>(&self, elements: &[E]) -> Vec<E> {
-        let pick = |places: &Vec<u32>| places.iter().map(|&p| elements[p as usize]).collect();
-        let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
-        self.ranks.as_ref().map_or_else(Vec::new, |ranks| exchange(&**ranks, &out, &self.counts))
+    /// Elements as bytes, which are the same code for every element: there are many kinds of them, and each moves rarely.
+    fn fill(&self, all: &mut [u8], elements: &[u8], size: usize) {
+        let here = elements.len() / size;
+        let list = |place: usize| &elements[place * size..(place + 1) * size];
+        let counts: Vec<usize> = self.counts.iter().map(|count| count * size).collect();
+        let others = self.coming(&list, &counts);
+        for (own, &place) in all.chunks_exact_mut(size).zip(&self.order) {
+            let place = place as usize;
+            let start = (place - here.min(place)) * size;
+            own.copy_from_slice(if place < here {
+                list(place)
+            } else {
+                &others[start..start + size]
+            });
+        }
+    }
+
+    /// The bytes that come, so many from each process, in the order in which they do; `of` has those of the elements here.
+    fn coming<'a>(&self, of: &dyn Fn(usize) -> &'a [u8], counts: &[usize]) -> Vec<u8> {
+        let pick =
+            |places: &Vec<u32>| places.iter().flat_map(|&p| of(p as usize)).copied().collect();
+        let out: Vec<Vec<u8>> = self.out.iter().map(pick).collect();
+        self.ranks.as_ref().map_or_else(Vec::new, |ranks| exchange(&**ranks, &out, counts))
     }
 
     /// The lists of those that are here afterwards.
     pub(crate) fn lists<E: Pod>(&self, lists: &Lists<E>) -> Lists<E> {
-        let here = lists.ends.len();
-        let lengths: Vec<u64> = (0..here).map(|p| lists.of(p).len() as u64).collect();
-        let coming = self.coming(&lengths);
-        let mut others = Lists { ends: Vec::with_capacity(coming.len()), elements: Vec::new() };
-        if let Some(ranks) = &self.ranks {
-            let pick = |places: &Vec<u32>| {
-                places.iter().flat_map(|&p| lists.of(p as usize)).copied().collect()
-            };
-            let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
-            let mut rest = coming.iter();
-            let of = |count: &usize| rest.by_ref().take(*count).sum::<u64>() as usize;
-            let counts: Vec<usize> = self.counts.iter().map(of).collect();
-            others.elements = exchange(&**ranks, &out, &counts);
-        }
-        let mut end = 0;
-        for length in coming {
-            end += length as usize;
-            others.ends.push(end);
-        }
+        let bytes = self.byte_lists(&lists.ends, cast_slice(&lists.elements), size_of::<E>());
+        let Lists { ends, elements } = bytes;
+        let mut own = vec![E::zeroed(); elements.len() / size_of::<E>()];
+        cast_slice_mut(&mut own).copy_from_slice(&elements);
+        Lists { ends: ends.into_iter().map(|end| end / size_of::<E>()).collect(), elements: own }
+    }
+
+    fn byte_lists(&self, ends: &[usize], elements: &[u8], size: usize) -> Lists<u8> {
+        let here = ends.len();
+        let list = |p: usize| {
+            let start = if p == 0 { 0 } else { ends[p - 1] };
+            &elements[start * size..ends[p] * size]
+        };
+        let lengths: Vec<u64> = (0..here).map(|p| list(p).len() as u64).collect();
+        let counts: Vec<usize> = self.counts.iter().map(|count| count * size_of::<u64>()).collect();
+        let coming = self.coming(&|p| bytes_of(&lengths[p]), &counts);
+        let coming = coming.as_chunks().0.iter().map(|bytes| u64::from_ne_bytes(*bytes) as usize);
+        let mut rest = coming.clone();
+        let counts: Vec<usize> =
+            self.counts.iter().map(|count| rest.by_ref().take(*count).sum()).collect();
+        let ends = coming.scan(0, |end, length| {
+            *end += length;
+            Some(*end)
+        });
+        let others = Lists { ends: ends.collect(), elements: self.coming(&list, &counts) };
         Lists::new(self.order.iter().map(|&place| {
             let place = place as usize;
-            if place < here { lists.of(place) } else { others.of(place - here) }.iter().copied()
+            if place < here { list(place) } else { others.of(place - here) }.iter().copied()
         }))
     }
 

@@ -1,5 +1,6 @@
 //! Elements that processes have read from files, found by their numbers: each is first brought to a process that follows from its number.
 
+use std::slice;
 use std::sync::Arc;
 
 use bytemuck::Pod;
@@ -36,8 +37,8 @@ impl Directory {
     /// Of the elements with these numbers, which this process has. A call of all.
     pub(crate) fn new(ranks: Option<&Arc<dyn Ranks>>, numbers: &[u64]) -> Self {
         let processes = ranks.map_or(1, |ranks| ranks.count());
-        let home = |k: usize| Some(home(numbers[k], processes));
-        let (moved, numbers) = Move::new(ranks, numbers, home);
+        let homes: Vec<usize> = numbers.iter().map(|&number| home(number, processes)).collect();
+        let (moved, numbers) = Move::new(ranks, numbers, &|k| slice::from_ref(&homes[k]));
         Self { ranks: ranks.cloned(), moved, numbers }
     }
 

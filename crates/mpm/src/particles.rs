@@ -46,6 +46,15 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
         density: T,
         inside: impl Fn(&SVector<T, D>) -> bool,
     ) -> Self {
+        Self::of_lattice(grid, per_cell, density, &inside)
+    }
+
+    fn of_lattice(
+        grid: &Grid<T, D>,
+        per_cell: usize,
+        density: T,
+        inside: &dyn Fn(&SVector<T, D>) -> bool,
+    ) -> Self {
         let fraction = real::<T>(per_cell.max(1) as f64).recip();
         let mut X = Vec::new();
         let mut place = |cell: &[usize; D]| {

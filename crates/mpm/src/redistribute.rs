@@ -4,6 +4,7 @@ mod polygons;
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::slice;
 use std::sync::Arc;
 
 use bytemuck::cast_slice;
@@ -40,7 +41,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Some(part) = &mut self.part else { return keys };
         let own = part.cut(counts);
         let holders: Vec<usize> = bins.into_iter().map(|bin| part.holder(bin)).collect();
-        if let Some(moved) = self.give(|p| Some(holders[p])) {
+        if let Some(moved) = self.give(&|p| slice::from_ref(&holders[p])) {
             moved.replace(&mut keys);
         }
         self.hold(own, keys.len());
@@ -48,10 +49,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     }
 
     /// Gives every particle to the processes `to(particle)`, and tells how they move; polygons stay.
-    pub(crate) fn give<I: IntoIterator<Item = usize>>(
-        &mut self,
-        to: impl Fn(usize) -> I,
-    ) -> Option<Move> {
+    pub(crate) fn give<'a>(&mut self, to: &dyn Fn(usize) -> &'a [usize]) -> Option<Move> {
         let Self { particles, support, part, .. } = self;
         let part = part.as_mut()?;
         let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);

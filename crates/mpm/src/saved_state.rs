@@ -4,6 +4,8 @@
 //! follows from its number, where its state is put in place, then to the process of the bin that it was sorted into before the state was
 //! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
 
+use std::slice;
+
 use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
 use mmsmith_ranks::total;
 use nalgebra::{SMatrix, SVector};
@@ -13,7 +15,7 @@ use crate::decomposition::Move;
 use crate::directory::Directory;
 use crate::particles::Particles;
 use crate::simd::Lanes;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulated, Simulation};
 use crate::state::State;
 use crate::support::Support;
 
@@ -274,12 +276,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let is_known = saved.ids.iter().all(|&id| id < all);
         self.agreed(if is_known { Ok(()) } else { Err(SavedStateError::Particles) })?;
         let per_process = all.div_ceil(processes as u64).max(1);
-        let home = |id: u64| (id / per_process) as usize;
+        let home = |id: &u64| (id / per_process) as usize;
         if let Some(part) = &self.part {
-            let ids = part.ids.clone();
-            self.give(|p| Some(home(ids[p])));
+            let homes: Vec<usize> = part.ids.iter().map(home).collect();
+            self.give(&|p| slice::from_ref(&homes[p]));
         }
-        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, |p| Some(home(saved.ids[p])));
+        let homes: Vec<usize> = saved.ids.iter().map(home).collect();
+        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, &|p| slice::from_ref(&homes[p]));
         saved.follow(&moved);
         let is_whole = match &self.part {
             Some(part) => ids == *part.ids,
@@ -344,7 +347,15 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     /// # Errors
     ///
     /// Where the state is not one of this set-up. The particles then may be those of any time, and only another state can be taken up.
-    pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+    pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError>
+    where
+        T: Simulated<D>,
+    {
+        T::take_up(self, parts)
+    }
+
+    /// See [`take_up`](Self::take_up).
+    pub(crate) fn put(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
         // The grid no longer belongs to the particles.
         self.state.is_ahead = false;
         self.steps_done = self.state.take_up(parts)?;

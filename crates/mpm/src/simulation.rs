@@ -22,6 +22,7 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::polygons::Polygons;
+use crate::saved_state::{SavedState, SavedStateError};
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
@@ -78,6 +79,13 @@ pub trait Simulated<const D: usize>: Stressed<D> {
     #[doc(hidden)]
     fn body_part(body: &Body<Self, D>, own: &Range<usize>) -> Body<Self, D>;
 
+    /// [`Simulation::take_up`].
+    #[doc(hidden)]
+    fn take_up(
+        simulation: &mut Simulation<Self, D>,
+        parts: Vec<SavedState>,
+    ) -> Result<(), SavedStateError>;
+
     /// [`Simulation::step`].
     #[doc(hidden)]
     fn step(
@@ -119,6 +127,13 @@ macro_rules! simulated {
 
             fn body_part(body: &Body<Self, $D>, own: &Range<usize>) -> Body<Self, $D> {
                 body::part(body, own)
+            }
+
+            fn take_up(
+                simulation: &mut Simulation<Self, $D>,
+                parts: Vec<SavedState>,
+            ) -> Result<(), SavedStateError> {
+                simulation.put(parts)
             }
 
             fn step(

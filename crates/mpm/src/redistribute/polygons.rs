@@ -52,7 +52,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
         let loads = LoadRecords::new(polygons, &loads);
         let (moved, numbers) =
-            Move::new(Some(&part.ranks), loads.numbers(), |load| of_loads[load].iter().copied());
+            Move::new(Some(&part.ranks), loads.numbers(), &|load| &of_loads[load]);
         let loads = loads.follow(&moved, numbers);
         let records = Records::new(polygons, 0..known.len());
         let keys = Lists::new((0..known.len()).map(|p| {
@@ -60,7 +60,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             corners.iter().map(|&corner| keys[corner as usize])
         }));
         let (turn, at_corner) = (polygons.turn, corners.at_corner);
-        let Some(moved) = self.give(|p| of_particles[p].iter().copied()) else { return Vec::new() };
+        let Some(moved) = self.give(&|p| &of_particles[p]) else { return Vec::new() };
         let (records, keys) = (records.follow(&moved), moved.lists(&keys));
 
         let bin = |p: usize, place: usize| self.bins.bin_of_key(keys.of(p)[place]);
