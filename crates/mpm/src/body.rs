@@ -8,7 +8,6 @@ use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::polygons::Polygons;
-use crate::simulation::Simulated;
 use crate::tensor::real;
 
 /// Particles, and the region of the body that each represents.
@@ -99,34 +98,6 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
             polygons: None,
             particles,
         }
-    }
-}
-
-impl<T: Simulated<D>, const D: usize> Body<T, D> {
-    /// Some successive particles alone, with their corners.
-    #[must_use]
-    pub fn part(&self, own: &Range<usize>) -> Self {
-        T::body_part(self, own)
-    }
-
-    /// A ring at rest, fitted by polar cells of equal width and angle. Particles lie at the exact centroids of the cells
-    /// and have their exact areas; their quadrilaterals share corners, which lie on the rims and on the planes of
-    /// symmetry.
-    ///
-    /// With `per_cell` particles in a length `spacing` there are `round(per_cell (outer - inner) / spacing)` cells across
-    /// (1 at least), and around as many in each quarter as make them square at the mean radius.
-    ///
-    /// # Errors
-    ///
-    /// [`SetupError::PolarDimension`] in other dimensions than two, and [`SetupError::NotPositive`] for radii or a density
-    /// that are none.
-    pub fn annulus(
-        ring: &Annulus<T>,
-        spacing: T,
-        per_cell: usize,
-        density: T,
-    ) -> Result<Self, SetupError> {
-        T::body_annulus(ring, spacing, per_cell, density)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::decomposition::Move;
 use crate::directory::Directory;
 use crate::particles::Particles;
 use crate::simd::Lanes;
-use crate::simulation::{Simulated, Simulation};
+use crate::simulation::Simulation;
 use crate::state::State;
 use crate::support::Support;
 
@@ -339,19 +339,6 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         let mut state = vec![bytes_of(&self.steps_done)];
         state.extend(self.state.arrays());
         state
-    }
-
-    /// Goes on from a state that was saved, of a simulation with the same set-up on any number of processes, to the bits of that one. Each
-    /// process gives the parts that it has read; a call of all.
-    ///
-    /// # Errors
-    ///
-    /// Where the state is not one of this set-up. The particles then may be those of any time, and only another state can be taken up.
-    pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError>
-    where
-        T: Simulated<D>,
-    {
-        T::take_up(self, parts)
     }
 
     /// See [`take_up`](Self::take_up).

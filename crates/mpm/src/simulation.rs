@@ -1,13 +1,11 @@
 //! A simulation: set up once, then stepped.
 
 use std::fmt;
-use std::ops::Range;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::body::{self, Annulus, Body, Mesh};
+use crate::body::{Body, Mesh};
 use crate::body_force::BodyForce;
-use crate::clip::{self, Clip, Facet};
 use crate::corner_exchange::Exchange;
 use crate::decomposition::{Arrangement, Part, Share, admit};
 use crate::error::{SetupError, StepError};
@@ -22,7 +20,6 @@ use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::polygons::Polygons;
-use crate::saved_state::{SavedState, SavedStateError};
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
@@ -57,35 +54,6 @@ pub trait Simulated<const D: usize>: Stressed<D> {
         share: Option<Share>,
     ) -> Result<Simulation<Self, D>, SetupError>;
 
-    /// [`Body::clipped`].
-    #[doc(hidden)]
-    fn body_clipped(
-        grid: &Grid<f64, D>,
-        per_cell: usize,
-        density: f64,
-        clip: &Clip<D>,
-    ) -> Result<(Body<Self, D>, Vec<Facet<D>>), SetupError>;
-
-    /// [`Body::annulus`].
-    #[doc(hidden)]
-    fn body_annulus(
-        ring: &Annulus<Self>,
-        spacing: Self,
-        per_cell: usize,
-        density: Self,
-    ) -> Result<Body<Self, D>, SetupError>;
-
-    /// [`Body::part`].
-    #[doc(hidden)]
-    fn body_part(body: &Body<Self, D>, own: &Range<usize>) -> Body<Self, D>;
-
-    /// [`Simulation::take_up`].
-    #[doc(hidden)]
-    fn take_up(
-        simulation: &mut Simulation<Self, D>,
-        parts: Vec<SavedState>,
-    ) -> Result<(), SavedStateError>;
-
     /// [`Simulation::step`].
     #[doc(hidden)]
     fn step(
@@ -105,35 +73,6 @@ macro_rules! simulated {
                 share: Option<Share>,
             ) -> Result<Simulation<Self, $D>, SetupError> {
                 Simulation::set_up(grid, body, law, settings, share)
-            }
-
-            fn body_clipped(
-                grid: &Grid<f64, $D>,
-                per_cell: usize,
-                density: f64,
-                clip: &Clip<$D>,
-            ) -> Result<(Body<Self, $D>, Vec<Facet<$D>>), SetupError> {
-                clip::body(grid, per_cell, density, clip)
-            }
-
-            fn body_annulus(
-                ring: &Annulus<Self>,
-                spacing: Self,
-                per_cell: usize,
-                density: Self,
-            ) -> Result<Body<Self, $D>, SetupError> {
-                body::annulus(ring, spacing, per_cell, density)
-            }
-
-            fn body_part(body: &Body<Self, $D>, own: &Range<usize>) -> Body<Self, $D> {
-                body::part(body, own)
-            }
-
-            fn take_up(
-                simulation: &mut Simulation<Self, $D>,
-                parts: Vec<SavedState>,
-            ) -> Result<(), SavedStateError> {
-                simulation.put(parts)
             }
 
             fn step(

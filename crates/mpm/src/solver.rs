@@ -1,9 +1,12 @@
 //! Solvers of any scheme behind one door, compiled with this crate.
 
+use std::ops::Range;
+
 use nalgebra::SVector;
 
-use crate::body::Body;
+use crate::body::{self, Annulus, Body};
 use crate::body_force::BodyForce;
+use crate::clip::{self, Clip, Facet};
 use crate::decomposition::{Arrangement, Share};
 use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
@@ -92,13 +95,69 @@ pub struct TotalSetUp<'a, const D: usize> {
     pub motion: &'a dyn Fn(&SVector<f64, D>) -> [SVector<f64, D>; 2],
 }
 
+impl<T: Scalar<D>, const D: usize> Body<T, D> {
+    /// Some successive particles alone, with their corners.
+    #[must_use]
+    pub fn part(&self, own: &Range<usize>) -> Self {
+        T::body_part(self, own)
+    }
+
+    /// A ring at rest, fitted by polar cells of equal width and angle. Particles lie at the exact centroids of the cells
+    /// and have their exact areas; their quadrilaterals share corners, which lie on the rims and on the planes of
+    /// symmetry.
+    ///
+    /// With `per_cell` particles in a length `spacing` there are `round(per_cell (outer - inner) / spacing)` cells across
+    /// (1 at least), and around as many in each quarter as make them square at the mean radius.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::PolarDimension`] in other dimensions than two, and [`SetupError::NotPositive`] for radii or a density
+    /// that are none.
+    pub fn annulus(
+        ring: &Annulus<T>,
+        spacing: T,
+        per_cell: usize,
+        density: T,
+    ) -> Result<Self, SetupError> {
+        T::body_annulus(ring, spacing, per_cell, density)
+    }
+
+    /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
+    /// clipped with its sides; and its boundary, facet by facet, but for what lies on the grid's walls. `grid` is in its own axes.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::PolygonDimension`] in one dimension.
+    pub fn clipped(
+        grid: &Grid<f64, D>,
+        per_cell: usize,
+        density: f64,
+        clip: &Clip<D>,
+    ) -> Result<(Self, Vec<Facet<D>>), SetupError> {
+        T::body_clipped(grid, per_cell, density, clip)
+    }
+}
+
+impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
+    /// Goes on from a state that was saved, of a simulation with the same set-up on any number of processes, to the bits of that one. Each
+    /// process gives the parts that it has read; a call of all.
+    ///
+    /// # Errors
+    ///
+    /// Where the state is not one of this set-up. The particles then may be those of any time, and only another state can be taken up.
+    pub fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        T::take_up(self, parts)
+    }
+}
+
 /// A body in the total Lagrangian formulation, with given motion and traction on its sides.
 struct DrivenBody<'a, const D: usize> {
     body: TotalLagrangian<D>,
     boundary: Box<dyn BoundaryData<D> + 'a>,
 }
 
-/// The precisions of the solver: `f64` and `f32`.
+/// The precisions of the solver: `f64` and `f32`. The functions here are not generic, so that they are compiled with this crate, and not
+/// again by whoever sets a solver up.
 pub trait Scalar<const D: usize>: Simulated<D> {
     /// [`Simulation::new`], or [`Simulation::shared_out`] where there is a share.
     ///
@@ -112,6 +171,35 @@ pub trait Scalar<const D: usize>: Simulated<D> {
         settings: Settings<Self>,
         share: Option<Share>,
     ) -> Result<Box<dyn Solver<Self, D>>, SetupError>;
+
+    /// [`Body::clipped`].
+    #[doc(hidden)]
+    fn body_clipped(
+        grid: &Grid<f64, D>,
+        per_cell: usize,
+        density: f64,
+        clip: &Clip<D>,
+    ) -> Result<(Body<Self, D>, Vec<Facet<D>>), SetupError>;
+
+    /// [`Body::annulus`].
+    #[doc(hidden)]
+    fn body_annulus(
+        ring: &Annulus<Self>,
+        spacing: Self,
+        per_cell: usize,
+        density: Self,
+    ) -> Result<Body<Self, D>, SetupError>;
+
+    /// [`Body::part`].
+    #[doc(hidden)]
+    fn body_part(body: &Body<Self, D>, own: &Range<usize>) -> Body<Self, D>;
+
+    /// [`Simulation::take_up`].
+    #[doc(hidden)]
+    fn take_up(
+        simulation: &mut Simulation<Self, D>,
+        parts: Vec<SavedState>,
+    ) -> Result<(), SavedStateError>;
 
     /// A simulation in the total Lagrangian formulation.
     ///
@@ -136,6 +224,35 @@ macro_rules! scalar {
                     share: Option<Share>,
                 ) -> Result<Box<dyn Solver<Self, $D>>, SetupError> {
                     Ok(Box::new(Simulation::set_up(grid, body, law, settings, share)?))
+                }
+
+                fn body_clipped(
+                    grid: &Grid<f64, $D>,
+                    per_cell: usize,
+                    density: f64,
+                    clip: &Clip<$D>,
+                ) -> Result<(Body<Self, $D>, Vec<Facet<$D>>), SetupError> {
+                    clip::body(grid, per_cell, density, clip)
+                }
+
+                fn body_annulus(
+                    ring: &Annulus<Self>,
+                    spacing: Self,
+                    per_cell: usize,
+                    density: Self,
+                ) -> Result<Body<Self, $D>, SetupError> {
+                    body::annulus(ring, spacing, per_cell, density)
+                }
+
+                fn body_part(body: &Body<Self, $D>, own: &Range<usize>) -> Body<Self, $D> {
+                    body::part(body, own)
+                }
+
+                fn take_up(
+                    simulation: &mut Simulation<Self, $D>,
+                    parts: Vec<SavedState>,
+                ) -> Result<(), SavedStateError> {
+                    simulation.put(parts)
                 }
 
                 fn total_lagrangian<'a>(

@@ -20,7 +20,6 @@ use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::polygons::Polygons;
-use crate::simulation::Simulated;
 use crate::tensor::real;
 
 /// What is left of a box with less than this share of its volume is a sliver.
@@ -230,23 +229,6 @@ fn at_rest<T: RealField + Copy, const D: usize>(
         half_size: SVector::repeat(real(0.5 * spacing)),
     };
     Body { particles, half_edges: Vec::new(), mesh: None, polygons: Some(polygons) }
-}
-
-impl<T: Simulated<D>, const D: usize> Body<T, D> {
-    /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
-    /// clipped with its sides; and its boundary, facet by facet, but for what lies on the grid's walls. `grid` is in its own axes.
-    ///
-    /// # Errors
-    ///
-    /// [`SetupError::PolygonDimension`] in one dimension.
-    pub fn clipped(
-        grid: &Grid<f64, D>,
-        per_cell: usize,
-        density: f64,
-        clip: &Clip<D>,
-    ) -> Result<(Self, Vec<Facet<D>>), SetupError> {
-        T::body_clipped(grid, per_cell, density, clip)
-    }
 }
 
 /// See [`Body::clipped`].
