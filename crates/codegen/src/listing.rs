@@ -3,7 +3,7 @@
 use crate::code::Code;
 use crate::runtime::{Routine, WithRuntime, routines};
 use crate::target::{Called, Target, Written};
-use crate::text::{comment, meaning};
+use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};
 use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
 use mmsmith_stage::{Block, Measures, Shape};
@@ -206,7 +206,7 @@ In two dimensions the deformation is plane strain. Units are those of the parame
         let mut lines = String::new();
         for (index, parameter) in spec.parameters.iter().enumerate() {
             let name = named(index);
-            let mut condition = with(refusal.finite, &[&name]);
+            let mut condition = with(refusal.finite, [&name]);
             for bound in &parameter.bounds {
                 let (sign, limit) = (bound.relation.sign(), target.literal(bound.limit));
                 condition += &format!(" {} {name} {sign} {limit}", refusal.and);
@@ -216,17 +216,17 @@ In two dimensions the deformation is plane strain. Units are those of the parame
             if !parameter.range.is_empty() {
                 message += &format!(" {}", parameter.range);
             }
-            lines += &with(refusal.lines, &[&condition, &(refusal.string)(&message)]);
+            lines += &with(refusal.lines, [&condition, &(refusal.string)(&message)]);
         }
         let written = target.block(&self.staged.fixed_stage(), margin, places);
         lines += &written.lines;
         let (sides, fixed) = written.outputs.split_at(2 * spec.requirements.len());
         for (requirement, side) in spec.requirements.iter().zip(sides.chunks(2)) {
-            let [left, right] = [0, 1].map(|index| with(refusal.side, &[&side[index]]));
+            let [left, right] = [0, 1].map(|index| with(refusal.side, [&side[index]]));
             let condition = format!("{left} {} {right}", requirement.relation.sign());
             let message =
                 format!("the parameters of {} must satisfy {}", spec.name, requirement.text);
-            lines += &with(refusal.lines, &[&condition, &(refusal.string)(&message)]);
+            lines += &with(refusal.lines, [&condition, &(refusal.string)(&message)]);
         }
         Written { lines, outputs: fixed.to_vec() }
     }
@@ -244,16 +244,6 @@ pub(crate) struct Refusal {
     pub(crate) lines: &'static str,
     /// A literal of text.
     pub(crate) string: fn(&str) -> String,
-}
-
-/// `template` with a part in the place of each `#`.
-fn with(template: &str, parts: &[&str]) -> String {
-    let mut pieces = template.split('#');
-    let mut text = pieces.next().unwrap_or_default().to_owned();
-    for (piece, part) in pieces.zip(parts) {
-        text.extend([*part, piece]);
-    }
-    text
 }
 
 pub(crate) fn surface_name(surface: Surface) -> String {

@@ -1,6 +1,7 @@
 //! The functions of `runtime.txt`, for every language.
 
 use crate::target::{Called, Target};
+use crate::text::with;
 use std::collections::{BTreeMap, BTreeSet};
 use std::iter::Peekable;
 use std::str::Chars;
@@ -271,6 +272,9 @@ impl Term {
         let infix = |sign: &str, [left, right]: &[Term; 2], rank: u8| {
             format!("{} {sign} {}", within(left, rank), within(right, rank + 1))
         };
+        let call = |template: &str, parts: &[Term]| {
+            with(template, parts.iter().map(|part| part.spell(target)))
+        };
         match self {
             Term::Number(value) => target.literal(*value),
             Term::Name(name) => name.clone(),
@@ -279,26 +283,11 @@ impl Term {
             Term::Difference(parts) => infix("-", parts, 1),
             Term::Product(parts) => infix("*", parts, 2),
             Term::Quotient(parts) => infix("/", parts, 2),
-            Term::Primitive(primitive, parts) => fill(target, target.primitive(*primitive), parts),
-            Term::Library(name, parts) => {
-                fill(target, &target.function(Called::Library(name)), parts)
-            }
-            Term::Support(name, parts) => {
-                fill(target, &target.function(Called::Support(name)), parts)
-            }
+            Term::Primitive(primitive, parts) => call(target.primitive(*primitive), parts),
+            Term::Library(name, parts) => call(&target.function(Called::Library(name)), parts),
+            Term::Support(name, parts) => call(&target.function(Called::Support(name)), parts),
         }
     }
-}
-
-/// `template` with a part in the place of each `#`.
-fn fill<T: WithRuntime>(target: &T, template: &str, parts: &[Term]) -> String {
-    let mut pieces = template.split('#');
-    let mut text = pieces.next().unwrap_or_default().to_owned();
-    for (piece, part) in pieces.zip(parts) {
-        text += &part.spell(target);
-        text += piece;
-    }
-    text
 }
 
 /// Reads `runtime.txt`; what is wrong in it is left out, which the tests notice.

@@ -39,6 +39,16 @@ pub(crate) fn spell(
     }
 }
 
+/// `template` with a part in the place of each `#`.
+pub(crate) fn with(template: &str, parts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let mut pieces = template.split('#');
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    for (piece, part) in pieces.zip(parts) {
+        text.extend([part.as_ref(), piece]);
+    }
+    text
+}
+
 /// `template` with the text of each place between two signs `@`, by the name that stands there.
 pub(crate) fn filled(template: &str, place: impl Fn(&str) -> String) -> String {
     let pieces = template.split('@').enumerate();

@@ -247,12 +247,9 @@ impl Move {
         let counts: Vec<usize> = self.counts.iter().map(|count| count * size).collect();
         let others = self.coming(&list, &counts);
         for (own, &place) in all.chunks_exact_mut(size).zip(&self.order) {
-            let place = place as usize;
-            let start = (place - here.min(place)) * size;
-            own.copy_from_slice(if place < here {
-                list(place)
-            } else {
-                &others[start..start + size]
+            own.copy_from_slice(match (place as usize).checked_sub(here) {
+                None => list(place as usize),
+                Some(other) => &others[other * size..(other + 1) * size],
             });
         }
     }

@@ -78,7 +78,6 @@ def solve(exact, cells, degree, share=1.0):
 
 
 def main(mms, folder):
-    Path(folder).mkdir(parents=True, exist_ok=True)
     exact = solution(mms, "skew-2d", folder)
     failed = False
     for degree in (1, 2):

@@ -10,23 +10,7 @@ module MODULE_host
   ! Whether the host solves a static problem, with the time as a load factor.
   logical :: is_static = .false.
 
-  type(solution), save :: s
-  logical, save :: is_ready = .false.
-
-contains
-
-  subroutine make_ready()
-    type(parameters) :: p
-    character(:), allocatable :: message
-    if (is_ready) return
-    call prepare(s, p, message)
-    if (len(message) > 0) then
-      write (*, "(a)") message
-      error stop 2
-    end if
-    is_ready = .true.
-  end subroutine
-
+  PREPARED
   ! The X of the body with x = X + u(X, t): by Newton's method from x itself; where that leads nowhere, or out of the
   ! body, where the formulas may reach the same x again, from the place of a lattice that is carried next to x.
   function reference_position(x_now, t) result(X)

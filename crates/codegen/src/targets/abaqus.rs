@@ -1,6 +1,6 @@
 //! The user subroutines of Abaqus, around the Fortran module.
 
-use super::fortran::{module, module_name, with_head};
+use super::fortran::{module, user_subroutines, with_head};
 use crate::code::Code;
 use crate::listing::surface_name;
 use crate::target::Unwritable;
@@ -18,7 +18,6 @@ Parameters are those of the type `parameters`; change the defaults there, or wri
 
 /// The module with the user subroutines of Abaqus.
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
-    let d = code.spec.dimension;
     let tractions: String = code
         .staged
         .tractions
@@ -39,13 +38,11 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
             "norm2(X) >= inner(s) - slack .and. norm2(X) <= outer(s) + slack",
         ],
     };
-    let shim = include_str!("abaqus.f90")
+    let routines = user_subroutines(code, include_str!("abaqus.f90"))
         .replace("CORNER_LOW", low)
         .replace("CORNER_HIGH", high)
         .replace("INSIDE", inside)
-        .replace("MODULE", &module_name(code))
-        .replace("DIMENSION", &d.to_string())
         .replace("    TRACTIONS\n", &tractions);
     // The first line tells Intel's compiler that lines are free.
-    Ok(with_head(code, REMARKS, "!DIR$ FREEFORM\n") + &module(code) + &shim)
+    Ok(with_head(code, REMARKS, "!DIR$ FREEFORM\n") + &module(code) + &routines)
 }

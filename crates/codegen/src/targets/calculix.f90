@@ -8,25 +8,12 @@ module MODULE_host
   ! Whether the step is static.
   logical :: is_static = .false.
 
-  type(solution), save :: s
-  logical, save :: is_ready = .false.
-
-contains
-
+  PREPARED
   ! The force per reference volume.
   function force(X, t) result(values)
     real(dp), intent(in) :: X(DIMENSION), t
     real(dp) :: values(DIMENSION)
-    type(parameters) :: p
-    character(:), allocatable :: message
-    if (.not. is_ready) then
-      call prepare(s, p, message)
-      if (len(message) > 0) then
-        write (*, "(a)") message
-        error stop 2
-      end if
-      is_ready = .true.
-    end if
+    call make_ready()
     if (is_static) then
       values = static_force(s, X, t)
     else

@@ -1,6 +1,6 @@
 //! The user subroutine of CalculiX, around the Fortran module.
 
-use super::fortran::{module, module_name, with_head};
+use super::fortran::{module, user_subroutines, with_head};
 use crate::code::Code;
 use crate::target::Unwritable;
 
@@ -13,8 +13,6 @@ Parameters are those of the type `parameters`; change the defaults there, or wri
 
 /// The module with the user subroutine of CalculiX.
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
-    let routines = include_str!("calculix.f90")
-        .replace("MODULE", &module_name(code))
-        .replace("DIMENSION", &code.spec.dimension.to_string());
+    let routines = user_subroutines(code, include_str!("calculix.f90"));
     Ok(with_head(code, REMARKS, "") + &module(code) + &routines)
 }

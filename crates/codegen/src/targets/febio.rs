@@ -53,10 +53,8 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         entry.map_or("0".to_owned(), |entry| format!("0-{}", entry.text))
     };
     text += &format!(
-        "  <body_load type=\"body force\">\n    <force type=\"math\">{},{},{}</force>\n  </body_load>\n",
-        component(0),
-        component(1),
-        component(2)
+        "  <body_load type=\"body force\">\n    <force type=\"math\">{}</force>\n  </body_load>\n",
+        [0, 1, 2].map(component).join(",")
     );
     for Field { name, about, entries } in &fields {
         text += &format!("  <field name=\"{name}\"> <!-- {} -->\n", escaped(about));

@@ -5,8 +5,7 @@ use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
-use crate::text::digits;
-use crate::text::one_line;
+use crate::text::{digits, one_line};
 use mmsmith_spec::Parameter;
 use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
@@ -121,6 +120,14 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
 /// The head of a file, after a line `start`.
 pub(super) fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
     start.to_owned() + &commented(&code.head_for_host(remarks), "!", 110)
+}
+
+/// User subroutines of a host around the module: `template` with the solution of the defaults that they share, and the names.
+pub(super) fn user_subroutines(code: &Code<'_>, template: &str) -> String {
+    template
+        .replace("  PREPARED\n", include_str!("prepared.f90"))
+        .replace("MODULE", &module_name(code))
+        .replace("DIMENSION", &code.spec.dimension.to_string())
 }
 
 /// The module of the fields.

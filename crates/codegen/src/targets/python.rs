@@ -4,8 +4,7 @@ use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Written};
-use crate::text::digits;
-use crate::text::{one_line, push_index};
+use crate::text::{digits, one_line, push_index};
 use mmsmith_stage::{Operand, Shape, Stage};
 use std::borrow::Cow;
 

@@ -3,8 +3,7 @@
 use crate::code::Code;
 use crate::listing::Given;
 use crate::target::{Called, Unwritable, arithmetic};
-use crate::text::digits;
-use crate::text::spell;
+use crate::text::{digits, spell};
 use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
 use mmsmith_stage::{Operand, Shape};
 use std::collections::BTreeMap;
@@ -13,9 +12,6 @@ use std::collections::BTreeMap;
 pub(crate) const ACCURACY: &str = "\
 The parameters are numbers in the expressions: write the file anew with --set for others. sin(pi x) is formed as it stands, and ln(1 + x) as \
 ln(y) x/(y - 1) with y = 1 + x, which keeps the digits of a small x.";
-
-/// The number zero, as [`number`] writes it.
-const ZERO: &str = "0.0";
 
 /// How a host writes expressions.
 pub(crate) struct Strings {
@@ -43,6 +39,27 @@ pub(crate) struct Entry {
     /// The field's letter and the indices, as `P_01`.
     pub(crate) name: String,
     pub(crate) text: String,
+}
+
+/// What stands for a value in an expression.
+#[derive(Clone)]
+enum Value {
+    /// Nothing but zero, with which products and sums are shorter.
+    Zero,
+    Text(String),
+}
+
+impl Value {
+    fn number(value: f64) -> Self {
+        if value.to_bits() == 0 { Value::Zero } else { Value::Text(number(value)) }
+    }
+
+    fn text(self) -> String {
+        match self {
+            Value::Zero => number(0.0),
+            Value::Text(text) => text,
+        }
+    }
 }
 
 impl Strings {
@@ -145,30 +162,41 @@ impl Strings {
     ) -> Result<String, Unwritable> {
         let block = code.staged.after_parameters(outputs);
         let fixed = code.fixed_values();
-        let mut texts: BTreeMap<usize, String> = BTreeMap::new();
+        let mut known: BTreeMap<usize, Value> = BTreeMap::new();
         let mut statements = String::new();
-        let value = |texts: &BTreeMap<usize, String>, operand: Operand<'_>| match operand {
-            Operand::Temporary(index) => texts.get(&index).cloned().unwrap_or_default(),
-            Operand::Number(value) => number(nearest_f64(value)),
-            Operand::Pi => number(std::f64::consts::PI),
-            Operand::Time => "t".to_owned(),
-            Operand::Coordinate(index) => self.coordinates[index.min(2)].to_owned(),
-            Operand::Parameter(index) => number(code.spec.parameters[index].default),
-            Operand::Kept(_, index) => number(fixed[index]),
+        let value = |known: &BTreeMap<usize, Value>, operand: Operand<'_>| match operand {
+            Operand::Temporary(index) => known.get(&index).cloned().unwrap_or(Value::Zero),
+            Operand::Number(value) => Value::number(nearest_f64(value)),
+            Operand::Pi => Value::number(std::f64::consts::PI),
+            Operand::Time => Value::Text("t".to_owned()),
+            Operand::Coordinate(index) => Value::Text(self.coordinates[index.min(2)].to_owned()),
+            Operand::Parameter(index) => Value::number(code.spec.parameters[index].default),
+            Operand::Kept(_, index) => Value::number(fixed[index]),
         };
         for (index, operation) in block.steps() {
-            let operands: Vec<String> =
-                operation.operands().map(|slot| value(&texts, block.operand(slot))).collect();
-            let text = self.operation(code, operation, &operands)?;
-            let text = if self.names_values {
-                statements += &format!("t{index} := {text}; ");
-                format!("t{index}")
-            } else {
-                text
+            let operands: Vec<Value> =
+                operation.operands().map(|slot| value(&known, block.operand(slot))).collect();
+            let result = match (operation, operands.as_slice()) {
+                // What rounding takes is less than what these expressions lose.
+                (Operation::SumError(..) | Operation::ProductError(..), _)
+                | (Operation::Mul(..), [Value::Zero, _] | [_, Value::Zero]) => Value::Zero,
+                (Operation::Add(..) | Operation::Sub(..), [value, Value::Zero])
+                | (Operation::Add(..), [Value::Zero, value]) => value.clone(),
+                _ => {
+                    let texts: Vec<String> = operands.into_iter().map(Value::text).collect();
+                    let text = self.operation(code, operation, &texts)?;
+                    Value::Text(if self.names_values {
+                        statements += &format!("t{index} := {text}; ");
+                        format!("t{index}")
+                    } else {
+                        text
+                    })
+                }
             };
-            texts.insert(index, text);
+            known.insert(index, result);
         }
-        let of: Vec<String> = block.outputs().map(|operand| value(&texts, operand)).collect();
+        let of: Vec<String> =
+            block.outputs().map(|operand| value(&known, operand).text()).collect();
         Ok(statements + &join(&of))
     }
 
@@ -194,8 +222,6 @@ impl Strings {
                 self.call(code, Called::Library("atan2"), Function::Atan2, operands)?
             }
             Operation::LnOfBoth(..) => self.logarithm(code, one())?,
-            // What rounding takes is less than what these expressions lose.
-            Operation::SumError(..) | Operation::ProductError(..) => ZERO.to_owned(),
             Operation::Call(Function::Ln1p, _) => self.logarithm(code, one())?,
             Operation::Call(Function::Ln1pMinusX, _) => {
                 format!("({} - {})", self.logarithm(code, one())?, one())
@@ -210,10 +236,6 @@ impl Strings {
             Operation::Call(function, _) => {
                 self.call(code, Called::of(*function), *function, operands)?
             }
-            // What would be lost in rounding, above all.
-            Operation::Mul(..) if one() == ZERO || other() == ZERO => ZERO.to_owned(),
-            Operation::Add(..) | Operation::Sub(..) if other() == ZERO => one().to_owned(),
-            Operation::Add(..) if one() == ZERO => other().to_owned(),
             other_operation => {
                 let mut operands = [one(), other()].into_iter();
                 let mut text = String::from("(");
