@@ -6,8 +6,8 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
 use crate::grid::Grid;
+use crate::mesh::{Mesh, Numbers};
 use crate::particles::Particles;
-use crate::polygons::Polygons;
 use crate::tensor::real;
 
 /// Particles, and the region of the body that each represents.
@@ -18,56 +18,14 @@ pub struct Body<T, const D: usize> {
     /// For each particle half the edges of its parallelogram in the reference configuration, one a column: it is the set
     /// of `X + E s`, `|s_a| <= 1`. Empty where all are the boxes of half-size [`Particles::half_size`].
     pub half_edges: Vec<SMatrix<T, D, D>>,
-    /// The corners of the particles' domains, where there are any.
+    /// The domains between shared corners, where there are such. Cells are used with CPDI2 alone.
     pub mesh: Option<Mesh<T, D>>,
-    /// The domains as polygons on shared corners, where they are such.
-    pub polygons: Option<Polygons<T, D>>,
 }
 
 /// Particles whose domains are boxes, all of the same half-size, without common corners.
 impl<T, const D: usize> From<Particles<T, D>> for Body<T, D> {
     fn from(particles: Particles<T, D>) -> Self {
-        Self { particles, half_edges: Vec::new(), mesh: None, polygons: None }
-    }
-}
-
-/// Corners that the domains of neighbouring particles share.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mesh<T, const D: usize> {
-    /// Reference positions.
-    pub X: Vec<SVector<T, D>>,
-    /// Current positions.
-    pub x: Vec<SVector<T, D>>,
-    /// The corners of each particle's domain: in one dimension the first two entries, from left to right; in two the first
-    /// four, counter-clockwise; in three all, counter-clockwise as seen from above those of the lower face, then those above
-    /// them.
-    pub corners: Vec<[u32; 8]>,
-}
-
-impl<T, const D: usize> Default for Mesh<T, D> {
-    fn default() -> Self {
-        Self { X: Vec::new(), x: Vec::new(), corners: Vec::new() }
-    }
-}
-
-impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
-    /// The corners of some successive particles.
-    fn part(&self, own: &Range<usize>) -> Self {
-        let mut part = Self { corners: self.corners[own.clone()].to_vec(), ..Self::default() };
-        let mut used: Vec<u32> =
-            part.corners.iter().flat_map(|corners| &corners[..1 << D]).copied().collect();
-        used.sort_unstable();
-        used.dedup();
-        part.X = used.iter().map(|&corner| self.X[corner as usize]).collect();
-        part.x = used.iter().map(|&corner| self.x[corner as usize]).collect();
-        for corners in &mut part.corners {
-            let (own, others) = corners.split_at_mut(1 << D);
-            for corner in own {
-                *corner = used.partition_point(|known| known < corner) as u32;
-            }
-            others.fill(0);
-        }
-        part
+        Self { particles, half_edges: Vec::new(), mesh: None }
     }
 }
 
@@ -94,8 +52,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         let half_edge = SMatrix::from_diagonal(&particles.half_size);
         Self {
             half_edges: vec![half_edge; particles.len()],
-            mesh: Some(mesh_of_boxes(grid, &particles)),
-            polygons: None,
+            mesh: Some(cells_of_boxes(grid, &particles)),
             particles,
         }
     }
@@ -106,14 +63,13 @@ pub(crate) fn part<T: RealField + Copy, const D: usize>(
     body: &Body<T, D>,
     own: &Range<usize>,
 ) -> Body<T, D> {
-    let Body { particles, half_edges, mesh, polygons } = body;
+    let Body { particles, half_edges, mesh } = body;
     let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
     let particles = particles.some(&places);
     let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
-    let mesh = mesh.as_ref().map(|mesh| mesh.part(own));
     let own: Vec<usize> = own.clone().collect();
-    let polygons = polygons.as_ref().map(|polygons| polygons.part(&own));
-    Body { particles, half_edges, mesh, polygons }
+    let mesh = mesh.as_ref().map(|mesh| mesh.part(&own));
+    Body { particles, half_edges, mesh }
 }
 
 /// See [`Body::annulus`].
@@ -154,12 +110,11 @@ pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
 
     let vector = |cos: T, sin: T| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
     let radius = |i: usize| inner + width * number(i);
-    let mut mesh = Mesh { X: Vec::new(), x: Vec::new(), corners: Vec::new() };
+    let (mut of_corners, mut corners) = (Vec::new(), Vec::new());
     for j in 0..rays {
         let (cos, sin) = direction(j, around);
-        mesh.X.extend((0..=across).map(|i| vector(cos, sin) * radius(i)));
+        of_corners.extend((0..=across).map(|i| vector(cos, sin) * radius(i)));
     }
-    mesh.x.clone_from(&mesh.X);
     let count = across * cells;
     let (mut X, mut volume) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut half_edges = Vec::with_capacity(count);
@@ -177,8 +132,12 @@ pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
             let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
             half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
             let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u32;
-            let of_cell = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-            mesh.corners.push(std::array::from_fn(|k| of_cell[k % 4]));
+            corners.extend([
+                corner(i, j),
+                corner(i + 1, j),
+                corner(i + 1, j + 1),
+                corner(i, j + 1),
+            ]);
         }
     }
     let particles = Particles {
@@ -190,7 +149,7 @@ pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
         volume,
         half_size: SVector::repeat(half * width),
     };
-    Ok(Body { particles, half_edges, mesh: Some(mesh), polygons: None })
+    Ok(Body { particles, half_edges, mesh: Some(Mesh::cells(of_corners, corners)) })
 }
 
 /// Cosine and sine of `index` parts of a quarter turn, each of which has `per_quarter`; exact on the axes.
@@ -206,8 +165,8 @@ fn direction<T: RealField + Copy>(index: usize, per_quarter: usize) -> (T, T) {
     }
 }
 
-/// The shared corners of a lattice's boxes.
-fn mesh_of_boxes<T: RealField + Copy, const D: usize>(
+/// The boxes of a lattice, which share corners; in the order of their numbers on the lattice, whatever part of it is here.
+fn cells_of_boxes<T: RealField + Copy, const D: usize>(
     grid: &Grid<T, D>,
     particles: &Particles<T, D>,
 ) -> Mesh<T, D> {
@@ -219,29 +178,31 @@ fn mesh_of_boxes<T: RealField + Copy, const D: usize>(
     let count: [usize; D] = std::array::from_fn(|a| {
         in_boxes(grid.spacing * real(grid.cells[a] as f64), a).round() as usize + 1
     });
-    const NONE: u32 = u32::MAX;
-    let mut known = vec![NONE; count.iter().product()];
-    let mut mesh = Mesh::default();
+    let mut of_cells = Vec::with_capacity(particles.X.len() << D);
     for X in &particles.X {
-        let mut corners = [0; 8];
-        for (corner, offset) in corners.iter_mut().zip(&AROUND[..1 << D]) {
-            let index: [usize; D] = std::array::from_fn(|a| {
+        for offset in &AROUND[..1 << D] {
+            of_cells.push((0..D).rev().fold(0_u64, |place, a| {
                 let below = in_boxes(X[a] - grid.lower[a], a) - 0.5;
-                below.round().max(0.0) as usize + offset[a]
-            });
-            let place = (0..D).rev().fold(0, |place, a| place * count[a] + index[a]);
-            if known[place] == NONE {
-                known[place] = mesh.X.len() as u32;
-                mesh.X.push(SVector::from_fn(|a, _| {
-                    grid.lower[a] + real::<T>(index[a] as f64) * edge[a]
-                }));
-            }
-            *corner = known[place];
+                place * count[a] as u64 + (below.round().max(0.0) as usize + offset[a]) as u64
+            }));
         }
-        mesh.corners.push(corners);
     }
-    mesh.x.clone_from(&mesh.X);
-    mesh
+    let mut numbers = of_cells.clone();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let position = |number: &u64| {
+        let mut rest = *number;
+        SVector::from_fn(|a, _| {
+            let index = rest % count[a] as u64;
+            rest /= count[a] as u64;
+            grid.lower[a] + real::<T>(index as f64) * edge[a]
+        })
+    };
+    let X = numbers.iter().map(position).collect();
+    let place = |number: u64| numbers.partition_point(|known| *known < number) as u32;
+    let corners = of_cells.into_iter().map(place).collect();
+    let numbers = Numbers { corners: numbers, loads: Vec::new() };
+    Mesh { numbers: Some(numbers), ..Mesh::cells(X, corners) }
 }
 
 #[cfg(test)]
@@ -278,18 +239,18 @@ mod tests {
                 // The integral of x over a quarter is (outer^3 - inner^3) / 3.
                 let exact = if quarter { (0.216 - 0.064) / 3.0 } else { 0.0 };
                 assert!((moment - Vector2::repeat(exact)).norm() < 1e-14, "{moment}");
-                let mesh = body.mesh.unwrap();
-                for (corners, E) in mesh.corners.iter().zip(&body.half_edges) {
-                    let [a, b, c, d] = std::array::from_fn(|k| mesh.X[corners[k] as usize]);
+                let cells = body.mesh.unwrap();
+                for (corners, E) in cells.corners.chunks(4).zip(&body.half_edges) {
+                    let [a, b, c, d] = std::array::from_fn(|k| cells.X[corners[k] as usize]);
                     let area = 0.5 * (c - a).perp(&(d - b));
                     assert!(area > 0.0 && E.determinant() > 0.0);
                 }
-                let on_axis = mesh.X.iter().filter(|X| X[0] == 0.0 && X[1] > 0.0).count();
+                let on_axis = cells.X.iter().filter(|X| X[0] == 0.0 && X[1] > 0.0).count();
                 let across = (per_cell as f64 * 0.2 / spacing).round().max(1.0) as usize;
                 assert_eq!(on_axis, across + 1);
                 assert_eq!(p.len() % across, 0);
                 let corners = if quarter { p.len() / across + 1 } else { p.len() / across };
-                assert_eq!(mesh.X.len(), corners * (across + 1));
+                assert_eq!(cells.X.len(), corners * (across + 1));
             }
         }
     }
@@ -303,11 +264,11 @@ mod tests {
             walls: [[false; 2]; 2],
         };
         let body = Body::lattice(&grid, 2, 1.0, |_| true);
-        let mesh = body.mesh.unwrap();
-        assert_eq!(mesh.X.len(), 7 * 5);
-        for (corners, X) in mesh.corners.iter().zip(&body.particles.X) {
+        let cells = body.mesh.unwrap();
+        assert_eq!(cells.X.len(), 7 * 5);
+        for (corners, X) in cells.corners.chunks(4).zip(&body.particles.X) {
             let corners: [Vector2<f64>; 4] =
-                std::array::from_fn(|k| mesh.X[corners[k] as usize] - X);
+                std::array::from_fn(|k| cells.X[corners[k] as usize] - X);
             let h = 0.125;
             let expected = [[-h, -h], [h, -h], [h, h], [-h, h]].map(Vector2::from);
             for (corner, expected) in corners.iter().zip(expected) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::polygons::Load;
+use crate::mesh::Load;
 
 /// Force per unit mass on many particles at once.
 pub trait BodyForce<T: Copy, const D: usize>: Sync {
@@ -33,7 +33,7 @@ pub trait BodyForce<T: Copy, const D: usize>: Sync {
         }
     }
 
-    /// Writes the Cauchy stress at the [loaded points](crate::Polygons::loads) of a body's boundary at time `t`; both slices have the same
+    /// Writes the Cauchy stress at the [loaded points](crate::Mesh::loads) of a body's boundary at time `t`; both slices have the same
     /// length. All are zero before the first call. Default: leaves them as they are.
     fn boundary_stress(&self, _loads: &[Load<T, D>], _t: T, _stress: &mut [SMatrix<T, D, D>]) {}
 

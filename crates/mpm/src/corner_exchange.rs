@@ -1,4 +1,4 @@
-//! P2G and G2P of polygons by way of their corners: particles exchange with the corners, and these, as points, with the grid.
+//! P2G and G2P by way of shared corners: particles exchange with the corners, and these, as points, with the grid.
 //!
 //! ```text
 //! to the grid:  m_c = sum_p m_p w_pc,  f_c = -sum_p V0_p tau_p g_pc + sum_p m_p b_p w_pc + loads;  m_i = sum_c m_c N_i(x_c), ...
@@ -12,14 +12,18 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
 use crate::geometry::Constants;
+use crate::grid_update::{GridUpdate, NodeUpdate};
 use crate::health::{Invalid, Outcome, SharedOutcome};
+use crate::kernel::block::Seen;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
-use crate::node::{LANES, Node};
-use crate::parallel::chunks::{each, each_chunk};
-use crate::polygons::{Polygons, Share};
+use crate::kernel::shared::{AffineSum, variance};
+use crate::mesh::{Interpolation, Mesh};
+use crate::node::Node;
+use crate::parallel::bins::Bins;
+use crate::parallel::chunks::each;
 use crate::shape_function::{OnAxis, ProductShape};
-use crate::shared_corners::{CHUNK, SharedCorners};
+use crate::shared_corners::{CHUNK, Chunk, SharedCorners};
 use crate::simd::Lanes;
 use crate::support::Support;
 
@@ -28,24 +32,20 @@ pub(crate) type Loading<'a, T, const D: usize> = Option<(&'a dyn BodyForce<T, D>
 
 /// What passes between particles, corners and grid on its way.
 pub(crate) struct Exchange<T, const D: usize> {
-    /// What each particle gives.
-    pub(crate) given: Vec<Given<T, D>>,
-    /// APIC: its affine momentum per cell, and the mean of its polygons; else empty.
-    pub(crate) affine: Vec<(SMatrix<T, D, D>, SVector<T, D>)>,
-    /// Whether there are such.
-    has_affine: bool,
-    /// Whether that counts in the sums at hand.
-    pub(crate) is_affine: bool,
-    /// The sums at each corner that this process sorts.
+    /// What the particles of each chunk give at each corner, see [`SharedCorners::chunks`].
     sums: Vec<Node<T, D>>,
-    /// APIC: the affine momenta at each of them, along the axes of the grid; else empty.
-    affine_sums: Vec<SMatrix<T, D, D>>,
+    /// Whether there are affine momenta.
+    has_affine: bool,
+    /// Whether they count in the sums at hand.
+    is_affine: bool,
+    /// APIC: the same of affine momenta; else empty.
+    affine_sums: Vec<AffineSum<T, D>>,
     /// The values of the grid at each corner here.
-    pub(crate) values: Vec<Node<T, D>>,
+    pub(crate) values: CornerValues<T, D>,
     /// Whether velocities are projected again.
     reprojects: bool,
     /// The same of such velocities, where there are any.
-    pub(crate) reprojected: Vec<Node<T, D>>,
+    pub(crate) reprojected: CornerValues<T, D>,
     /// The Cauchy stress at each loaded point.
     stresses: Vec<SMatrix<T, D, D>>,
     /// The weights of corners at nodes.
@@ -54,11 +54,37 @@ pub(crate) struct Exchange<T, const D: usize> {
     buffers: BufferPool<T, D>,
 }
 
-/// Momentum, body force and mass of a particle, in the order of a node's values, and `-V0 tau / h`.
-#[derive(Clone, Copy)]
-pub(crate) struct Given<T, const D: usize> {
-    pub(crate) value: Node<T, D>,
-    pub(crate) stress_flux: SMatrix<T, D, D>,
+/// The sums of a chunk of particles.
+pub(crate) struct ChunkSums<'a, T, const D: usize> {
+    pub(crate) sums: &'a mut [Node<T, D>],
+    /// Of affine momenta, where they count.
+    pub(crate) affine_sums: &'a mut [AffineSum<T, D>],
+}
+
+impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
+    pub(crate) fn clear(&mut self) {
+        self.sums.fill(Node::zero());
+        self.affine_sums.fill([Node::zero(); D]);
+    }
+}
+
+/// Values of the grid at all corners.
+pub(crate) struct CornerValues<T, const D: usize> {
+    /// Interpolated values of nodes.
+    pub(crate) nodes: Vec<Node<T, D>>,
+    /// APIC of cells: the moments `sum v N_i arm` about each corner, in cells; else empty.
+    pub(crate) moments: Vec<SMatrix<T, D, D>>,
+}
+
+impl<T: Lanes, const D: usize> CornerValues<T, D> {
+    pub(crate) fn none() -> Self {
+        Self { nodes: Vec::new(), moments: Vec::new() }
+    }
+
+    fn fit(&mut self, count: usize, has_moments: bool) {
+        self.nodes.resize(count, Node::zero());
+        self.moments.resize(if has_moments { count } else { 0 }, SMatrix::zeros());
+    }
 }
 
 impl<T: Lanes, const D: usize> Exchange<T, D> {
@@ -66,20 +92,18 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool, reprojects: bool) -> Self {
         let none = ProductShape { on_axis: OnAxis::Hat, l: SVector::zeros() };
         let mut own = Self {
-            given: Vec::new(),
-            affine: Vec::new(),
+            sums: Vec::new(),
             has_affine: is_affine,
             is_affine,
-            sums: Vec::new(),
             affine_sums: Vec::new(),
-            values: Vec::new(),
+            values: CornerValues::none(),
             reprojects,
-            reprojected: Vec::new(),
+            reprojected: CornerValues::none(),
             stresses: Vec::new(),
             at_nodes: Support::Product(none),
             buffers: BufferPool::new(),
         };
-        if let Support::Polygons(corners) = support {
+        if let Support::Mesh(corners) = support {
             own.at_nodes = Support::Product(corners.at_corner);
             own.fit(corners);
         }
@@ -88,84 +112,66 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
 
     /// Makes room for these corners and their particles.
     pub(crate) fn fit(&mut self, corners: &SharedCorners<T, D>) {
-        let Polygons { of_particles, loads, .. } = &corners.polygons;
-        let (count, particles, own) = (corners.count(), of_particles.len(), corners.own());
+        let Mesh { loads, interpolation, .. } = &corners.mesh;
+        let has_moments = self.has_affine && *interpolation == Interpolation::Cell;
         let (zero, none) = (Node::zero(), SMatrix::zeros());
-        self.given.resize(particles, Given { value: zero, stress_flux: none });
-        self.sums.resize(own, zero);
-        self.values.resize(count, zero);
+        self.sums.resize(corners.sums(), zero);
         if self.has_affine {
-            self.affine.resize(particles, (none, SVector::zeros()));
-            self.affine_sums.resize(own, none);
+            self.affine_sums.resize(corners.sums(), [zero; D]);
         }
+        self.values.fit(corners.count(), has_moments);
         if self.reprojects {
-            self.reprojected.resize(count, zero);
+            self.reprojected.fit(corners.count(), has_moments);
         }
         self.stresses.clear();
         self.stresses.resize(loads.len(), none);
     }
 
-    /// Sums what particles give at each corner, with the loads on it.
-    pub(crate) fn sum(
-        &mut self,
-        c: &Constants<T, D>,
-        corners: &SharedCorners<T, D>,
-        loading: Loading<'_, T, D>,
-    ) {
-        let Self { given, affine, is_affine, sums, affine_sums, stresses, .. } = self;
-        let (given, affine) = (&given[..], if *is_affine { &affine[..] } else { &[] });
-        let per_length = c.spacing();
-        each_chunk(sums, CHUNK, &|chunk, sums| {
-            for (k, sum) in sums.iter_mut().enumerate() {
-                let corner = chunk * CHUNK + k;
-                let mut values = [T::zero(); LANES];
-                for place in corners.places_of(corner) {
-                    let Share { w, g, .. } = &corners.shares[place.share as usize];
-                    let Given { value, stress_flux } = &given[place.particle as usize];
-                    for (sum, value) in values.iter_mut().zip(&value.values) {
-                        *sum += *value * *w;
-                    }
-                    for (a, g) in g.iter().enumerate() {
-                        let per_cell = *g * per_length;
-                        for i in 0..D {
-                            values[D + i] += stress_flux[(i, a)] * per_cell;
-                        }
-                    }
-                    if let Some((affine, centre)) = affine.get(place.particle as usize) {
-                        let arm = (corners.polygons.x[corner] - centre) * c.inverse_spacing;
-                        let momentum = affine * arm * *w;
-                        (0..D).for_each(|i| values[i] += momentum[i]);
-                    }
-                }
-                sum.values = values;
-            }
-        });
-        let affine_sums = if *is_affine { &mut affine_sums[..] } else { &mut [] };
-        each_chunk(affine_sums, CHUNK, &|chunk, sums| {
-            for (k, sum) in sums.iter_mut().enumerate() {
-                let mut own = SMatrix::zeros();
-                for place in corners.places_of(chunk * CHUNK + k) {
-                    let (affine, _) = &affine[place.particle as usize];
-                    own += affine * corners.shares[place.share as usize].w;
-                }
-                // Arms are along the axes of the grid.
-                *sum = corners.polygons.turn.map_or(own, |turn| own * turn.transpose());
-            }
-        });
+    /// Adds the loads to what particles give at corners.
+    pub(crate) fn load(&mut self, corners: &SharedCorners<T, D>, loading: Loading<'_, T, D>) {
+        let Self { sums, stresses, .. } = self;
         let Some((loading, time)) = loading.filter(|_| !stresses.is_empty()) else { return };
-        loading.boundary_stress(&corners.polygons.loads, time, stresses);
-        for (load, stress) in corners.polygons.loads.iter().zip(&*stresses) {
-            let force = stress * load.normal(&corners.polygons.x);
+        loading.boundary_stress(&corners.mesh.loads, time, stresses);
+        for (load, stress) in corners.mesh.loads.iter().zip(&*stresses) {
+            let force = stress * load.normal(&corners.mesh.x);
             for (&corner, &share) in load.corners.iter().zip(&load.shares) {
                 // The process that sorts a corner has all loads at it.
-                let Some(Node { values }) = sums.get_mut(corner as usize) else { continue };
+                let Some(&sum) = corners.sums_of(corner as usize).first() else { continue };
+                let Node { values } = &mut sums[sum as usize];
                 (0..D).for_each(|i| values[D + i] += force[i] * share);
             }
         }
     }
 
+    /// The sums of each chunk, to begin anew with [`ChunkSums::clear`]; of affine momenta where they count.
+    pub(crate) fn begin(&mut self, chunks: &[Chunk], is_affine: bool) -> Vec<ChunkSums<'_, T, D>> {
+        self.is_affine = is_affine;
+        let mut sums = &mut self.sums[..];
+        let mut affine_sums = if is_affine { &mut self.affine_sums[..] } else { &mut [] };
+        let of_chunk = |Chunk { sums: places, .. }: &Chunk| {
+            let own = sums.split_off_mut(..places.len()).unwrap_or_default();
+            let of_affine = affine_sums.len().min(places.len());
+            let affine_sums = affine_sums.split_off_mut(..of_affine).unwrap_or_default();
+            ChunkSums { sums: own, affine_sums }
+        };
+        chunks.iter().map(of_chunk).collect()
+    }
+
+    /// Adds the sums at corners to the grid, and updates it.
+    pub(crate) fn update_grid<S: NodeUpdate<T, D>>(
+        &self,
+        update: &GridUpdate<'_, T, S, D>,
+        (c, corners): (&Constants<T, D>, &SharedCorners<T, D>),
+        bins: &mut Bins,
+        nodes: &mut [Node<T, D>],
+    ) {
+        update.p2g(bins, nodes, &|band, first, ids| {
+            self.to_grid(c, corners, (band, first), ids);
+        });
+    }
+
     /// Adds the sums at the corners `ids` to the band of nodes that starts at node `first`.
-    pub(crate) fn to_grid(
+    fn to_grid(
         &self,
         c: &Constants<T, D>,
         corners: &SharedCorners<T, D>,
@@ -180,15 +186,33 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             contributions.without_stress();
             for (k, &corner) in ids.iter().enumerate() {
                 copies.x[k] = corners.at(corner as usize);
-                contributions.value[k] = self.sums[corner as usize];
+                let sums = corners.sums_of(corner as usize);
+                let [first, others @ ..] = sums else { continue };
+                let mut value = self.sums[*first as usize];
+                others.iter().for_each(|&sum| value.add(&self.sums[sum as usize]));
+                contributions.value[k] = value;
                 if is_affine {
-                    contributions.affine[k] = self.affine_sums[corner as usize];
+                    contributions.affine[k] = self.affine_at(corners, sums);
                 }
             }
             block.compute_weights(c, &self.at_nodes, ids, copies.kinematics());
             block.p2g(&c.strides, band, first, contributions, ids.len());
         }
         self.buffers.give_back(buffers);
+    }
+
+    /// The affine momentum at a corner with these sums, along the axes of the grid.
+    fn affine_at(&self, corners: &SharedCorners<T, D>, sums: &[u32]) -> SMatrix<T, D, D> {
+        let mut own = SMatrix::zeros();
+        for &sum in sums {
+            for (a, along) in self.affine_sums[sum as usize].iter().enumerate() {
+                (0..D).for_each(|i| own[(i, a)] += along.values[i]);
+            }
+        }
+        match &corners.mesh.turn {
+            Some(turn) => own * turn.transpose(),
+            None => own,
+        }
     }
 
     /// Interpolates the values of nodes at all corners.
@@ -200,21 +224,35 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
     ) {
         let Self { values, buffers, at_nodes, .. } = self;
         let (buffers, at_nodes) = (&*buffers, &*at_nodes);
-        each_chunk(&mut values[..corners.own()], CHUNK, &|chunk, values| {
+        let CornerValues { nodes: at_corners, moments } = values;
+        let own = corners.own();
+        let mut of_moments = moments.chunks_mut(CHUNK);
+        let chunks = at_corners[..own].chunks_mut(CHUNK).enumerate();
+        let chunks: Vec<_> = chunks
+            .map(|(number, values)| (number * CHUNK, values, of_moments.next().unwrap_or_default()))
+            .collect();
+        each(chunks, &|(first, values, moments)| {
             let mut copies = Copies::new();
             let mut own = buffers.take(at_nodes, false);
             let Buffers { block, interpolated, .. } = &mut *own;
+            let mut of_moments = moments.chunks_mut(BLOCK);
             for (index, values) in values.chunks_mut(BLOCK).enumerate() {
-                let ids = successive(chunk * CHUNK + index * BLOCK);
+                let ids = successive(first + index * BLOCK);
                 let ids = &ids[..values.len()];
                 for (x, &corner) in copies.x.iter_mut().zip(ids) {
                     *x = corners.at(corner as usize);
                 }
                 let interpolated = &mut interpolated[..values.len()];
                 block.compute_weights(c, at_nodes, ids, copies.kinematics());
-                block.g2p(&c.strides, nodes, interpolated);
-                for (value, own) in values.iter_mut().zip(interpolated) {
+                block.g2p((c, at_nodes), Seen::Nodes(nodes), interpolated);
+                for (value, own) in values.iter_mut().zip(&*interpolated) {
                     *value = Node::new(&own.velocity, &own.second, T::zero());
+                }
+                let moments = of_moments.next().unwrap_or_default().iter_mut();
+                for (moments, (own, x)) in moments.zip(interpolated.iter().zip(&copies.x)) {
+                    // The slope of hat functions along an axis times the variance: the nodes of an axis are two.
+                    let variance = variance(c, x);
+                    *moments = own.velocity_gradient * SMatrix::from_diagonal(&variance);
                 }
             }
             buffers.give_back(own);
@@ -234,19 +272,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         self.at_nodes.first_node(c, corner, &corners.at(corner), &SMatrix::identity())
     }
 
-    /// The reason why a corner may not be where it is, with a particle at it.
-    pub(crate) fn invalidity(
-        &self,
-        c: &Constants<T, D>,
-        corners: &SharedCorners<T, D>,
-        corner: usize,
-    ) -> Option<(Invalid, usize)> {
-        let at = corners.at(corner);
-        let invalid = self.at_nodes.invalidity(c, corner, &at, &SMatrix::identity())?;
-        Some((invalid, corners.particle_at(corner)))
-    }
-
-    /// Checks that every corner that this process sorts is on the grid and in its bin.
+    /// Checks that every corner that this process sorts is where the grid has nodes for it, and in its bin.
     pub(crate) fn check(
         &self,
         c: &Constants<T, D>,
@@ -268,17 +294,33 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
                     continue;
                 }
                 for (k, bin) in bins[..count].iter().enumerate() {
-                    let corner = first + k;
-                    let at = &copies.x[k];
-                    let found = self.at_nodes.diagnose(c, corner, *bin, at, &SMatrix::identity());
-                    let of_particle = found
-                        .failure
-                        .map(|(invalid, corner)| (invalid, corners.particle_at(corner)));
-                    outcome = outcome.merge(Outcome { failure: of_particle, ..found });
+                    let (corner, at) = (first + k, &copies.x[k]);
+                    let failure = invalidity_of_corner(c, corners, corner);
+                    let no_stretch = SMatrix::identity();
+                    let is_inside = failure.is_some()
+                        || self.at_nodes.is_in_bin(c, corner, *bin, at, &no_stretch);
+                    outcome = outcome.merge(Outcome { failure, resort: !is_inside });
                 }
             }
             found.add(outcome);
         });
         found.all()
     }
+}
+
+/// The reason why a corner may not be where it is, with a particle at it.
+pub(crate) fn invalidity_of_corner<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    corners: &SharedCorners<T, D>,
+    corner: usize,
+) -> Option<(Invalid, usize)> {
+    let at = corners.at(corner);
+    let invalid = if at.iter().any(|x| !x.is_finite()) {
+        Invalid::NotFinite
+    } else if c.axis_beyond(&at).is_some() {
+        Invalid::LeftGrid
+    } else {
+        return None;
+    };
+    Some((invalid, corners.particle_at(corner)))
 }

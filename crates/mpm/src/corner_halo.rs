@@ -5,11 +5,12 @@
 
 use std::sync::Arc;
 
-use bytemuck::Pod;
 use mmsmith_ranks::{Ranks, announce, exchange};
-use nalgebra::{RealField, SVector};
+use nalgebra::SVector;
 
+use crate::corner_exchange::CornerValues;
 use crate::node::Node;
+use crate::simd::Lanes;
 
 /// Which values come from other processes, and which go there.
 pub(crate) struct CornerHalo {
@@ -43,20 +44,28 @@ impl CornerHalo {
         Self { ranks: ranks.clone(), out: out.collect(), come }
     }
 
-    /// Puts the two vectors in place at the corners that other processes sort; a call of all.
-    pub(crate) fn exchange<T: RealField + Copy + Pod, const D: usize>(
-        &self,
-        values: &mut [Node<T, D>],
-    ) {
+    /// Puts the two vectors and the moments in place at the corners that other processes sort; a call of all.
+    pub(crate) fn exchange<T: Lanes, const D: usize>(&self, values: &mut CornerValues<T, D>) {
         let Self { ranks, out, come } = self;
-        let numbers = |corner: &u32| &values[*corner as usize].values[..2 * D];
-        let of = |corners: &Vec<u32>| corners.iter().flat_map(numbers).copied().collect();
+        let CornerValues { nodes, moments } = values;
+        let per_corner = if moments.is_empty() { 2 * D } else { 2 * D + D * D };
+        let of = |corners: &Vec<u32>| {
+            let mut numbers = Vec::with_capacity(per_corner * corners.len());
+            for &corner in corners {
+                numbers.extend(&nodes[corner as usize].values[..2 * D]);
+                numbers.extend(moments.get(corner as usize).into_iter().flatten());
+            }
+            numbers
+        };
         let out: Vec<Vec<T>> = out.iter().map(of).collect();
-        let counts: Vec<usize> = come.iter().map(|corners| 2 * D * corners.len()).collect();
+        let counts: Vec<usize> = come.iter().map(|corners| per_corner * corners.len()).collect();
         let numbers = exchange(&**ranks, &out, &counts);
-        for (&corner, numbers) in come.iter().flatten().zip(numbers.chunks(2 * D)) {
+        for (&corner, numbers) in come.iter().flatten().zip(numbers.chunks(per_corner)) {
             let vector = |first: usize| SVector::from_fn(|a, _| numbers[first + a]);
-            values[corner as usize] = Node::new(&vector(0), &vector(D), T::zero());
+            nodes[corner as usize] = Node::new(&vector(0), &vector(D), T::zero());
+            if let Some(moments) = moments.get_mut(corner as usize) {
+                moments.copy_from_slice(&numbers[2 * D..]);
+            }
         }
     }
 }

@@ -153,7 +153,7 @@ pub(crate) fn inverse<N: Number, const D: usize>(A: &[[N; D]; D]) -> [[N; D]; D]
     inverse
 }
 
-/// The shares of the corners of a segment, of a quadrilateral or of a hexahedron, and its volume (length, area), which must not be
+/// Sets the shares of the corners of a segment, of a quadrilateral or of a hexahedron, and gives its volume (length, area), which must not be
 /// zero for the shares to have a meaning.
 ///
 /// Corners of a quadrilateral go counter-clockwise; those of a hexahedron are those of its lower face, counter-clockwise as seen
@@ -161,11 +161,12 @@ pub(crate) fn inverse<N: Number, const D: usize>(A: &[[N; D]; D]) -> [[N; D]; D]
 #[inline(always)]
 pub(crate) fn shares_of_cell<N: Number, const D: usize>(
     x: &[[N; D]; MOST_CORNERS],
-) -> (Shares<N, D>, N) {
+    shares: &mut Shares<N, D>,
+) -> N {
     match D {
-        1 => segment(x),
-        2 => quadrilateral(x),
-        _ => hexahedron(x),
+        1 => segment(x, shares),
+        2 => quadrilateral(x, shares),
+        _ => hexahedron(x, shares),
     }
 }
 
@@ -180,12 +181,15 @@ pub(crate) fn volume_of_cell<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNER
 }
 
 #[inline(always)]
-fn segment<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<N, D>, N) {
+fn segment<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS], shares: &mut Shares<N, D>) -> N {
     let length = x[1][0] - x[0][0];
     let slope = length.constant(1.0).divided_by(length);
-    let mut g = [[slope; D]; MOST_CORNERS];
-    g[0] = [length.constant(0.0) - slope; D];
-    (Shares { w: [length.constant(0.5); MOST_CORNERS], g }, length)
+    for corner in 0..2 {
+        shares.w[corner] = length.constant(0.5);
+        let signed = if corner == 1 { slope } else { length.constant(0.0) - slope };
+        shares.g[corner] = [signed; D];
+    }
+    length
 }
 
 /// `a x b` in the plane.
@@ -210,23 +214,24 @@ fn area<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> N {
 /// The map's determinant is linear. With `T_c` the area of the triangle at corner c between its neighbours and A the area of all,
 /// `w_c = 1/6 + T_c / (6 A)`.
 #[inline(always)]
-fn quadrilateral<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<N, D>, N) {
+fn quadrilateral<N: Number, const D: usize>(
+    x: &[[N; D]; MOST_CORNERS],
+    shares: &mut Shares<N, D>,
+) -> N {
     let area = area(x);
     let (half, sixth) = (area.constant(0.5), area.constant(1.0 / 6.0));
     let half_inverse = half.divided_by(area);
-    let mut w = [sixth; MOST_CORNERS];
-    let mut g = [[half; D]; MOST_CORNERS];
     for corner in 0..4 {
         let (own, next, last) = (x[corner], x[(corner + 1) % 4], x[(corner + 3) % 4]);
         // Twice the triangle.
         let triangle = cross(minus(next, own), minus(last, own));
-        w[corner] = sixth + sixth * (triangle * half_inverse);
+        shares.w[corner] = sixth + sixth * (triangle * half_inverse);
         // The normals of the two sides at the corner, each with half of its length.
         let across = minus(next, last);
-        g[corner][0] = across[D - 1] * half_inverse;
-        g[corner][D - 1] = area.constant(0.0) - across[0] * half_inverse;
+        shares.g[corner][0] = across[D - 1] * half_inverse;
+        shares.g[corner][D - 1] = area.constant(0.0) - across[0] * half_inverse;
     }
-    (Shares { w, g }, area)
+    area
 }
 
 /// The place of each corner of a hexahedron where bit `a` says on which side of axis `a` it is.
@@ -334,7 +339,10 @@ fn hexahedron_volume<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> N
 /// The share of a mean gradient is `g_c = dV/dx_c / V`, and `w_c` a sum of the moments of the determinant, since `N_c` is one of the
 /// products.
 #[inline(always)]
-fn hexahedron<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<N, D>, N) {
+fn hexahedron<N: Number, const D: usize>(
+    x: &[[N; D]; MOST_CORNERS],
+    shares: &mut Shares<N, D>,
+) -> N {
     let [_, m1, m2, m3, m4, m5, m6, m7] = coefficients_of_map(x);
     let one = m1[0].constant(1.0);
     let third = one.constant(1.0 / 3.0);
@@ -369,7 +377,6 @@ fn hexahedron<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<
         dot(m5, n63) * (inverse * one.constant(-1.0 / 108.0)),
     ];
     to_corners(&mut w);
-    let mut shares = Shares { w, g: [[zero; D]; MOST_CORNERS] };
     for corner in 0..MOST_CORNERS {
         shares.w[corner] = w[BITS[corner]];
     }
@@ -383,7 +390,7 @@ fn hexahedron<N: Number, const D: usize>(x: &[[N; D]; MOST_CORNERS]) -> (Shares<
             shares.g[corner][i] = values[BITS[corner]];
         }
     }
-    (shares, whole * one.constant(1.0 / 64.0))
+    whole * one.constant(1.0 / 64.0)
 }
 
 #[cfg(test)]
@@ -416,7 +423,9 @@ mod tests {
     /// The corners of a cell with their shares, and its volume.
     fn cell<const D: usize>(x: &[SVector<f64, D>]) -> (Vec<(f64, SVector<f64, D>)>, f64) {
         let corners = array::from_fn(|c| ones(&x[c % x.len()]));
-        let (shares, volume) = shares_of_cell(&corners);
+        let none = ones(&SVector::<f64, D>::zeros());
+        let mut shares = Shares { w: [One(0.0); MOST_CORNERS], g: [none; MOST_CORNERS] };
+        let volume = shares_of_cell(&corners, &mut shares);
         assert!((volume_of_cell(&corners).0 - volume.0).abs() < 1e-14);
         let share = |c: usize| (shares.w[c].0, SVector::from_fn(|i, _| shares.g[c][i].0));
         ((0..x.len()).map(share).collect(), volume.0)

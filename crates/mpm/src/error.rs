@@ -167,7 +167,7 @@ pub enum SetupError {
         /// The largest number that is of use.
         most: usize,
     },
-    /// Polygons of a part of a body without their numbers in the whole.
+    /// Mesh of a part of a body without their numbers in the whole.
     #[error("the polygons of a process have no numbers in the whole body; take them by Body::part")]
     NoNumbers,
     /// More particles than ids.
@@ -278,7 +278,7 @@ pub enum SetupError {
         /// The first particle of this kind.
         particle: usize,
     },
-    /// Polygons or polyhedra on a line.
+    /// Mesh or polyhedra on a line.
     #[error("polygons and polyhedra have two or three dimensions; this body has {dimension}")]
     PolygonDimension {
         /// The body's dimension.

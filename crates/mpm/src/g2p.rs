@@ -6,6 +6,8 @@
 //!
 //! Steps in a [single pass](crate::step::is_fused) fuse this with the next P2G ([`g2p2g`](crate::g2p2g)).
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::{SMatrix, SVector};
 
 use crate::corner_exchange::Exchange;
@@ -13,11 +15,11 @@ use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
-use crate::kernel::block::Block;
+use crate::kernel::block::{Block, Seen};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
-use crate::kernel::corners::velocity_at;
-use crate::node::Node;
+use crate::kernel::shared::cells_are_valid_next;
+use crate::mesh::Interpolation;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
@@ -34,7 +36,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
         let Self { particles, constants, nodes, F_early, support, buffers, exchange, .. } = self;
         let c = *constants;
-        if let Support::Polygons(corners) = support {
+        if let Support::Mesh(corners) = support {
             exchange.interpolate(&c, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
@@ -80,9 +82,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             (support, &self.exchange),
             buffers,
             transfer,
-            |block, interpolated, first, of_block| {
+            |(block, support), interpolated, first, of_block| {
                 let OfBlock { x, v, F, affine } = of_block;
-                block.g2p(&c.strides, nodes, interpolated);
+                block.g2p((&c, support), nodes, interpolated);
                 take_velocity(&c, transfer, interpolated, v, affine);
                 for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                     *x += interpolated.velocity * c.time_step;
@@ -113,7 +115,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
         let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
         let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
-        if let Support::Polygons(corners) = support {
+        if let Support::Mesh(corners) = support {
             std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
             exchange.interpolate(&c, corners, reprojected);
             std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
@@ -129,13 +131,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
             (support, &*exchange),
             buffers,
             Transfer::Flip,
-            |block, interpolated, first, of_block| {
+            |(block, support), interpolated, first, of_block| {
                 let OfBlock { x, F, .. } = of_block;
-                block.g2p(&c.strides, nodes, interpolated);
+                block.g2p((&c, support), nodes, interpolated);
                 for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
                     *x += interpolated.velocity * c.time_step;
                 }
-                block.g2p(&c.strides, reprojected, interpolated);
+                block.g2p((&c, support), reprojected, interpolated);
                 stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
             },
         )
@@ -155,7 +157,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             node.values.copy_within(..D, D);
         }
         let Self { particles, constants, nodes, support, affine, buffers, exchange, .. } = self;
-        if let Support::Polygons(corners) = support {
+        if let Support::Mesh(corners) = support {
             exchange.interpolate(constants, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
@@ -170,27 +172,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
     }
 
-    /// CPDI2 and polygons: the corners of domains move with the grid; their new positions are stored beside the old.
+    /// The corners of domains move with the grid; their new positions are stored beside the old.
     pub(crate) fn move_corners(&mut self) {
         let Self { constants, nodes, support, exchange, .. } = self;
-        let (nodes, c) = (&nodes[..], *constants);
-        let (mesh, next) = match support {
-            Support::Cpdi2 { mesh, next } => (mesh, next),
-            Support::Polygons(corners) => {
-                exchange.interpolate(&c, corners, nodes);
-                corners.follow(&c, &exchange.values);
-                return;
-            }
-            Support::Product(_) | Support::Cpdi { .. } => return,
-        };
-        each_chunk(next, CHUNK, &|chunk, next| {
-            for (next, x) in next.iter_mut().zip(&mesh.x[chunk * CHUNK..]) {
-                *next = *x;
-                if !c.planted.is(Fault::CornersStay) {
-                    *next += velocity_at(&c, nodes, x) * c.time_step;
-                }
-            }
-        });
+        if let Support::Mesh(corners) = support {
+            exchange.interpolate(constants, corners, nodes);
+            corners.follow(constants, &exchange.values.nodes);
+        }
     }
 }
 
@@ -198,7 +186,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 struct FromGrid<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     support: &'a Support<T, D>,
-    nodes: &'a [Node<T, D>],
+    nodes: Seen<'a, T, D>,
     copies: Copies<T, D>,
     buffers: Box<Buffers<T, D>>,
 }
@@ -207,7 +195,7 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     fn new(
         c: &'a Constants<T, D>,
         support: &'a Support<T, D>,
-        nodes: &'a [Node<T, D>],
+        nodes: Seen<'a, T, D>,
         buffers: Box<Buffers<T, D>>,
     ) -> Self {
         Self { c, support, nodes, copies: Copies::new(), buffers }
@@ -229,13 +217,13 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
             &successive(first)[..x.len()],
             copies.of_successive(x, F),
         );
-        block.g2p(&c.strides, nodes, interpolated);
+        block.g2p((c, support), *nodes, interpolated);
         interpolated
     }
 }
 
 /// Velocities, and affine ones, by the transfer.
-fn take_velocity<T: Lanes, const D: usize>(
+pub(crate) fn take_velocity<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     transfer: Transfer,
     interpolated: &[Interpolated<T, D>],
@@ -262,7 +250,7 @@ fn take_velocity<T: Lanes, const D: usize>(
 }
 
 /// F at the end of the step: that after its early part, where it has one, stretched for a time `late`.
-fn stretch<T: Lanes, const D: usize>(
+pub(crate) fn stretch<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     late: T,
     F_early: Option<&[SMatrix<T, D, D>]>,
@@ -314,49 +302,71 @@ fn g2p<T: Lanes, const D: usize>(
     (support, exchange): (&mut Support<T, D>, &Exchange<T, D>),
     buffers: &BufferPool<T, D>,
     transfer: Transfer,
-    update: impl Fn(&mut Block<T, D>, &mut [Interpolated<T, D>], usize, &mut OfBlock<'_, T, D>) + Sync,
+    update: impl Fn(
+        (&mut Block<T, D>, &Support<T, D>),
+        &mut [Interpolated<T, D>],
+        usize,
+        &mut OfBlock<'_, T, D>,
+    ) + Sync,
 ) -> Outcome {
     let Particles { x, v, F, .. } = particles;
     let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
     let at_start = &*support;
+    // Where domains share corners, these have to be at their new places before particles are told invalid.
+    let is_in_doubt = AtomicBool::new(false);
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let mut outcome = Outcome::default();
         let mut copies = Copies::new();
         let mut own = buffers.take(at_start, transfer.is_affine());
         let Buffers { block, interpolated, .. } = &mut *own;
         for_blocks(chunk, |first, mut of_block| {
-            copies.copy(of_block.x, of_block.F);
+            let count = of_block.x.len();
+            if !matches!(at_start, Support::Mesh(_)) {
+                copies.copy(of_block.x, of_block.F);
+            }
             if c.planted.is(Fault::WeightsOfNewPosition) {
                 for (x, v) in copies.x.iter_mut().zip(&*of_block.v) {
                     *x += v * c.time_step;
                 }
             }
-            let count = of_block.x.len();
             block.compute_weights(&c, at_start, &successive(first)[..count], copies.kinematics());
-            update(block, &mut interpolated[..count], first, &mut of_block);
-            if let Support::Cpdi2 { .. } | Support::Polygons(_) = at_start {
-                // Checked below, when all corners are at their new places.
-                return;
-            }
+            update((block, at_start), &mut interpolated[..count], first, &mut of_block);
             let OfBlock { x, F, .. } = of_block;
-            outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
+            match at_start {
+                Support::Product(_) | Support::Cpdi { .. } => {
+                    outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
+                }
+                Support::Mesh(corners) => {
+                    let of_cells = corners.mesh.interpolation == Interpolation::Cell;
+                    if !of_cells || !cells_are_valid_next(&c, corners, (first, x, F)) {
+                        is_in_doubt.store(true, Ordering::Relaxed);
+                    }
+                }
+            }
         });
         buffers.give_back(own);
         found.add(outcome);
     });
-    match support {
-        Support::Cpdi2 { mesh, next } => std::mem::swap(&mut mesh.x, next),
-        Support::Polygons(corners) => {
-            corners.arrive();
-            found.add(exchange.check(&c, corners, bin_of));
-        }
-        Support::Product(_) | Support::Cpdi { .. } => return found.all(),
+    let Support::Mesh(corners) = support else { return found.all() };
+    corners.arrive(false);
+    found.add(exchange.check(&c, corners, bin_of));
+    if is_in_doubt.into_inner() {
+        found.add(check_all((particles, affine), (&c, support), bin_of));
     }
-    let support = &*support;
+    found.all()
+}
+
+/// Checks all particles.
+pub(crate) fn check_all<T: Lanes, const D: usize>(
+    (Particles { x, v, F, .. }, affine): (&mut Particles<T, D>, &mut [SMatrix<T, D, D>]),
+    (c, support): (&Constants<T, D>, &Support<T, D>),
+    bin_of: &[u32],
+) -> Outcome {
+    let found = SharedOutcome::default();
     each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
         let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
         for_blocks(chunk, |first, OfBlock { x, F, .. }| {
-            outcome = outcome.merge(check(&c, support, &mut copies, first, bin_of, x, F));
+            outcome = outcome.merge(check(c, support, &mut copies, first, bin_of, x, F));
         });
         found.add(outcome);
     });
@@ -374,8 +384,8 @@ fn check<T: Lanes, const D: usize>(
     F: &[SMatrix<T, D, D>],
 ) -> Outcome {
     let mut bins = [0; BLOCK];
-    // Bins of polygons are those of their corners.
-    if !matches!(support, Support::Polygons(_)) {
+    // Where domains share corners the bins are those of the corners.
+    if !matches!(support, Support::Mesh(_)) {
         bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
     }
     let mut outcome = Outcome::default();

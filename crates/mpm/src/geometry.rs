@@ -8,13 +8,16 @@ use crate::fault::{Fault, Planted};
 use crate::grid::{Grid, Layout};
 use crate::node::Node;
 use crate::parallel::bins::{BinRows, Bins};
-use crate::tensor::product;
+use crate::shape_function::HALF_SIZE_LIMIT;
+use crate::tensor::{product, real};
 
 /// Constants of a run: the grid's geometry, the rows of each bin, the time step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Constants<T, const D: usize> {
     pub(crate) lower: SVector<T, D>,
     pub(crate) upper: SVector<T, D>,
+    /// Whether its lower and its upper face across each axis are walls.
+    walls: [[bool; 2]; D],
     pub(crate) inverse_spacing: T,
     /// Distance in memory between neighbouring nodes along each axis.
     pub(crate) strides: [usize; D],
@@ -38,6 +41,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         Self {
             lower: grid.lower,
             upper: grid.upper(),
+            walls: grid.walls,
             inverse_spacing: grid.spacing.recip(),
             strides: layout.strides,
             nodes_before: (layout.first_row * layout.row()) as f64,
@@ -120,6 +124,18 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     /// Ends of the grid along an axis.
     pub(crate) fn range(&self, axis: usize) -> (T, T) {
         (self.lower[axis], self.upper[axis])
+    }
+
+    /// Whether `x` lies on a wall across an axis.
+    pub(crate) fn is_on_wall(&self, x: &SVector<T, D>, axis: usize) -> bool {
+        let [lower, upper] = self.walls[axis];
+        (lower && x[axis] == self.lower[axis]) || (upper && x[axis] == self.upper[axis])
+    }
+
+    /// The first axis along which `x` lies so far outside the grid that there are no nodes for it.
+    pub(crate) fn axis_beyond(&self, x: &SVector<T, D>) -> Option<usize> {
+        let margin = self.spacing() * real(HALF_SIZE_LIMIT);
+        (0..D).find(|&a| !(x[a] >= self.lower[a] - margin && x[a] <= self.upper[a] + margin))
     }
 
     /// The first axis along which `x` lies outside the grid.

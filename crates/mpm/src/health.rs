@@ -4,13 +4,10 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::body::Mesh;
-use crate::domain::{
-    self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, volume_of_cell,
-};
+use crate::domain::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram};
 use crate::geometry::Constants;
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::corners::{GROUP, OfGroup, cells, gather, padded, parallelograms};
+use crate::kernel::corners::{GROUP, OfGroup, gather, padded, parallelograms};
 use crate::shape_function::{
     EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
 };
@@ -43,8 +40,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return Some(Invalid::NotFinite);
         }
-        // The corners of polygons are looked at themselves.
-        if !matches!(self, Self::Polygons(_)) && c.axis_outside(x).is_some() {
+        if c.axis_outside(x).is_some() {
             return Some(Invalid::LeftGrid);
         }
         if let Some(volume) = self.volume(p) {
@@ -55,7 +51,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
                 return Some(Invalid::NotFinite);
             }
         }
-        self.axis_too_large(&self.half_size(c, p, x, F)).map(|_| Invalid::TooLarge)
+        self.axis_too_large(&self.half_size(c, p, F)).map(|_| Invalid::TooLarge)
     }
 
     /// Diagnoses a particle that may be invalid or outside its bin.
@@ -70,14 +66,24 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         if let Some(invalid) = self.invalidity(c, p, x, F) {
             return Outcome { failure: Some((invalid, p)), resort: false };
         }
-        if let Self::Polygons(_) = self {
-            return Outcome::default();
-        }
-        let l = self.half_size(c, p, x, F);
+        // Where domains share corners, these are what is sorted.
+        let is_inside = matches!(self, Self::Mesh(_)) || self.is_in_bin(c, p, bin, x, F);
+        Outcome { failure: None, resort: !is_inside }
+    }
+
+    /// Whether a particle is in a bin.
+    pub(crate) fn is_in_bin(
+        &self,
+        c: &Constants<T, D>,
+        p: usize,
+        bin: u32,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> bool {
+        let l = self.half_size(c, p, F);
         let Rows { edge, width } = self.rows(c, p, x, F, &l);
         let (first, end) = c.bins.range(bin, width);
-        let is_inside = edge >= real(first) && edge < real(end);
-        Outcome { failure: None, resort: !is_inside }
+        edge >= real(first) && edge < real(end)
     }
 
     /// Whether all particles `ids` of a block are valid, each in its own of `bins`. Nearly all are, and this tells it sooner
@@ -103,10 +109,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
                 let ids = &padded(ids);
                 dispatch(CheckParallelograms { of_block, half_edges, ids, all_valid: all });
             }
-            Self::Cpdi2 { mesh, .. } => {
-                dispatch(CheckCells { of_block, mesh, ids: &padded(ids), all_valid: all });
-            }
-            Self::Polygons(_) => {
+            Self::Mesh(_) => {
                 let Kinematics { x, F } = kinematics;
                 for (k, &p) in ids.iter().enumerate() {
                     all_valid &= self.invalidity(c, p as usize, &x[k], &F[k]).is_none();
@@ -256,33 +259,6 @@ impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
             let mut corners = [xi; MOST_CORNERS];
             for (corner, at) in corners.iter_mut().enumerate().take(1 << D) {
                 *at = corner_of_parallelogram(&xi, &E, corner);
-            }
-            all &= of_block.are_domains_valid(vectors, group, &corners);
-        }
-        *all_valid = all;
-    }
-}
-
-struct CheckCells<'a, 'b, T, const D: usize> {
-    of_block: OfBlock<'a, T, D>,
-    mesh: &'a Mesh<T, D>,
-    ids: &'a [usize; BLOCK],
-    all_valid: &'b mut bool,
-}
-
-impl<T: Lanes, const D: usize> Loop for CheckCells<'_, '_, T, D> {
-    const WIDE: bool = D > 1;
-
-    #[inline(always)]
-    fn run<V: Vectors>(self, vectors: V) {
-        let Self { of_block, mesh, ids, all_valid } = self;
-        let OfBlock { c, count, .. } = of_block;
-        let mut all = true;
-        for group in 0..count.div_ceil(GROUP).min(BLOCK / GROUP) {
-            let corners = cells(vectors, c, mesh, ids, group);
-            let volumes = volume_of_cell(&corners).lanes;
-            for volume in volumes.0 {
-                all &= volume > T::zero();
             }
             all &= of_block.are_domains_valid(vectors, group, &corners);
         }

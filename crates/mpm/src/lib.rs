@@ -56,7 +56,8 @@
 //! # Modules
 //!
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
-//! - `clip`: bodies of any shape; `polygons`: their particles, in space polyhedra; `shared_corners`, `corner_exchange`: P2G and G2P by way of corners.
+//! - `clip`: bodies of any shape; `mesh`: domains of particles on shared corners, cells of CPDI2, polygons and
+//!   polyhedra; `shared_corners`, `corner_exchange`, `corner_step`: P2G and G2P by way of corners.
 //! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
@@ -69,6 +70,7 @@ mod body_force;
 mod clip;
 mod corner_exchange;
 mod corner_halo;
+mod corner_step;
 mod decomposition;
 mod directory;
 mod domain;
@@ -84,11 +86,11 @@ mod grid_update;
 mod health;
 mod kernel;
 mod material;
+mod mesh;
 mod node;
 mod p2g;
 mod parallel;
 mod particles;
-mod polygons;
 mod prefetch;
 mod redistribute;
 mod saved_state;
@@ -106,7 +108,7 @@ pub mod total_lagrangian;
 mod weights;
 mod xpic;
 
-pub use body::{Annulus, Body, Mesh};
+pub use body::{Annulus, Body};
 pub use body_force::{AtTime, BodyForce, NoBodyForce};
 pub use clip::{Clip, Facet, Side};
 pub use decomposition::{Arrangement, Share};
@@ -114,8 +116,8 @@ pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
+pub use mesh::{Faces, Interpolation, Load, Mesh, Numbers};
 pub use particles::Particles;
-pub use polygons::{Faces, Load, Numbers, Polygons};
 pub use saved_state::{SavedState, SavedStateError};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;

@@ -10,7 +10,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
-use crate::corner_exchange::{Exchange, Given, Loading};
+use crate::corner_exchange::{ChunkSums, CornerValues, Exchange, Loading};
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
@@ -20,11 +20,12 @@ use crate::grid_update::{
 };
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
+use crate::kernel::shared::ToCorners;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
-use crate::shared_corners::{CHUNK, SharedCorners};
+use crate::shared_corners::{Chunk, SharedCorners};
 use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::StepTimes;
@@ -117,10 +118,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;
         let from = if is_first { &nodes[..] } else { &reprojected[..] };
-        if let Support::Polygons(corners) = support {
+        if let Support::Mesh(corners) = support {
             exchange.interpolate(&c, corners, from);
         }
-        let at_corners = std::mem::take(&mut exchange.values);
+        let at_corners = std::mem::replace(&mut exchange.values, CornerValues::none());
         let seen = support.seen(from, &at_corners);
         let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
         let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
@@ -128,7 +129,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                    _: &mut Copies<T, D>,
                    ids: &[u32]| {
             let interpolated = &mut interpolated[..ids.len()];
-            block.g2p(&c.strides, seen, interpolated);
+            block.g2p((&c, support), seen, interpolated);
             contributions.without_stress();
             for (value, (interpolated, &p)) in
                 contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
@@ -165,8 +166,8 @@ struct P2g<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> P2g<'_, T, D> {
-    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and for polygons
-    /// by way of their corners, with the loads on these.
+    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and by
+    /// way of corners where particles share them, with the loads on these.
     fn to_grid<S: NodeUpdate<T, D>>(
         &self,
         update: &GridUpdate<'_, T, S, D>,
@@ -174,51 +175,47 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         nodes: &mut [Node<T, D>],
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
-        let Support::Polygons(corners) = self.support else {
+        let Support::Mesh(corners) = self.support else {
             update.p2g(bins, nodes, &|band, first, ids| self.bin(band, first, ids, set));
             return;
         };
         self.to_corners(corners, exchange, set);
-        exchange.sum(self.c, corners, loading);
-        let exchange = &*exchange;
-        update.p2g(bins, nodes, &|band, first, ids| {
-            exchange.to_grid(self.c, corners, (band, first), ids);
-        });
+        exchange.load(corners, loading);
+        exchange.update_grid(update, (self.c, corners), bins, nodes);
     }
 
-    /// Keeps what `set` says of each particle, for the corners.
+    /// Sums what `set` says of each particle at its corners, chunk by chunk.
     fn to_corners(
         &self,
         corners: &SharedCorners<T, D>,
-        Exchange { given, affine, is_affine: has_affine, .. }: &mut Exchange<T, D>,
+        exchange: &mut Exchange<T, D>,
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
         let &Self { c, support, buffers: pool, is_affine, x, F } = self;
-        *has_affine = is_affine;
-        let mut of_affine = affine.chunks_mut(CHUNK);
-        let chunks = given.chunks_mut(CHUNK).enumerate();
-        let chunks: Vec<_> = chunks
-            .map(|(number, given)| (number * CHUNK, given, of_affine.next().unwrap_or_default()))
-            .collect();
-        each(chunks, &|(first, given, affine)| {
+        let chunks = &corners.chunks;
+        let pieces = chunks.iter().zip(exchange.begin(chunks, is_affine)).collect();
+        each(pieces, &|(Chunk { particles, .. }, mut of_chunk)| {
+            of_chunk.clear();
+            let ChunkSums { sums, affine_sums } = of_chunk;
             let mut copies = Copies::new();
             let mut buffers = pool.take(support, is_affine);
-            let mut of_affine = affine.chunks_mut(BLOCK);
-            for (index, given) in given.chunks_mut(BLOCK).enumerate() {
-                let ids = successive(first + index * BLOCK);
-                let ids = &ids[..given.len()];
+            for first in particles.clone().step_by(BLOCK) {
+                let ids = successive(first);
+                let ids = &ids[..BLOCK.min(particles.end - first)];
                 copies.pick(ids, x, F);
                 buffers.block.compute_weights(c, support, ids, copies.kinematics());
                 set(&mut buffers, &mut copies, ids);
-                let Buffers { contributions, .. } = &*buffers;
-                for (k, given) in given.iter_mut().enumerate() {
-                    let (value, stress_flux) =
-                        (contributions.value[k], contributions.stress_flux[k]);
-                    *given = Given { value, stress_flux };
+                ToCorners {
+                    c,
+                    corners,
+                    at: &corners.mesh.x,
+                    shares: corners.measured.from(&corners.mesh, first),
+                    particles: (first, ids.len()),
+                    contributions: &buffers.contributions,
+                    sums,
+                    affine_sums,
                 }
-                for (k, affine) in of_affine.next().unwrap_or_default().iter_mut().enumerate() {
-                    *affine = (contributions.affine[k], corners.centre(ids[k] as usize));
-                }
+                .add();
             }
             pool.give_back(buffers);
         });

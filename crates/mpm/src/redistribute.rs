@@ -1,16 +1,13 @@
 //! Particles go to the process of their bin.
 
-mod polygons;
+mod mesh;
 
-use std::collections::HashMap;
 use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
-use bytemuck::cast_slice;
 use nalgebra::{SMatrix, SVector};
 
-use crate::body::Mesh;
 use crate::decomposition::Move;
 use crate::domain::HalfEdges;
 use crate::node::Node;
@@ -22,11 +19,11 @@ use crate::support::Support;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,
-    /// or of each corner of their polygons.
+    /// or of each corner that they share.
     pub(crate) fn sort_as(&mut self, mut keys: Vec<u32>) {
         if self.part.is_some() {
             keys = match self.support {
-                Support::Polygons(_) => self.give_polygons(&keys),
+                Support::Mesh(_) => self.give_mesh(&keys),
                 _ => self.give_to_bins(keys),
             };
         }
@@ -48,7 +45,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         keys
     }
 
-    /// Gives every particle to the processes `to(particle)`, and tells how they move; polygons stay.
+    /// Gives every particle to the processes `to(particle)`, and tells how they move; a mesh stays.
     pub(crate) fn give<'a>(&mut self, to: &dyn Fn(usize) -> &'a [usize]) -> Option<Move> {
         let Self { particles, support, part, .. } = self;
         let part = part.as_mut()?;
@@ -60,14 +57,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
         moved.replace(F);
         [&mut *mass, &mut *volume].into_iter().for_each(|numbers| moved.replace(numbers));
         match support {
-            Support::Product(_) | Support::Polygons(_) => {}
+            Support::Product(_) | Support::Mesh(_) => {}
             Support::Cpdi { half_edges } => {
                 let each: Vec<_> = (0..before).map(|p| *half_edges.of(p)).collect();
                 *half_edges = HalfEdges::new(moved.all(&each));
-            }
-            Support::Cpdi2 { mesh, next } => {
-                *mesh = move_corners(mesh, &moved);
-                next.clone_from(&mesh.x);
             }
         }
         if part.is_affine {
@@ -105,27 +98,4 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.filtered = vec![SVector::zeros(); layout.nodes];
         }
     }
-}
-
-/// The corners of the particles that come; neighbours share them as before.
-fn move_corners<T: Lanes, const D: usize>(mesh: &Mesh<T, D>, moved: &Move) -> Mesh<T, D> {
-    let mut new = Mesh { corners: vec![[0; 8]; moved.len()], ..Mesh::default() };
-    // Corners are one where their reference positions are, which all processes have computed alike.
-    let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
-    for corner in 0..1 << D {
-        let of_particle = |positions: &[SVector<T, D>]| -> Vec<SVector<T, D>> {
-            mesh.corners.iter().map(|corners| positions[corners[corner] as usize]).collect()
-        };
-        let (X, x) = (moved.all(&of_particle(&mesh.X)), moved.all(&of_particle(&mesh.x)));
-        for (p, (X, x)) in X.into_iter().zip(x).enumerate() {
-            let key = cast_slice::<T, u8>(X.as_slice()).to_vec();
-            let place = *known.entry(key).or_insert_with(|| {
-                new.X.push(X);
-                new.x.push(x);
-                new.X.len() as u32 - 1
-            });
-            new.corners[p][corner] = place;
-        }
-    }
-    new
 }

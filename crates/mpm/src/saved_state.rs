@@ -89,11 +89,9 @@ struct Saved<T, const D: usize> {
     v: Vec<SVector<T, D>>,
     F: Vec<SMatrix<T, D, D>>,
     affine: Vec<SMatrix<T, D, D>>,
-    /// Cells: the first, second, ... corner of each particle.
-    corners: Vec<Vec<SVector<T, D>>>,
-    /// Polygons: the numbers of the corners that have the keys.
+    /// Shared corners: the numbers of those that have the keys.
     corner_ids: Vec<u64>,
-    /// Polygons: their positions.
+    /// Their positions.
     corner_x: Vec<SVector<T, D>>,
 }
 
@@ -101,17 +99,8 @@ struct Saved<T, const D: usize> {
 #[derive(Clone, Copy)]
 struct Kind {
     is_affine: bool,
-    corners: Corners,
-}
-
-/// What corners particles have that belong to the state.
-#[derive(Clone, Copy, PartialEq)]
-enum Corners {
-    None,
-    /// Those of cells, an array of places a particle.
-    OfCells,
-    /// Those of polygons. Keys are theirs: those of the first ones, which one process alone has.
-    OfPolygons,
+    /// Whether they share corners. Keys are theirs then: those of the first ones, which one process alone has.
+    has_corners: bool,
 }
 
 /// The elements of a saved array, which are as many as `count`.
@@ -136,7 +125,6 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
             v: Vec::new(),
             F: Vec::new(),
             affine: Vec::new(),
-            corners: vec![Vec::new(); 1 << D],
             corner_ids: Vec::new(),
             corner_x: Vec::new(),
         };
@@ -145,8 +133,8 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
     }
 
     fn add(&mut self, part: SavedState) -> Result<(), SavedStateError> {
-        let Kind { is_affine, corners } = self.kind;
-        let (found, expected) = (part.len(), if corners == Corners::None { 7 } else { 9 });
+        let Kind { is_affine, has_corners } = self.kind;
+        let (found, expected) = (part.len(), if has_corners { 9 } else { 7 });
         if found != expected {
             return Err(SavedStateError::Arrays { found, expected });
         }
@@ -165,35 +153,17 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
         self.F.extend(elements::<SMatrix<T, D, D>>(next(), count)?);
         let affine = if is_affine { count } else { 0 };
         self.affine.extend(elements::<SMatrix<T, D, D>>(next(), affine)?);
-        let keyed = match corners {
-            Corners::None | Corners::OfCells => count,
-            Corners::OfPolygons => keys.len() / size_of::<u32>(),
-        };
+        let keyed = if has_corners { keys.len() / size_of::<u32>() } else { count };
         self.keys.extend(elements::<u32>(keys, keyed)?);
-        match corners {
-            Corners::None => {}
-            Corners::OfCells => {
-                let x = next();
-                let corners = x.len() / size_of::<SVector<T, D>>();
-                let x: Vec<SVector<T, D>> = elements(x, corners)?;
-                let of_particles: Vec<[u32; 8]> = elements(next(), count)?;
-                for (corner, positions) in self.corners.iter_mut().enumerate() {
-                    for own in &of_particles {
-                        let x = x.get(own[corner] as usize).ok_or(SavedStateError::Place)?;
-                        positions.push(*x);
-                    }
-                }
+        if has_corners {
+            let (x, ids) = (next(), next());
+            let corners = x.len() / size_of::<SVector<T, D>>();
+            let (x, ids) = (elements::<SVector<T, D>>(x, corners)?, numbers(ids, corners)?);
+            if keyed > corners {
+                return Err(SavedStateError::Place);
             }
-            Corners::OfPolygons => {
-                let (x, ids) = (next(), next());
-                let corners = x.len() / size_of::<SVector<T, D>>();
-                let (x, ids) = (elements::<SVector<T, D>>(x, corners)?, numbers(ids, corners)?);
-                if keyed > corners {
-                    return Err(SavedStateError::Place);
-                }
-                self.corner_x.extend(&x[..keyed]);
-                self.corner_ids.extend(&ids[..keyed]);
-            }
+            self.corner_x.extend(&x[..keyed]);
+            self.corner_ids.extend(&ids[..keyed]);
         }
         Ok(())
     }
@@ -206,9 +176,6 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
         if self.kind.is_affine {
             moved.replace(&mut self.affine);
         }
-        if self.kind.corners == Corners::OfCells {
-            self.corners.iter_mut().for_each(|positions| moved.replace(positions));
-        }
     }
 }
 
@@ -220,16 +187,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
         let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
         arrays.extend([cast_slice(x), cast_slice(v), cast_slice(F), cast_slice(affine)]);
-        match support {
-            Support::Cpdi2 { mesh, .. } => {
-                arrays.extend([cast_slice(&mesh.x), cast_slice(&mesh.corners)]);
-            }
-            Support::Polygons(corners) => {
-                let numbers = corners.polygons.numbers.as_ref();
-                let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
-                arrays.extend([cast_slice(&corners.polygons.x), cast_slice(numbers)]);
-            }
-            Support::Product(_) | Support::Cpdi { .. } => {}
+        if let Support::Mesh(corners) = support {
+            let numbers = corners.mesh.numbers.as_ref();
+            let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
+            arrays.extend([cast_slice(&corners.mesh.x), cast_slice(numbers)]);
         }
         arrays
     }
@@ -245,11 +206,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
         let kind = Kind {
             is_affine: self.transfer.is_affine(),
-            corners: match self.support {
-                Support::Product(_) | Support::Cpdi { .. } => Corners::None,
-                Support::Cpdi2 { .. } => Corners::OfCells,
-                Support::Polygons(_) => Corners::OfPolygons,
-            },
+            has_corners: matches!(self.support, Support::Mesh(_)),
         };
         let saved = self.agreed(Saved::of_parts(parts, kind))?;
         let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
@@ -259,7 +216,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let steps_done = ranks.as_ref().map_or(steps_done, |ranks| ranks.largest(steps_done));
         let keys = match self.support {
-            Support::Polygons(_) => self.put_polygons(saved)?,
+            Support::Mesh(_) => self.put_mesh(saved)?,
             _ => self.put_particles(saved)?,
         };
         self.sort_as(keys);
@@ -290,30 +247,22 @@ impl<T: Lanes, const D: usize> State<T, D> {
         };
         self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
 
-        let Saved { keys, x, v, F, affine, corners, .. } = saved;
+        let Saved { keys, x, v, F, affine, .. } = saved;
         (self.particles.x, self.particles.v, self.particles.F) = (x, v, F);
         self.affine = affine;
-        if let Support::Cpdi2 { mesh, next } = &mut self.support {
-            for (corner, positions) in corners.iter().enumerate() {
-                for (own, x) in mesh.corners.iter().zip(positions) {
-                    mesh.x[own[corner] as usize] = *x;
-                }
-            }
-            next.clone_from(&mesh.x);
-        }
         Ok(keys)
     }
 
-    /// Puts polygons in place, where they are. Gives the keys of their corners.
-    fn put_polygons(&mut self, saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
-        let Support::Polygons(corners) = &self.support else { return Ok(Vec::new()) };
+    /// Puts particles that share corners in place, where they are. Gives the keys of their corners.
+    fn put_mesh(&mut self, saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
+        let Support::Mesh(corners) = &self.support else { return Ok(Vec::new()) };
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let ids = match &self.part {
             Some(part) => part.ids.to_vec(),
             None => (0..self.particles.len() as u64).collect(),
         };
         let numbers: Vec<u64> =
-            (0..corners.count()).map(|corner| corners.polygons.number(corner)).collect();
+            (0..corners.count()).map(|corner| corners.mesh.number(corner)).collect();
         let particles = Directory::new(ranks.as_ref(), &saved.ids).ask(&ids);
         let points = Directory::new(ranks.as_ref(), &saved.corner_ids).ask(&numbers);
         // All processes ask before one of them gives up.
@@ -326,7 +275,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.affine = particles.fetch(&saved.affine);
         }
         let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
-        if let Support::Polygons(corners) = &mut self.support {
+        if let Support::Mesh(corners) = &mut self.support {
             corners.positions().copy_from_slice(&x);
         }
         Ok(keys)

@@ -1,33 +1,46 @@
-//! The corners that polygons share, with their shares of means and mean gradients at the current positions.
+//! The corners that domains of particles share, with their shares of means and mean gradients at the current positions.
+
+use std::array;
+use std::ops::Range;
 
 use nalgebra::SVector;
 
 use crate::corner_halo::CornerHalo;
+use crate::domain::volume_of_cell;
 use crate::fault::Fault;
 use crate::geometry::Constants;
+use crate::mesh::{Interpolation, Mesh, Share};
 use crate::node::Node;
 use crate::parallel::chunks::{each, each_chunk};
-use crate::polygons::{Polygons, Share};
 use crate::shape_function::ProductShape;
-use crate::simd::Lanes;
+use crate::simd::{Lanes, One};
 
-/// Corners or particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
+/// Corners handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 pub(crate) const CHUNK: usize = 1024;
 
-/// Polygons, with the shares of their corners at the current positions.
+/// Particles whose contributions are summed together, by their numbers in the whole body; fixed, so that no sum depends on the number of
+/// threads or processes. In space a plane of a lattice has many, and as many corners.
+const fn per_chunk(dimension: usize) -> u64 {
+    if dimension < 3 { 1024 } else { 4096 }
+}
+
+/// Domains, with the shares of their corners at the current positions.
 #[derive(Debug)]
 pub(crate) struct SharedCorners<T, const D: usize> {
-    pub(crate) polygons: Polygons<T, D>,
+    pub(crate) mesh: Mesh<T, D>,
     /// Positions at the end of a step.
-    next: Vec<SVector<T, D>>,
-    /// Whether shares and areas are those of the positions.
+    pub(crate) next: Vec<SVector<T, D>>,
+    /// Mesh: whether shares and areas are those of the positions.
     is_measured: bool,
-    /// For each place in the list of corners.
-    pub(crate) shares: Vec<Share<T, D>>,
-    /// The area of each particle.
-    volumes: Vec<T>,
-    /// The places of each corner, corner after corner.
-    places: Vec<Place>,
+    pub(crate) measured: Measured<T, D>,
+    /// Cells: whether each corner of a particle is the one after that of the particle before.
+    pub(crate) is_next: Vec<bool>,
+    /// Particles whose contributions are summed together.
+    pub(crate) chunks: Vec<Chunk>,
+    /// For each place in the list of corners which of its chunk's sums is that of its corner.
+    pub(crate) sum_at: Vec<u32>,
+    /// The sums of each corner, corner after corner, each in the order of chunks.
+    sums: Vec<u32>,
     /// Where those of each corner end.
     ends: Vec<u32>,
     /// The shape function at a corner, by which it reaches nodes.
@@ -38,54 +51,164 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     pub(crate) halo: Option<CornerHalo>,
 }
 
-/// A place in the list of corners, and the particle that it belongs to.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
-    pub(crate) share: u32,
-    pub(crate) particle: u32,
+/// Mesh: shares and areas. Those of cells are computed where they are used, which takes less time than to read them from memory.
+#[derive(Debug)]
+pub(crate) struct Measured<T, const D: usize> {
+    /// For each place in the list of corners.
+    pub(crate) shares: Vec<Share<T, D>>,
+    /// The area of each particle.
+    volumes: Vec<T>,
+}
+
+/// The same of some successive particles.
+pub(crate) struct MeasuredPart<'a, T, const D: usize> {
+    shares: &'a mut [Share<T, D>],
+    volumes: &'a mut [T],
+}
+
+impl<T: Lanes, const D: usize> Measured<T, D> {
+    pub(crate) fn none() -> Self {
+        Self { shares: Vec::new(), volumes: Vec::new() }
+    }
+
+    fn new(mesh: &Mesh<T, D>) -> Self {
+        let (mut shares, mut volumes) = (Vec::new(), Vec::new());
+        if mesh.interpolation == Interpolation::Triangles {
+            let particles = mesh.of_particles.len();
+            shares.resize(mesh.corners.len(), Share { w: T::zero(), g: [T::zero(); D] });
+            volumes.resize(particles, T::zero());
+            (0..particles).for_each(|p| mesh.means(p, &mut shares[mesh.places(p)]));
+        }
+        Self { shares, volumes }
+    }
+
+    /// Those of a particle and the ones after it.
+    pub(crate) fn from(&self, mesh: &Mesh<T, D>, first: usize) -> &[Share<T, D>] {
+        self.shares.get(mesh.places(first).start..).unwrap_or_default()
+    }
+
+    /// Split among successive particles, which are all.
+    pub(crate) fn split(
+        &mut self,
+        mesh: &Mesh<T, D>,
+        particles: impl Iterator<Item = Range<usize>>,
+    ) -> Vec<MeasuredPart<'_, T, D>> {
+        let (mut shares, mut volumes) = (&mut self.shares[..], &mut self.volumes[..]);
+        let of_particles = particles.map(|particles| {
+            let (start, end) =
+                (mesh.places(particles.start).start, mesh.places(particles.end - 1).end);
+            let of_shares = shares.len().min(end - start);
+            let own = shares.split_off_mut(..of_shares).unwrap_or_default();
+            let of_volumes = volumes.len().min(particles.len());
+            let volumes = volumes.split_off_mut(..of_volumes).unwrap_or_default();
+            MeasuredPart { shares: own, volumes }
+        });
+        of_particles.collect()
+    }
+}
+
+impl<T: Lanes, const D: usize> MeasuredPart<'_, T, D> {
+    /// The shares of a particle and the ones after it, where the first one of all is `of_all`.
+    pub(crate) fn from(
+        &self,
+        mesh: &Mesh<T, D>,
+        (of_all, first): (usize, usize),
+    ) -> &[Share<T, D>] {
+        let start = mesh.places(first).start - mesh.places(of_all).start;
+        self.shares.get(start..).unwrap_or_default()
+    }
+
+    /// Computes those of some particles between corners at `x`, where the first one of all is `of_all`; tells whether all have an area.
+    pub(crate) fn at(
+        &mut self,
+        mesh: &Mesh<T, D>,
+        x: &[SVector<T, D>],
+        (of_all, particles): (usize, Range<usize>),
+    ) -> bool {
+        let before = mesh.places(of_all).start;
+        let volumes = self.volumes.get_mut(particles.start - of_all..).unwrap_or_default();
+        let mut have_area = true;
+        for (p, volume) in particles.zip(volumes) {
+            let places = mesh.places(p);
+            let own = &mut self.shares[places.start - before..places.end - before];
+            *volume = mesh.slopes(x, p, own);
+            have_area &= *volume > T::zero();
+        }
+        have_area
+    }
+}
+
+/// Successive particles, and their sums: one for each corner at which one of them is.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunk {
+    pub(crate) particles: Range<usize>,
+    pub(crate) sums: Range<usize>,
 }
 
 impl<T: Lanes, const D: usize> SharedCorners<T, D> {
-    pub(crate) fn new(polygons: Polygons<T, D>, at_corner: ProductShape<T, D>) -> Self {
-        let own = polygons.X.len();
-        Self::of_part(polygons, at_corner, (own, None))
+    pub(crate) fn new(mesh: Mesh<T, D>, at_corner: ProductShape<T, D>) -> Self {
+        let ids: Vec<u64> = (0..mesh.of_particles.len() as u64).collect();
+        let own = mesh.X.len();
+        Self::of_part(mesh, at_corner, &ids, (own, None))
     }
 
-    /// Where this process sorts the first `own` corners, and others do the rest.
+    /// Of particles with these numbers in the whole body, ascending, where this process sorts the first `own` corners, and others do the
+    /// rest.
     pub(crate) fn of_part(
-        polygons: Polygons<T, D>,
+        mesh: Mesh<T, D>,
         at_corner: ProductShape<T, D>,
+        ids: &[u64],
         (own, halo): (usize, Option<CornerHalo>),
     ) -> Self {
-        let mut places = vec![Place { share: 0, particle: 0 }; polygons.corners.len()];
-        let mut ends = vec![0; polygons.X.len() + 1];
-        for &corner in &polygons.corners {
+        let count = mesh.X.len();
+        let mut chunks: Vec<Chunk> = Vec::new();
+        let mut sum_at = Vec::with_capacity(mesh.corners.len());
+        // The corner of each sum.
+        let mut corners: Vec<u32> = Vec::new();
+        let mut first = 0;
+        let of_one = |a: &u64, b: &u64| a / per_chunk(D) == b / per_chunk(D);
+        for ids in ids.chunk_by(of_one) {
+            let end = first + ids.len();
+            let of_chunk = &mesh.corners[mesh.places(first).start..mesh.places(end - 1).end];
+            let start = corners.len();
+            corners.extend(of_chunk);
+            corners[start..].sort_unstable();
+            let touched = deduplicated(&mut corners[start..]);
+            corners.truncate(start + touched);
+            let touched = &corners[start..];
+            sum_at.extend(
+                of_chunk
+                    .iter()
+                    .map(|corner| touched.partition_point(|known| known < corner) as u32),
+            );
+            chunks.push(Chunk { particles: first..end, sums: start..corners.len() });
+            first = end;
+        }
+        let mut ends = vec![0; count + 1];
+        for &corner in &corners {
             ends[corner as usize + 1] += 1;
         }
         for corner in 1..ends.len() {
             ends[corner] += ends[corner - 1];
         }
-        let particles = polygons.of_particles.len();
-        for p in 0..particles {
-            for share in polygons.places(p) {
-                let next = &mut ends[polygons.corners[share] as usize];
-                places[*next as usize] = Place { share: share as u32, particle: p as u32 };
-                *next += 1;
-            }
+        let mut sums = vec![0; corners.len()];
+        for (sum, &corner) in corners.iter().enumerate() {
+            let next = &mut ends[corner as usize];
+            sums[*next as usize] = sum as u32;
+            *next += 1;
         }
         ends.pop();
-        let share = Share { corner: 0, w: T::zero(), g: [T::zero(); D] };
-        let mut shares = vec![share; polygons.corners.len()];
-        (0..particles).for_each(|p| polygons.means(p, &mut shares[polygons.places(p)]));
         let mut all = Self {
-            next: polygons.x.clone(),
+            next: mesh.x.clone(),
             is_measured: false,
-            shares,
-            volumes: vec![T::zero(); particles],
-            places,
+            measured: Measured::new(&mesh),
+            is_next: are_next(&mesh),
+            chunks,
+            sum_at,
+            sums,
             ends,
             at_corner,
-            polygons,
+            mesh,
             own,
             halo,
         };
@@ -96,58 +219,43 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     /// The positions, which the caller may overwrite.
     pub(crate) fn positions(&mut self) -> &mut [SVector<T, D>] {
         self.is_measured = false;
-        &mut self.polygons.x
+        &mut self.mesh.x
     }
 
-    /// Computes shares and areas at the current positions, if they are of others.
+    /// Mesh: computes shares and areas at the current positions, if they are of others.
     pub(crate) fn measure(&mut self) {
-        let Self { polygons, shares, volumes, is_measured, .. } = self;
+        let Self { mesh, measured, is_measured, .. } = self;
         if std::mem::replace(is_measured, true) {
             return;
         }
-        let mut rest = &mut shares[..];
-        let mut pieces = Vec::new();
-        let mut done = 0;
-        for (number, volumes) in volumes.chunks_mut(CHUNK).enumerate() {
-            let first = number * CHUNK;
-            let end = polygons.places(first + volumes.len() - 1).end;
-            let (own, others) = std::mem::take(&mut rest).split_at_mut(end - done);
-            (rest, done) = (others, end);
-            pieces.push((first, volumes, own));
-        }
-        let polygons = &*polygons;
-        each(pieces, &|(first, volumes, shares)| {
-            let before = polygons.places(first).start;
-            for (k, volume) in volumes.iter_mut().enumerate() {
-                let places = polygons.places(first + k);
-                let own = &mut shares[places.start - before..places.end - before];
-                *volume = polygons.slopes(first + k, own);
-            }
+        let particles = mesh.of_particles.len();
+        let firsts = (0..particles).step_by(CHUNK);
+        let pieces = firsts.map(|first| first..particles.min(first + CHUNK));
+        let pieces: Vec<_> = pieces.clone().zip(measured.split(mesh, pieces)).collect();
+        let mesh = &*mesh;
+        each(pieces, &|(particles, mut measured)| {
+            let of_all = particles.start;
+            measured.at(mesh, &mesh.x, (of_all, particles));
         });
     }
 
-    /// The area of a particle.
+    /// The length, area or volume of a particle's domain.
     pub(crate) fn volume(&self, p: usize) -> T {
-        self.volumes[p]
-    }
-
-    /// The shares of a particle's corners.
-    pub(crate) fn of_particle(&self, p: usize) -> &[Share<T, D>] {
-        &self.shares[self.polygons.places(p)]
-    }
-
-    /// The mean of a particle's polygons.
-    pub(crate) fn centre(&self, p: usize) -> SVector<T, D> {
-        let mut centre = SVector::zeros();
-        for Share { corner, w, .. } in self.of_particle(p) {
-            centre += self.polygons.x[*corner as usize] * *w;
+        let Mesh { interpolation, x, .. } = &self.mesh;
+        match interpolation {
+            Interpolation::Triangles => self.measured.volumes[p],
+            Interpolation::Cell => {
+                let own = self.mesh.of_particle(p);
+                let at = |corner: usize, a: usize| One(x[own[corner % own.len()] as usize][a]);
+                let x = array::from_fn(|corner| array::from_fn(|a| at(corner, a)));
+                volume_of_cell::<_, D>(&x).0
+            }
         }
-        centre
     }
 
     /// Number of corners.
     pub(crate) fn count(&self) -> usize {
-        self.polygons.x.len()
+        self.mesh.x.len()
     }
 
     /// Number of corners that this process sorts: the first ones.
@@ -157,33 +265,38 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
 
     /// A corner's position along the axes of the grid.
     pub(crate) fn at(&self, corner: usize) -> SVector<T, D> {
-        let x = self.polygons.x[corner];
-        match &self.polygons.turn {
+        let x = self.mesh.x[corner];
+        match &self.mesh.turn {
             Some(turn) => turn * x,
             None => x,
         }
     }
 
-    /// The places of a corner.
-    pub(crate) fn places_of(&self, corner: usize) -> &[Place] {
+    /// The sums of a corner, in the order in which they are added.
+    #[inline]
+    pub(crate) fn sums_of(&self, corner: usize) -> &[u32] {
         let start = if corner == 0 { 0 } else { self.ends[corner - 1] };
-        &self.places[start as usize..self.ends[corner] as usize]
+        &self.sums[start as usize..self.ends[corner] as usize]
     }
 
-    /// A particle at a corner.
+    /// Number of sums.
+    pub(crate) fn sums(&self) -> usize {
+        self.sums.len()
+    }
+
+    /// The first particle at a corner.
     pub(crate) fn particle_at(&self, corner: usize) -> usize {
-        self.places_of(corner).first().map_or(0, |place| place.particle as usize)
+        let place = self.mesh.corners.iter().position(|own| *own as usize == corner);
+        let place = place.unwrap_or(0);
+        (0..self.mesh.of_particles.len()).find(|&p| self.mesh.places(p).end > place).unwrap_or(0)
     }
 
     /// Stores the positions after a step with the velocities `values` of the corners.
     pub(crate) fn follow(&mut self, c: &Constants<T, D>, values: &[Node<T, D>]) {
-        let Self { polygons, next, .. } = self;
-        let x = &polygons.x[..];
+        let Self { mesh, next, .. } = self;
+        let x = &mesh.x[..];
         // What wide splines leave of the velocity across a wall, which is zero but for rounding, would take a corner off the grid.
-        let is_on_wall = |x: &SVector<T, D>, a: usize| {
-            let (lower, upper) = c.range(a);
-            polygons.turn.is_none() && (x[a] == lower || x[a] == upper)
-        };
+        let is_on_wall = |x, axis| mesh.turn.is_none() && c.is_on_wall(x, axis);
         each_chunk(next, CHUNK, &|chunk, next| {
             let first = chunk * CHUNK;
             for ((next, x), value) in next.iter_mut().zip(&x[first..]).zip(&values[first..]) {
@@ -197,10 +310,35 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         });
     }
 
-    /// Puts the corners at their new places.
-    pub(crate) fn arrive(&mut self) {
-        std::mem::swap(&mut self.polygons.x, &mut self.next);
-        self.is_measured = false;
+    /// Puts the corners at their new places, at which shares are known or not.
+    pub(crate) fn arrive(&mut self, is_measured: bool) {
+        std::mem::swap(&mut self.mesh.x, &mut self.next);
+        self.is_measured = is_measured;
         self.measure();
     }
+}
+
+/// See [`SharedCorners::is_next`].
+fn are_next<T: Lanes, const D: usize>(mesh: &Mesh<T, D>) -> Vec<bool> {
+    let of_one = 1 << D;
+    let pairs = mesh.corners.chunks(of_one).zip(mesh.corners.chunks(of_one).skip(1));
+    let is_next = |(before, own): (&[u32], &[u32])| {
+        own.iter().zip(before).all(|(corner, before)| *corner == before + 1)
+    };
+    match mesh.interpolation {
+        Interpolation::Triangles => Vec::new(),
+        Interpolation::Cell => std::iter::once(false).chain(pairs.map(is_next)).collect(),
+    }
+}
+
+/// Puts one of each of ascending numbers first, and tells how many these are.
+fn deduplicated(numbers: &mut [u32]) -> usize {
+    let mut count = 0;
+    for k in 0..numbers.len() {
+        if count == 0 || numbers[count - 1] != numbers[k] {
+            numbers[count] = numbers[k];
+            count += 1;
+        }
+    }
+    count
 }

@@ -4,9 +4,10 @@ use std::fmt;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::body::{Body, Mesh};
+use crate::body::Body;
 use crate::body_force::BodyForce;
 use crate::corner_exchange::Exchange;
+use crate::corner_exchange::invalidity_of_corner;
 use crate::decomposition::{Arrangement, Part, Share, admit};
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
@@ -16,10 +17,10 @@ use crate::health::{Invalid, Outcome};
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
+use crate::mesh::{Interpolation, Mesh};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
-use crate::polygons::Polygons;
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape_function::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
@@ -152,10 +153,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
             Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p))
         });
         let worst = match &state.support {
-            Support::Polygons(corners) => {
-                let of_corners = (0..corners.count()).filter_map(|corner| {
-                    state.exchange.invalidity(&state.constants, corners, corner)
-                });
+            Support::Mesh(corners) => {
+                let of_corners = (0..corners.count())
+                    .filter_map(|corner| invalidity_of_corner(&state.constants, corners, corner));
                 worst.chain(of_corners).min()
             }
             _ => worst.min(),
@@ -193,14 +193,14 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         Ok(())
     }
 
-    /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag). With polygons and several
+    /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag). With shared corners and several
     /// processes these are also the particles of others that share corners with this one's; see [`own_particles`](Self::own_particles).
     pub fn particles(&self) -> &Particles<T, D> {
         &self.state.particles
     }
 
     /// The particles that this process alone holds, those of its [`arrangement`](Self::arrangement): all
-    /// [`particles`](Self::particles), but for polygons of several processes.
+    /// [`particles`](Self::particles), but for those that share corners with particles of others.
     pub fn own_particles(&mut self) -> &Particles<T, D> {
         self.observed().0
     }
@@ -220,18 +220,10 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         self.state.part.as_ref().map(Part::arrangement)
     }
 
-    /// The corners of the particles' domains at the current time, with CPDI2.
+    /// The domains of the particles at the current time, where they share corners.
     pub fn mesh(&self) -> Option<&Mesh<T, D>> {
         match &self.state.support {
-            Support::Cpdi2 { mesh, .. } => Some(mesh),
-            Support::Product(_) | Support::Cpdi { .. } | Support::Polygons(_) => None,
-        }
-    }
-
-    /// The polygons of the particles at the current time, where their domains are such.
-    pub fn polygons(&self) -> Option<&Polygons<T, D>> {
-        match &self.state.support {
-            Support::Polygons(corners) => Some(&corners.polygons),
+            Support::Mesh(corners) => Some(&corners.mesh),
             _ => None,
         }
     }
@@ -333,7 +325,7 @@ fn check<T: Lanes, const D: usize>(
     if settings.halve_first_acceleration && !settings.integrator.is_staggered() {
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
-    let Body { particles, half_edges, mesh, polygons } = body;
+    let Body { particles, half_edges, mesh } = body;
     let Particles { X, x, v, F, mass, volume, half_size } = particles;
     let expected = X.len();
     let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
@@ -345,14 +337,10 @@ fn check<T: Lanes, const D: usize>(
         ("volume", volume.len()),
         ("half_edges", boxes),
         ("ids", share.map_or(expected, |share| share.ids.len())),
-        ("corners", mesh.as_ref().map_or(expected, |mesh| mesh.corners.len())),
     ] {
         if found != expected {
             return Err(SetupError::LengthMismatch { array, found, expected });
         }
-    }
-    if share.is_some() && polygons.as_ref().is_some_and(|own| own.numbers.is_none()) {
-        return Err(SetupError::NoNumbers);
     }
     if expected == 0 && share.is_none() {
         return Err(SetupError::NoParticles);
@@ -391,36 +379,27 @@ fn check<T: Lanes, const D: usize>(
             _ => {}
         }
     }
-    if let Some(polygons) = polygons {
-        if !matches!(settings.shape, Shape::Cpdi2 | Shape::Bspline2 | Shape::Bspline3) {
-            return Err(SetupError::NotOfPolygons { shape: settings.shape.to_string() });
-        }
-        if polygons.turn.is_some() && grid.walls.iter().flatten().any(|is_wall| *is_wall) {
-            return Err(SetupError::TurnedWalls);
-        }
-        return polygons.check(expected);
-    }
     match mesh {
-        _ if settings.shape != Shape::Cpdi2 => Ok(()),
-        Some(mesh) => check_corners(mesh),
-        None => Err(SetupError::NoCorners),
-    }
-}
-
-fn check_corners<T, const D: usize>(mesh: &Mesh<T, D>) -> Result<(), SetupError> {
-    let (expected, found) = (mesh.X.len(), mesh.x.len());
-    if found != expected {
-        return Err(SetupError::LengthMismatch { array: "x of the corners", found, expected });
-    }
-    let mut idle = vec![true; expected];
-    for &corner in mesh.corners.iter().flat_map(|corners| &corners[..1 << D]) {
-        let corner = corner as usize;
-        *idle.get_mut(corner).ok_or(SetupError::NoSuchCorner { corner, corners: expected })? =
-            false;
-    }
-    match idle.iter().position(|&idle| idle) {
-        Some(corner) => Err(SetupError::IdleCorner { corner }),
+        None if settings.shape == Shape::Cpdi2 => Err(SetupError::NoCorners),
         None => Ok(()),
+        // Shapes without corners do without.
+        Some(cells)
+            if cells.interpolation == Interpolation::Cell && settings.shape != Shape::Cpdi2 =>
+        {
+            Ok(())
+        }
+        Some(mesh) => {
+            if !matches!(settings.shape, Shape::Cpdi2 | Shape::Bspline2 | Shape::Bspline3) {
+                return Err(SetupError::NotOfPolygons { shape: settings.shape.to_string() });
+            }
+            if share.is_some() && mesh.numbers.is_none() {
+                return Err(SetupError::NoNumbers);
+            }
+            if mesh.turn.is_some() && grid.walls.iter().flatten().any(|is_wall| *is_wall) {
+                return Err(SetupError::TurnedWalls);
+            }
+            mesh.check(expected)
+        }
     }
 }
 
@@ -441,13 +420,14 @@ fn allocate<T: Lanes, const D: usize>(
     let fused = is_fused(integrator, transfer, &support);
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
-    let ahead = fused || filtered;
+    // Sums for the next step are on a grid of their own, unless they are at corners.
+    let ahead = filtered || (fused && !matches!(support, Support::Mesh(_)));
     let grids = 1 + usize::from(reprojects) + usize::from(ahead);
     let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
     let mut layout = Layout::new(grid, bytes_per_node)?;
     let points = match &support {
-        Support::Polygons(corners) => corners.count(),
+        Support::Mesh(corners) => corners.count(),
         _ => count,
     };
     let mut bins = Bins::new(&layout, points);
@@ -540,13 +520,24 @@ fn describe<T: Lanes, const D: usize>(
         Invalid::Inverted => StepError::Inverted { step, time, particle, J },
         Invalid::NotFinite => StepError::NotFinite { step, time, particle, position, J },
         Invalid::LeftGrid => {
+            // It may be a corner of its domain that is beyond the grid.
+            let corner = match support {
+                Support::Mesh(corners) if c.axis_outside(x).is_none() => {
+                    let own = corners.mesh.of_particle(particle).iter();
+                    own.map(|&corner| corners.at(corner as usize))
+                        .find(|x| c.axis_beyond(x).is_some())
+                }
+                _ => None,
+            };
+            let x = corner.as_ref().unwrap_or(x);
+            let position = x.iter().map(|&x| figure(x)).collect();
             let axis = c.axis_outside(x).unwrap_or(0);
             let (lower, upper) = c.range(axis);
             let (lower, upper) = (figure(lower), figure(upper));
             StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
         }
         Invalid::TooLarge => {
-            let l = support.half_size(c, particle, x, F);
+            let l = support.half_size(c, particle, F);
             let axis = support.axis_too_large(&l).unwrap_or(0);
             let spacing = figure(c.spacing());
             let (half_size, limit) = (figure(l[axis]) * spacing, spacing * HALF_SIZE_LIMIT);

@@ -71,7 +71,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
         let Particles { x, F, .. } = &*particles;
         let keys = match support {
-            Support::Polygons(corners) => bins.keys_of(layout, corners.count(), &|corner| {
+            Support::Mesh(corners) => bins.keys_of(layout, corners.count(), &|corner| {
                 exchange.first_node(c, corners, corner)
             }),
             _ => bins.keys_of(layout, x.len(), &|p| support.first_node(c, p, &x[p], &F[p])),

@@ -29,7 +29,12 @@ pub(crate) fn is_fused<T, const D: usize>(
     support: &Support<T, D>,
 ) -> bool {
     let stress_last = integrator.early() == 0.0 && !integrator.reprojects();
-    stress_last && transfer == Transfer::Flip && matches!(support, Support::Product(_))
+    stress_last
+        && match support {
+            Support::Product(_) => transfer == Transfer::Flip,
+            Support::Cpdi { .. } => false,
+            Support::Mesh(_) => !matches!(transfer.taken(), Taken::Filtered(_)),
+        }
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -40,11 +45,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         times: StepTimes<T>,
     ) -> Outcome {
-        if let Support::Polygons(corners) = &mut self.support {
+        if let Support::Mesh(corners) = &mut self.support {
             corners.measure();
         }
         if is_fused(integrator, self.transfer, &self.support) {
-            return self.fused_step(body_force, times);
+            return match self.support {
+                Support::Mesh(_) => self.step_at_corners(body_force, times),
+                Support::Product(_) | Support::Cpdi { .. } => self.fused_step(body_force, times),
+            };
         }
         let early = integrator.early();
         let dt = self.constants.time_step;

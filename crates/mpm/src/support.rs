@@ -4,14 +4,17 @@ use std::array;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::body::{Body, Mesh};
-use crate::domain::{HalfEdges, REACHED, volume_of_cell};
+use crate::body::Body;
+use crate::corner_exchange::CornerValues;
+use crate::domain::{HalfEdges, REACHED};
 use crate::geometry::Constants;
+use crate::kernel::block::Seen;
+use crate::mesh::Interpolation;
 use crate::node::Node;
 use crate::scheme::Shape;
 use crate::shape_function::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, first_layer, node_below};
 use crate::shared_corners::SharedCorners;
-use crate::simd::{Lanes, One};
+use crate::simd::Lanes;
 use crate::tensor::{product, real};
 
 /// The shape function of a simulation.
@@ -22,14 +25,8 @@ pub(crate) enum Support<T, const D: usize> {
     /// CPDI: hat functions interpolated between the corners of parallelograms, half of whose edges in the reference
     /// configuration are the columns of a matrix, lengths.
     Cpdi { half_edges: HalfEdges<T, D> },
-    /// CPDI2: the same between corners that particles share.
-    Cpdi2 {
-        mesh: Mesh<T, D>,
-        /// Buffer for the positions of the corners at the end of a step.
-        next: Vec<SVector<T, D>>,
-    },
-    /// Polygons on shared corners.
-    Polygons(Box<SharedCorners<T, D>>),
+    /// Domains between shared corners, those of CPDI2 among them.
+    Mesh(Box<SharedCorners<T, D>>),
 }
 
 impl<T: Lanes, const D: usize> Support<T, D> {
@@ -39,24 +36,20 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         body: Body<T, D>,
         spacing: T,
     ) -> (Self, crate::Particles<T, D>) {
-        let Body { particles, half_edges, mesh, polygons } = body;
+        let Body { particles, half_edges, mesh } = body;
         let cells = particles.half_size / spacing;
-        if let Some(polygons) = polygons
+        let is_used =
+            |interpolation| interpolation == Interpolation::Triangles || shape == Shape::Cpdi2;
+        if let Some(mesh) = mesh.filter(|own| is_used(own.interpolation))
             && let Some(at_corner) = ProductShape::new(at_corners(shape), cells)
         {
-            let corners = Box::new(SharedCorners::new(polygons, at_corner));
-            return (Self::Polygons(corners), particles);
+            let corners = Box::new(SharedCorners::new(mesh, at_corner));
+            return (Self::Mesh(corners), particles);
         }
         if let Some(product) = ProductShape::new(shape, cells) {
             return (Self::Product(product), particles);
         }
-        let support = if shape == Shape::Cpdi2 {
-            let mesh = mesh.unwrap_or_default();
-            Self::Cpdi2 { next: mesh.x.clone(), mesh }
-        } else {
-            Self::Cpdi { half_edges: HalfEdges::new(half_edges) }
-        };
-        (support, particles)
+        (Self::Cpdi { half_edges: HalfEdges::new(half_edges) }, particles)
     }
 
     /// Half-sizes of the box around the support of a particle's domain, in cells, about the particle's position.
@@ -64,25 +57,13 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         &self,
         c: &Constants<T, D>,
         p: usize,
-        x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
     ) -> SVector<T, D> {
         match self {
             Self::Product(shape) => SVector::from_fn(|a, _| shape.half_size(a, F[(a, a)])),
             Self::Cpdi { half_edges } => extent(&product(F, half_edges.of(p))) * c.inverse_spacing,
-            Self::Cpdi2 { mesh, .. } => {
-                let mut l = SVector::zeros();
-                for &corner in &mesh.corners[p][..1 << D] {
-                    let away = mesh.x[corner as usize] - x;
-                    l = SVector::from_fn(|a, _| {
-                        let away: T = away[a].abs();
-                        if away > l[a] { away } else { l[a] }
-                    });
-                }
-                l * c.inverse_spacing
-            }
             // Corners reach nodes, each its own.
-            Self::Polygons(_) => SVector::zeros(),
+            Self::Mesh(_) => SVector::zeros(),
         }
     }
 
@@ -114,13 +95,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
                     })
                 }))
             }
-            Self::Cpdi2 { mesh, .. } => {
-                let corners = &mesh.corners[p][..1 << D];
-                Rows::between(
-                    corners.iter().map(|&corner| c.in_cells(&mesh.x[corner as usize])[D - 1]),
-                )
-            }
-            Self::Polygons(_) => Rows { edge: c.in_cells(x)[D - 1], width: REACHED },
+            Self::Mesh(_) => Rows { edge: c.in_cells(x)[D - 1], width: REACHED },
         }
     }
 
@@ -132,7 +107,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
     ) -> usize {
-        let (xi, l) = (c.in_cells(x), self.half_size(c, p, x, F));
+        let (xi, l) = (c.in_cells(x), self.half_size(c, p, F));
         let row = first_layer(self.rows(c, p, x, F, &l).edge, T::zero());
         (0..D - 1).map(|a| first_layer(xi[a], l[a]) * c.strides[a]).sum::<usize>()
             + row * c.strides[D - 1]
@@ -140,23 +115,16 @@ impl<T: Lanes, const D: usize> Support<T, D> {
 
     /// For domains between shared corners the volume of a particle's domain.
     pub(crate) fn volume(&self, p: usize) -> Option<T> {
-        let mesh = match self {
-            Self::Cpdi2 { mesh, .. } => mesh,
-            Self::Polygons(corners) => return Some(corners.volume(p)),
-            Self::Product(_) | Self::Cpdi { .. } => return None,
-        };
-        let corners = mesh.corners[p];
-        let x = array::from_fn(|k| array::from_fn(|a| One(mesh.x[corners[k] as usize][a])));
-        Some(volume_of_cell::<_, D>(&x).0)
+        if let Self::Mesh(corners) = self { Some(corners.volume(p)) } else { None }
     }
 
-    /// The nodes that particles take values from: for polygons their corners, with the grid's values there.
+    /// What particles take values from.
     pub(crate) fn seen<'a>(
         &self,
         nodes: &'a [Node<T, D>],
-        corners: &'a [Node<T, D>],
-    ) -> &'a [Node<T, D>] {
-        if let Self::Polygons(_) = self { corners } else { nodes }
+        corners: &'a CornerValues<T, D>,
+    ) -> Seen<'a, T, D> {
+        if let Self::Mesh(_) = self { Seen::Corners(corners) } else { Seen::Nodes(nodes) }
     }
 
     /// The first axis along which a half-size, in cells, exceeds the limit.
@@ -165,7 +133,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
     }
 }
 
-/// The shape function by which the corners of polygons reach nodes.
+/// The shape function by which shared corners reach nodes.
 pub(crate) fn at_corners(shape: Shape) -> Shape {
     if shape == Shape::Cpdi2 { Shape::Linear } else { shape }
 }

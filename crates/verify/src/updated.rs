@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_mpm::{
-    Annulus, Body, Clip, Facet, Load, Particles, Settings, Shape, Share, Side, Solver,
+    Annulus, Body, Clip, Facet, Load, Mesh, Particles, Settings, Shape, Share, Side, Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
@@ -72,11 +72,11 @@ fn clipped<T: Precision<D>, const D: usize>(
         offset: placement.offset(),
     };
     let (mut body, facets) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
-    if let Some(polygons) = &mut body.polygons {
+    if let Some(mesh) = &mut body.mesh {
         let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
         for (a, walls) in scene.walls.iter().enumerate() {
             for (is_wall, wall) in walls.iter().zip([grid.lower[a], grid.upper()[a]]) {
-                for X in polygons.X.iter_mut().filter(|_| *is_wall) {
+                for X in mesh.X.iter_mut().filter(|_| *is_wall) {
                     if (X[a] - wall).abs() <= near {
                         X[a] = wall;
                     }
@@ -88,13 +88,13 @@ fn clipped<T: Precision<D>, const D: usize>(
             if !part.is_loaded {
                 continue;
             }
-            let ends = corners.map(|corner| polygons.X[corner as usize].map(Real::to_f64));
+            let ends = corners.map(|corner| mesh.X[corner as usize].map(Real::to_f64));
             for (X, shares) in load_points(part.side, ends) {
                 let (X, shares) = (X.map(Real::nearest), shares.map(Real::nearest));
-                polygons.loads.push(Load { corners, shares, X });
+                mesh.loads.push(Load { corners, shares, X });
             }
         }
-        polygons.x.clone_from(&polygons.X);
+        mesh.x.clone_from(&mesh.X);
     }
     Ok(body)
 }
@@ -195,8 +195,8 @@ fn body<T: Precision<D>, const D: usize>(
         let shift: SVector<T, D> = SVector::repeat(T::nearest(offset * distance));
         let Particles { X, x, .. } = &mut body.particles;
         X.iter_mut().chain(x).for_each(|place| *place += shift);
-        if let Some(mesh) = &mut body.mesh {
-            mesh.X.iter_mut().chain(&mut mesh.x).for_each(|place| *place += shift);
+        if let Some(cells) = &mut body.mesh {
+            cells.X.iter_mut().chain(&mut cells.x).for_each(|place| *place += shift);
         }
     }
     Ok((body, share))
@@ -218,12 +218,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
-    let corners = match (&mut body.mesh, &mut body.polygons) {
-        (Some(mesh), _) => Some((&mesh.X, &mut mesh.x)),
-        (None, Some(polygons)) => Some((&polygons.X, &mut polygons.x)),
-        (None, None) => None,
-    };
-    if let Some((X, x)) = corners {
+    if let Some(Mesh { X, x, .. }) = &mut body.mesh {
         let grid = scene.grid::<T>();
         for (x, X) in x.iter_mut().zip(X) {
             let place = X.map(Real::to_f64);

@@ -18,8 +18,8 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::body::Body;
 use crate::error::SetupError;
 use crate::grid::Grid;
+use crate::mesh::Mesh;
 use crate::particles::Particles;
-use crate::polygons::Polygons;
 use crate::tensor::real;
 
 /// What is left of a box with less than this share of its volume is a sliver.
@@ -211,13 +211,13 @@ fn turn_of<T: RealField + Copy, const D: usize>([cos, sin]: [f64; 2]) -> Option<
 
 /// A body of particles at rest, with their centroids, volumes and masses.
 fn at_rest<T: RealField + Copy, const D: usize>(
-    mut polygons: Polygons<T, D>,
+    mut mesh: Mesh<T, D>,
     X: Vec<SVector<T, D>>,
     volume: Vec<T>,
     mass: Vec<T>,
     spacing: f64,
 ) -> Body<T, D> {
-    polygons.x.clone_from(&polygons.X);
+    mesh.x.clone_from(&mesh.X);
     let count = X.len();
     let particles = Particles {
         x: X.clone(),
@@ -228,7 +228,7 @@ fn at_rest<T: RealField + Copy, const D: usize>(
         volume,
         half_size: SVector::repeat(real(0.5 * spacing)),
     };
-    Body { particles, half_edges: Vec::new(), mesh: None, polygons: Some(polygons) }
+    Body { particles, half_edges: Vec::new(), mesh: Some(mesh) }
 }
 
 /// See [`Body::clipped`].

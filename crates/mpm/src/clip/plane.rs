@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, RealField, SVector, Vector2, vector};
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
 use crate::body::Body;
 use crate::grid::Grid;
-use crate::polygons::{Polygons, cross};
+use crate::mesh::{Interpolation, Mesh, cross};
 use crate::tensor::real;
 
 /// What tells corners apart.
@@ -278,7 +278,7 @@ fn assemble<T: RealField + Copy, const D: usize>(
     let vector = |X: Vector2<f64>| SVector::<T, D>::from_fn(|a, _| real(X[a]));
     const NONE: u32 = u32::MAX;
     let mut renumbered = vec![NONE; corners.X.len()];
-    let mut own = Polygons::none(turn_of(*turn));
+    let mut own = Mesh::none(Interpolation::Triangles, turn_of(*turn));
     let mut boundary = Vec::new();
     let (mut X, mut volume, mut mass) = (Vec::new(), Vec::new(), Vec::new());
     for members in particles {

@@ -2,12 +2,13 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::corner_exchange::CornerValues;
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::corners::CornerWeights;
-use crate::kernel::polygons::PolygonWeights;
 use crate::kernel::product::ProductWeights;
+use crate::kernel::shared::FromCorners;
 use crate::material::LibraryLaw;
 use crate::node::Node;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
@@ -43,20 +44,32 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
 pub(crate) enum Block<T, const D: usize> {
     /// Products over the axes.
     Product(ProductWeights<T, D>),
-    /// Means over domains with corners, for CPDI and CPDI2.
+    /// Means over domains with corners of their own, for CPDI.
     Corners(CornerWeights<T, D>),
-    /// Means over polygons on shared corners.
-    Polygons(PolygonWeights<T, D>),
+    /// Means over domains between shared corners, of particles from this one on.
+    Shared {
+        /// Whether there are affine velocities (APIC).
+        is_affine: bool,
+        /// The first of the particles.
+        first: usize,
+    },
+}
+
+/// What particles take in G2P.
+#[derive(Clone, Copy)]
+pub(crate) enum Seen<'a, T, const D: usize> {
+    /// Values at nodes.
+    Nodes(&'a [Node<T, D>]),
+    /// Those of the grid at shared corners.
+    Corners(&'a CornerValues<T, D>),
 }
 
 impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
             Support::Product(shape) => Self::Product(ProductWeights::new(shape, is_affine)),
-            Support::Cpdi { .. } | Support::Cpdi2 { .. } => {
-                Self::Corners(CornerWeights::new(is_affine))
-            }
-            Support::Polygons(_) => Self::Polygons(PolygonWeights::new(is_affine)),
+            Support::Cpdi { .. } => Self::Corners(CornerWeights::new(is_affine)),
+            Support::Mesh(_) => Self::Shared { is_affine, first: 0 },
         }
     }
 
@@ -75,10 +88,9 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Corners(weights), Support::Cpdi { half_edges }) => {
                 weights.corners.of_parallelograms(c, half_edges, ids, kinematics);
             }
-            (Self::Corners(weights), Support::Cpdi2 { mesh, .. }) => {
-                weights.corners.of_mesh(c, mesh, ids);
+            (Self::Shared { first, .. }, Support::Mesh(_)) => {
+                *first = ids.first().map_or(0, |id| *id as usize);
             }
-            (Self::Polygons(weights), Support::Polygons(corners)) => weights.take(c, corners, ids),
             _ => debug_assert!(false, "a block for another shape function"),
         }
     }
@@ -102,7 +114,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
         match self {
             Self::Product(weights) => weights.p2g(strides, band, first, contributions, count),
             Self::Corners(weights) => weights.p2g(strides, band, first, contributions, count),
-            Self::Polygons(_) => debug_assert!(false, "polygons give to corners"),
+            Self::Shared { .. } => debug_assert!(false, "these give to corners"),
         }
     }
 
@@ -117,23 +129,35 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     ) {
         match self {
             Self::Product(weights) => weights.g2p_with(strides, nodes, count, receiver),
-            Self::Corners(_) | Self::Polygons(_) => {
+            Self::Corners(_) | Self::Shared { .. } => {
                 debug_assert!(false, "single passes are for products");
             }
         }
     }
 
-    /// G2P of the first particles, as many as `receiver` has places; for polygons `nodes` are the corners, with the grid's values there.
+    /// G2P of the first particles, as many as `receiver` has places; those on shared corners are successive.
     pub(crate) fn g2p(
         &mut self,
-        strides: &[usize; D],
-        nodes: &[Node<T, D>],
+        (c, support): (&Constants<T, D>, &Support<T, D>),
+        seen: Seen<'_, T, D>,
         receiver: &mut [Interpolated<T, D>],
     ) {
-        match self {
-            Self::Product(weights) => weights.g2p(strides, nodes, receiver),
-            Self::Corners(weights) => weights.g2p(strides, nodes, receiver),
-            Self::Polygons(weights) => weights.g2p(nodes, receiver),
+        match (self, seen, support) {
+            (Self::Product(weights), Seen::Nodes(nodes), _) => {
+                weights.g2p(&c.strides, nodes, receiver);
+            }
+            (Self::Corners(weights), Seen::Nodes(nodes), _) => {
+                weights.g2p(&c.strides, nodes, receiver);
+            }
+            (
+                &mut Self::Shared { is_affine, first },
+                Seen::Corners(values),
+                Support::Mesh(corners),
+            ) => {
+                let shares = corners.measured.from(&corners.mesh, first);
+                FromCorners { c, corners, shares, values, first, receiver }.interpolate(is_affine);
+            }
+            _ => debug_assert!(false, "values for another shape function"),
         }
     }
 }

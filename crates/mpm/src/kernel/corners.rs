@@ -1,22 +1,21 @@
-//! P2G and G2P of CPDI and CPDI2, whose weights are means over domains with corners.
+//! P2G and G2P of CPDI, whose weights are means over parallelograms.
 //!
 //! Weights are computed for eight particles at once, as sums over the corners. Most domains lie within two cells along each axis,
 //! and reach 3 nodes; the others go from corner to corner, one particle at a time.
 
 use std::array;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
-use crate::body::Mesh;
 use crate::domain::{
     HalfEdges, MOST_CORNERS, REACHED, Shares, corner_of_parallelogram, deformed, inverse,
-    shares_of_cell, slopes_of_parallelogram,
+    slopes_of_parallelogram,
 };
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::node::Node;
-use crate::shape_function::{Hat, ShapeFunction, index, node_below};
+use crate::shape_function::{index, node_below};
 use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 use crate::tensor::{product, real};
 
@@ -72,11 +71,6 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
         kinematics: Kinematics<'_, T, D>,
     ) {
         dispatch(Parallelograms { corners: self, c, half_edges, ids: &padded(ids), kinematics });
-    }
-
-    /// Of the domains between the corners of a mesh.
-    pub(crate) fn of_mesh(&mut self, c: &Constants<T, D>, mesh: &Mesh<T, D>, ids: &[u32]) {
-        dispatch(Cells { corners: self, c, mesh, ids: &padded(ids) });
     }
 
     /// Takes the corners of a group, in cells from the lower corner of the grid, and their shares of means.
@@ -313,47 +307,6 @@ pub(crate) fn parallelograms<T: Lanes, V: Vectors, const D: usize>(
         }
     }
     OfGroup { xi, E: deformed(&of_F, &own, per_cell) }
-}
-
-struct Cells<'a, T, const D: usize> {
-    corners: &'a mut Corners<T, D>,
-    c: &'a Constants<T, D>,
-    mesh: &'a Mesh<T, D>,
-    ids: &'a [usize; BLOCK],
-}
-
-impl<T: Lanes, const D: usize> Loop for Cells<'_, T, D> {
-    const WIDE: bool = D > 1;
-
-    #[inline(always)]
-    fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, c, mesh, ids } = self;
-        for group in 0..BLOCK / GROUP {
-            let at = cells(vectors, c, mesh, ids, group);
-            let (shares, _) = shares_of_cell(&at);
-            corners.take(vectors, c, group, &at, &shares);
-        }
-    }
-}
-
-/// The corners of the domains of a group of particles, in cells from the lower corner of the grid.
-#[inline(always)]
-pub(crate) fn cells<T: Lanes, V: Vectors, const D: usize>(
-    vectors: V,
-    c: &Constants<T, D>,
-    Mesh { x, corners, .. }: &Mesh<T, D>,
-    ids: &[usize; BLOCK],
-    group: usize,
-) -> [[Eight<T, V>; D]; MOST_CORNERS] {
-    let per_cell = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
-    let mut xi = [[per_cell; D]; MOST_CORNERS];
-    for corner in 0..1 << D {
-        for a in 0..D {
-            let at = |k: usize| x[corners[ids[k]][corner] as usize][a] - c.lower[a];
-            xi[corner][a] = gather(vectors, group, at) * per_cell;
-        }
-    }
-    xi
 }
 
 /// The weights of a group of particles with small domains at the nodes that they reach, axis 0 fastest; `[node].0[n]` is of the
@@ -767,33 +720,4 @@ fn g2p_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
         }
     });
     Sums { value, gradients, moments }
-}
-
-/// The velocity of the grid at a point.
-#[inline(always)]
-pub(crate) fn velocity_at<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    nodes: &[Node<T, D>],
-    x: &SVector<T, D>,
-) -> SVector<T, D> {
-    let xi = c.in_cells(x);
-    let axes: [_; D] = array::from_fn(|a| Hat::axis_weights(xi[a], T::zero()));
-    let mut velocity = SVector::zeros();
-    for node in 0..1 << D {
-        let (mut place, mut S) = (0, real::<T>(1.0));
-        for (a, axis) in axes.iter().enumerate() {
-            let far = node >> a & 1;
-            place += (index(axis.base) + far) * c.strides[a];
-            S *= axis.S[far];
-        }
-        let place = place.wrapping_sub(c.nodes_before as usize);
-        let Some(Node { values }) = nodes.get(place) else {
-            debug_assert!(false, "a corner beyond the grid");
-            return velocity;
-        };
-        for i in 0..D {
-            velocity[i] += values[i] * S;
-        }
-    }
-    velocity
 }

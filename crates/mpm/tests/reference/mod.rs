@@ -252,14 +252,22 @@ where
         }
         let (lower, upper) = (self.grid.lower, self.grid.upper());
         let limit = HALF_SIZE_LIMIT * self.grid.spacing;
+        // Corners of its own may be as far outside as there are nodes.
+        let corners = if shape == Shape::Cpdi2 { domain(shape, &self.body, p) } else { None };
+        let is_beyond = |a: usize| {
+            let mut corners = corners.iter().flatten();
+            corners.any(|x| x[a] < lower[a] - limit || x[a] > upper[a] + limit)
+        };
         if volumes.iter().any(|volume| *volume <= 0.0) {
             Some((0, "is inverted"))
         } else if x.iter().chain(&volumes).any(|number| !number.is_finite()) {
             Some((1, "is not finite"))
-        } else if (0..D).any(|a| x[a] < lower[a] || x[a] > upper[a]) {
+        } else if (0..D).any(|a| x[a] < lower[a] || x[a] > upper[a] || is_beyond(a)) {
             Some((2, "has left the grid"))
         } else {
-            (half_size(shape, &self.body, p).max() > limit).then_some((3, "is too large"))
+            let is_limited = shape != Shape::Cpdi2;
+            let too_large = is_limited && half_size(shape, &self.body, p).max() > limit;
+            too_large.then_some((3, "is too large"))
         }
     }
 }

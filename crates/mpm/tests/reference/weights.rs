@@ -214,7 +214,7 @@ pub(super) fn domain<const D: usize>(
             Some(SIGNS[..1 << D].iter().map(corner).collect())
         }
         (Shape::Cpdi2, Some(mesh)) => {
-            Some(mesh.corners[p][..1 << D].iter().map(|&k| mesh.x[k as usize]).collect())
+            Some(mesh.of_particle(p).iter().map(|&k| mesh.x[k as usize]).collect())
         }
         _ => None,
     }

@@ -71,7 +71,7 @@ fn a_wall_is_a_mirror() {
                     volume: vec![],
                     half_size: Vector2::repeat(per_cell_size * h),
                 };
-                let mut mesh = Mesh::default();
+                let (mut places, mut moved, mut cells) = (vec![], vec![], vec![]);
                 for side in if mirrored { vec![1.0, -1.0] } else { vec![1.0] } {
                     for (k, X) in points.iter().enumerate() {
                         let reflect = Matrix2::new(side, 0.0, 0.0, 1.0);
@@ -82,26 +82,27 @@ fn a_wall_is_a_mirror() {
                         p.F.push(reflect * F * reflect);
                         p.mass.push(1.0 + 0.1 * k as f64);
                         p.volume.push(h * h / 4.0);
-                        let first = mesh.X.len();
+                        let first = places.len() as u32;
                         for (k, sign) in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
                             .map(Vector2::from)
                             .into_iter()
                             .enumerate()
                         {
                             let corner = X + sign.component_mul(&p.half_size);
-                            mesh.X.push(reflect * corner);
-                            let moved = vector![noise(k + 5), noise(k + 17)] * (0.1 * h);
-                            mesh.x.push(reflect * (corner + moved));
+                            places.push(reflect * corner);
+                            let away = vector![noise(k + 5), noise(k + 17)] * (0.1 * h);
+                            moved.push(reflect * (corner + away));
                         }
                         // Counter-clockwise in the image, too.
-                        let mut corners = [0, 1, 2, 3, 0, 0, 0, 0].map(|k| first as u32 + k);
+                        let mut corners = [0, 1, 2, 3].map(|k| first + k);
                         if side < 0.0 {
-                            corners[..4].reverse();
+                            corners.reverse();
                         }
-                        mesh.corners.push(corners);
+                        cells.extend(corners);
                     }
                 }
-                Body { half_edges: Vec::new(), mesh: Some(mesh), particles: p, polygons: None }
+                let mesh = Mesh { x: moved, ..Mesh::cells(places, cells) };
+                Body { half_edges: Vec::new(), mesh: Some(mesh), particles: p }
             };
             let wall = Grid {
                 lower: vector![0.0, 0.0],
@@ -216,11 +217,11 @@ fn a_body_flies_straight_past_another_through_the_bands() {
             Body::lattice(&grid, 2, 2.0, within)
         };
         let (mut body, flying) = (part(0.0..64.0, 18.0..22.0), part(70.0..134.0, 6.0..10.0));
-        let mesh = body.mesh.as_mut().unwrap();
-        let (first, other) = (mesh.X.len() as u32, flying.mesh.unwrap());
-        mesh.corners.extend(other.corners.iter().map(|corners| corners.map(|k| first + k)));
-        mesh.X.extend(other.X);
-        mesh.x.extend(other.x);
+        let (mut one, other) = (body.mesh.unwrap(), flying.mesh.unwrap());
+        let first = one.X.len() as u32;
+        one.corners.extend(other.corners.iter().map(|corner| first + corner));
+        one.X.extend(other.X);
+        body.mesh = Some(Mesh::cells(one.X, one.corners));
         body.half_edges.extend(flying.half_edges);
         let (p, flying) = (&mut body.particles, flying.particles);
         assert_eq!((p.len(), flying.len()), (1024, 1024));

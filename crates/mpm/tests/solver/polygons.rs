@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use mmsmith_mpm::{
-    Body, BodyForce, Clip, Facet, Grid, Integrator, Load, Material, NoBodyForce, Polygons, Scalar,
+    Body, BodyForce, Clip, Facet, Grid, Integrator, Load, Material, Mesh, NoBodyForce, Scalar,
     Settings, SetupError, Shape, Side, Simulation, Transfer,
 };
 use nalgebra::{SMatrix, SVector, Vector2, vector};
@@ -88,8 +88,8 @@ where
     Body::clipped(&grid(), 2, DENSITY, &clip).expect("a body of more than one dimension")
 }
 
-fn polygons<const D: usize>(body: &Body<f64, D>) -> &Polygons<f64, D> {
-    body.polygons.as_ref().expect("polygons")
+fn polygons<const D: usize>(body: &Body<f64, D>) -> &Mesh<f64, D> {
+    body.mesh.as_ref().expect("polygons")
 }
 
 fn each_form<const D: usize>() -> impl Iterator<Item = (Form<D>, (f64, f64))> {
@@ -103,7 +103,7 @@ fn parts<'a, P>(list: &'a [P], ends: &'a [u32]) -> impl Iterator<Item = &'a [P]>
 }
 
 /// The edges or faces of each particle's parts, as lists of corners.
-fn facets<const D: usize>(own: &Polygons<f64, D>) -> Vec<Vec<Vec<u32>>> {
+fn facets<const D: usize>(own: &Mesh<f64, D>) -> Vec<Vec<Vec<u32>>> {
     let corners: Vec<&[u32]> = parts(&own.corners, &own.ends).collect();
     let of_part: Vec<Vec<Vec<u32>>> = if D == 2 {
         let edges = |corners: &[u32]| {
@@ -220,7 +220,7 @@ fn neighbours_share_their_facets_and_the_rest_is_the_boundary() {
 /// Loads on all of the boundary, at the middle of each facet.
 pub(crate) fn loaded<const D: usize>(body: &mut Body<f64, D>, boundary: &[Facet<D>]) {
     let shares = [1.0 / D as f64; D];
-    let own = body.polygons.as_mut().expect("polygons");
+    let own = body.mesh.as_mut().expect("polygons");
     let middle = |corners: [u32; D]| -> SVector<f64, D> {
         corners.iter().map(|corner| own.X[*corner as usize]).sum::<SVector<f64, D>>() / D as f64
     };
@@ -274,7 +274,7 @@ where
             for &integrator in integrators {
                 let (mut body, boundary) = clipped(form, lattice);
                 loaded(&mut body, &boundary);
-                let own = body.polygons.as_mut().unwrap();
+                let own = body.mesh.as_mut().unwrap();
                 own.x.iter_mut().for_each(|x| *x = F * *x);
                 let p = &mut body.particles;
                 p.x.iter_mut().for_each(|x| *x = F * *x);
@@ -372,7 +372,7 @@ where
         };
         let (one, three) = (run(1), run(3));
         assert_eq!(one.particles(), three.particles(), "{settings:?}");
-        assert_eq!(one.polygons(), three.polygons(), "{settings:?}");
+        assert_eq!(one.mesh(), three.mesh(), "{settings:?}");
         let mut half = new();
         (0..5).for_each(|_| half.step(&NoBodyForce).unwrap());
         let kept: Vec<Vec<u8>> = half.state().iter().map(|part| part.to_vec()).collect();
@@ -382,7 +382,7 @@ where
         other.take_up(vec![kept]).unwrap();
         (0..7).for_each(|_| other.step(&NoBodyForce).unwrap());
         assert_eq!(one.particles(), other.particles(), "{settings:?}");
-        assert_eq!(one.polygons(), other.polygons(), "{settings:?}");
+        assert_eq!(one.mesh(), other.mesh(), "{settings:?}");
     }
     for (transfer, integrator) in transfers().into_iter().zip(Integrator::ALL) {
         for shape in SHAPES {
@@ -430,42 +430,41 @@ fn corners_on_walls_stay_on_them() {
             let (mut body, _) = Body::clipped(&grid, 2, DENSITY, &clip).unwrap();
             let p = &mut body.particles;
             (0..p.len()).for_each(|k| p.v[k] = SVector::from_fn(|a, _| noise(7 * k + a)));
-            let on_walls =
-                |own: &Polygons<f64, 2>| own.x.iter().map(|x| x.map(|x| x == 0.0)).collect();
+            let on_walls = |own: &Mesh<f64, 2>| own.x.iter().map(|x| x.map(|x| x == 0.0)).collect();
             let before: Vec<_> = on_walls(polygons(&body));
             let settings = settings(shape, integrator, Transfer::Flip);
             let mut run = Simulation::new(grid, body, MATERIAL, settings).unwrap();
             (0..30).for_each(|_| run.step(&NoBodyForce).unwrap());
-            assert_eq!(on_walls(run.polygons().unwrap()), before, "{settings:?}");
+            assert_eq!(on_walls(run.mesh().unwrap()), before, "{settings:?}");
         }
     }
 }
 
 #[test]
 fn bodies_that_cannot_be_are_refused() {
-    let set_up = |change: &dyn Fn(&mut Polygons<f64, 2>, &mut Grid<f64, 2>), shape| {
+    let set_up = |change: &dyn Fn(&mut Mesh<f64, 2>, &mut Grid<f64, 2>), shape| {
         let (mut body, mut grid) = (moving(Form::<2>::all()[1], LATTICES[2]), grid());
-        change(body.polygons.as_mut().unwrap(), &mut grid);
+        change(body.mesh.as_mut().unwrap(), &mut grid);
         let settings = settings(shape, Integrator::Cd, Transfer::Flip);
         Simulation::new(grid, body, MATERIAL, settings).err()
     };
-    let none = |_: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| {};
+    let none = |_: &mut Mesh<f64, 2>, _: &mut Grid<f64, 2>| {};
     assert!(matches!(set_up(&none, Shape::Gimp), Some(SetupError::NotOfPolygons { .. })));
-    let walls = |_: &mut Polygons<f64, 2>, grid: &mut Grid<f64, 2>| grid.walls[0][1] = true;
+    let walls = |_: &mut Mesh<f64, 2>, grid: &mut Grid<f64, 2>| grid.walls[0][1] = true;
     assert_eq!(set_up(&walls, Shape::Cpdi2), Some(SetupError::TurnedWalls));
-    let beyond = |own: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| own.corners[3] = 1 << 30;
+    let beyond = |own: &mut Mesh<f64, 2>, _: &mut Grid<f64, 2>| own.corners[3] = 1 << 30;
     let found = set_up(&beyond, Shape::Cpdi2);
     assert!(matches!(found, Some(SetupError::NoSuchCorner { corner: 0x4000_0000, .. })));
-    let idle = |own: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| {
+    let idle = |own: &mut Mesh<f64, 2>, _: &mut Grid<f64, 2>| {
         own.X.push(Vector2::zeros());
         own.x.push(Vector2::zeros());
     };
     assert!(matches!(set_up(&idle, Shape::Cpdi2), Some(SetupError::IdleCorner { .. })));
-    let short = |own: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| {
+    let short = |own: &mut Mesh<f64, 2>, _: &mut Grid<f64, 2>| {
         own.of_particles.pop();
     };
     assert!(matches!(set_up(&short, Shape::Cpdi2), Some(SetupError::LengthMismatch { .. })));
-    let away = |own: &mut Polygons<f64, 2>, _: &mut Grid<f64, 2>| own.x[0] = vector![9.0, 0.0];
+    let away = |own: &mut Mesh<f64, 2>, _: &mut Grid<f64, 2>| own.x[0] = vector![9.0, 0.0];
     assert!(matches!(set_up(&away, Shape::Cpdi2), Some(SetupError::InitialState(_))));
     let grid = Grid { lower: vector![0.0], spacing: 0.5, cells: [2], walls: [[false; 2]] };
     let sides = vec![Side::Straight { normal: [1.0], distance: 0.7 }];
@@ -473,7 +472,7 @@ fn bodies_that_cannot_be_are_refused() {
     let found = Body::<f64, 1>::clipped(&grid, 2, DENSITY, &clip).err();
     assert_eq!(found, Some(SetupError::PolygonDimension { dimension: 1 }));
     let mut body = moving(Form::<3>::all()[2], LATTICES[0]);
-    body.polygons.as_mut().unwrap().faces.corners[5] = 77;
+    body.mesh.as_mut().unwrap().faces.corners[5] = 77;
     let settings = settings(Shape::Cpdi2, Integrator::Cd, Transfer::Flip);
     let found = Simulation::new(self::grid(), body, MATERIAL, settings).err();
     assert_eq!(found, Some(SetupError::NoSuchCorner { corner: 77, corners: 8 }));

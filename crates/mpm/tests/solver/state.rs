@@ -270,14 +270,18 @@ fn states_that_cannot_be_are_refused() {
         // Bins, and the same particle twice.
         let far = saved[2].iter().map(|_| 255).collect();
         assert_eq!(run.take_up(with(2, far)), Err(SavedStateError::Place), "{settings:?}");
-        let twice = vec![0; 2 * saved[2].len()];
+        let twice = vec![0; size_of::<u64>() * run.particles().len()];
         assert_eq!(run.take_up(with(1, twice)), Err(SavedStateError::Particles), "{settings:?}");
         assert_eq!(run.take_up(vec![]), Err(SavedStateError::Particles), "{settings:?}");
         let both = vec![saved.clone(), saved.clone()];
         assert_eq!(run.take_up(both), Err(SavedStateError::Particles), "{settings:?}");
         if settings.shape == Shape::Cpdi2 {
-            let far = saved[8].iter().map(|_| 255).collect();
-            assert_eq!(run.take_up(with(8, far)), Err(SavedStateError::Place), "{settings:?}");
+            let other = saved[8].iter().map(|_| 255).collect();
+            assert_eq!(
+                run.take_up(with(8, other)),
+                Err(SavedStateError::Particles),
+                "{settings:?}"
+            );
         }
         assert_eq!(run.take_up(vec![saved.clone()]), Ok(()));
     }

@@ -1,11 +1,11 @@
-//! Polygons of some of a body's particles, and what processes tell each other of them.
+//! Mesh of some of a body's particles, and what processes tell each other of them.
 
 use std::collections::{BTreeMap, HashMap};
 
 use bytemuck::Pod;
 use nalgebra::{RealField, SMatrix, SVector};
 
-use super::{Load, Numbers, Polygons, start};
+use super::{Interpolation, Load, Mesh, Numbers, start};
 use crate::decomposition::{Lists, Move};
 
 /// The polygons of some particles, which can be told apart from the others.
@@ -29,10 +29,7 @@ pub(crate) struct LoadRecords<T, const D: usize> {
 
 impl<T: RealField + Copy, const D: usize> Records<T, D> {
     /// Those of some particles.
-    pub(crate) fn new(
-        own: &Polygons<T, D>,
-        particles: impl Iterator<Item = usize> + Clone,
-    ) -> Self {
+    pub(crate) fn new(own: &Mesh<T, D>, particles: impl Iterator<Item = usize> + Clone) -> Self {
         let at = |positions: &'_ [SVector<T, D>], p: usize| -> Vec<SVector<T, D>> {
             let corners = &own.corners[own.places(p)];
             corners.iter().map(|&corner| positions[corner as usize]).collect()
@@ -59,10 +56,10 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
         &self,
         particles: usize,
         loads: &LoadRecords<T, D>,
-        turn: Option<SMatrix<T, D, D>>,
+        (interpolation, turn): (Interpolation, Option<SMatrix<T, D, D>>),
         is_behind: impl Fn(usize, usize) -> bool,
-    ) -> (Polygons<T, D>, Vec<[usize; 2]>) {
-        let mut own = Polygons::none(turn);
+    ) -> (Mesh<T, D>, Vec<[usize; 2]>) {
+        let mut own = Mesh::none(interpolation, turn);
         // The number in the whole body of each place's corner, particle after particle.
         let mut numbers = Vec::new();
         let mut found: HashMap<u64, [usize; 2]> = HashMap::new();
@@ -96,7 +93,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
 
 impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
     /// Those of some loads.
-    pub(crate) fn new(own: &Polygons<T, D>, loads: &[usize]) -> Self {
+    pub(crate) fn new(own: &Mesh<T, D>, loads: &[usize]) -> Self {
         let number = |load: &usize| match &own.numbers {
             Some(numbers) => numbers.loads[*load],
             None => *load as u64,
@@ -128,7 +125,7 @@ impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
     }
 }
 
-impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
+impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     /// Those of some of the particles, with the loads that act on them, each a part of one particle's surface.
     #[must_use]
     pub fn part(&self, particles: &[usize]) -> Self {
@@ -155,7 +152,8 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         let loads: Vec<usize> = (0..self.loads.len()).filter(acts_here).collect();
         let loads = LoadRecords::new(self, &loads);
         let records = Records::new(self, particles.iter().copied());
-        records.assemble(particles.len(), &loads, self.turn, |_, _| false).0
+        let kind = (self.interpolation, self.turn);
+        records.assemble(particles.len(), &loads, kind, |_, _| false).0
     }
 
     /// The number of a corner in the whole body.
@@ -164,14 +162,15 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
     }
 }
 
-fn topology<T: RealField + Copy, const D: usize>(own: &Polygons<T, D>, p: usize) -> Vec<u64> {
+fn topology<T: RealField + Copy, const D: usize>(own: &Mesh<T, D>, p: usize) -> Vec<u64> {
     let polygons = own.polygons(p);
     let mut record = vec![polygons.len() as u64];
     for polygon in polygons {
         let corners = &own.corners[start(&own.ends, polygon)..own.ends[polygon] as usize];
         record.push(corners.len() as u64);
         record.extend(corners.iter().map(|&corner| own.number(corner as usize)));
-        let faces = if D == 3 { own.faces.of(polygon).collect() } else { Vec::new() };
+        let has_faces = D == 3 && own.interpolation == Interpolation::Triangles;
+        let faces = if has_faces { own.faces.of(polygon).collect() } else { Vec::new() };
         record.push(faces.len() as u64);
         for face in faces {
             record.push(face.len() as u64);
@@ -182,11 +181,7 @@ fn topology<T: RealField + Copy, const D: usize>(own: &Polygons<T, D>, p: usize)
 }
 
 /// Appends a particle's polygons to `own`, but for its corners, whose numbers in the whole body are appended to `numbers`.
-fn read_topology<T, const D: usize>(
-    record: &[u64],
-    own: &mut Polygons<T, D>,
-    numbers: &mut Vec<u64>,
-) {
+fn read_topology<T, const D: usize>(record: &[u64], own: &mut Mesh<T, D>, numbers: &mut Vec<u64>) {
     let mut record = record.iter().copied();
     let mut next = || record.next().unwrap_or(0);
     for _ in 0..next() {
@@ -200,7 +195,7 @@ fn read_topology<T, const D: usize>(
             }
             own.faces.ends.push(own.faces.corners.len() as u32);
         }
-        if D == 3 {
+        if D == 3 && own.interpolation == Interpolation::Triangles {
             own.faces.of_polyhedra.push(own.faces.ends.len() as u32);
         }
     }

@@ -1,7 +1,7 @@
-//! Polygons on shared corners: domains of particles that fill a body of any shape, whose corners the grid moves. In space they are
-//! polyhedra, with faces in place of edges: see [`polyhedra`].
+//! Domains of particles between corners that they share and that the grid moves: the cells of CPDI2, and polygons that fill a body of any
+//! shape. In space these are polyhedra, with faces in place of edges: see [`polyhedra`].
 //!
-//! A particle is a list of polygons. Each is divided into the triangles between its edges and the mean of its corners. Where a function
+//! The means over a cell are in [`domain`](crate::domain). Any other particle is a list of polygons. Each is divided into the triangles between its edges and the mean of its corners. Where a function
 //! is replaced by its interpolation between the corners, with the mean of their values at the mean of the corners, its mean over a
 //! particle is `sum_c w_c N(x_c)`, and the mean of its gradient, by the divergence theorem, a sum over edges of length L and outward normal
 //! n:
@@ -24,20 +24,34 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::error::SetupError;
 use crate::tensor::real;
 
-/// Particles' domains on shared corners: polygons in the plane, polyhedra in space.
+/// How a function is interpolated between the corners of a particle's domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Over the triangles of polygons, the tetrahedra of polyhedra, that are around the mean of their corners.
+    Triangles,
+    /// Over one cell with `2^D` corners, in as many variables: CPDI2 (Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952). Means are
+    /// those in the current configuration. The corners of a segment go from left to right, those of a quadrilateral counter-clockwise;
+    /// those of a hexahedron are those of its lower face, counter-clockwise as seen from above, and then those above them.
+    Cell,
+}
+
+/// Particles' domains between shared corners: segments on a line, polygons in the plane, polyhedra or hexahedra in space.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Polygons<T, const D: usize> {
+pub struct Mesh<T, const D: usize> {
+    /// How functions are interpolated between corners.
+    pub interpolation: Interpolation,
     /// Reference positions of the corners.
     pub X: Vec<SVector<T, D>>,
     /// Current positions of the corners.
     pub x: Vec<SVector<T, D>>,
-    /// The corners of all polygons, polygon after polygon, each counter-clockwise; of all polyhedra, in any order.
+    /// The corners of all polygons, polygon after polygon, each counter-clockwise; of all polyhedra, in any order; of all cells, in the
+    /// order of [`Interpolation::Cell`].
     pub corners: Vec<u32>,
     /// For each polygon or polyhedron where its corners end in `corners`.
     pub ends: Vec<u32>,
     /// For each particle where its polygons or polyhedra end in `ends`.
     pub of_particles: Vec<u32>,
-    /// The faces of polyhedra; none in the plane.
+    /// The faces of polyhedra; none in the plane, and none of cells.
     pub faces: Faces,
     /// Points of the boundary where a traction acts, see [`BodyForce::boundary_stress`](crate::BodyForce::boundary_stress).
     pub loads: Vec<Load<T, D>>,
@@ -103,15 +117,29 @@ impl<T: RealField + Copy, const D: usize> Load<T, D> {
 /// The shares `w` of a mean and `g` of a mean gradient, per length, that a corner of one of a particle's polygons has.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Share<T, const D: usize> {
-    pub(crate) corner: u32,
     pub(crate) w: T,
     pub(crate) g: [T; D],
 }
 
-impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
-    /// None yet, of a whole body.
-    pub(crate) fn none(turn: Option<SMatrix<T, D, D>>) -> Self {
+impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
+    /// Cells with these corners, `2^D` a particle, at rest.
+    #[must_use]
+    pub fn cells(X: Vec<SVector<T, D>>, corners: Vec<u32>) -> Self {
+        let cells = (corners.len() >> D) as u32;
         Self {
+            x: X.clone(),
+            X,
+            corners,
+            ends: (1..=cells).map(|cell| cell << D).collect(),
+            of_particles: (1..=cells).collect(),
+            ..Self::none(Interpolation::Cell, None)
+        }
+    }
+
+    /// None yet, of a whole body.
+    pub(crate) fn none(interpolation: Interpolation, turn: Option<SMatrix<T, D, D>>) -> Self {
+        Self {
+            interpolation,
             X: Vec::new(),
             x: Vec::new(),
             corners: Vec::new(),
@@ -126,17 +154,18 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
 
     /// Whether indices are in range, and every corner belongs to a particle.
     pub(crate) fn check(&self, particles: usize) -> Result<(), SetupError> {
-        if !(2..=3).contains(&D) {
+        let Self { X, x, corners, ends, of_particles, faces, loads, numbers, .. } = self;
+        let of_cells = self.interpolation == Interpolation::Cell;
+        if D == 1 && !of_cells {
             return Err(SetupError::PolygonDimension { dimension: D });
         }
-        let Self { X, x, corners, ends, of_particles, faces, loads, numbers, .. } = self;
         let is_rising = |ends: &[u32], last: usize| {
             ends.is_sorted() && ends.last().map_or(0, |end| *end as usize) == last
         };
         let numbers = numbers.as_ref();
         // None where the ends of the parts do not fit.
         let parts = |ends: &[u32], parts: usize| parts * usize::from(is_rising(ends, parts));
-        let polyhedra = if D == 3 { ends.len() } else { 0 };
+        let polyhedra = if D == 3 && !of_cells { ends.len() } else { 0 };
         for (array, found, expected) in [
             ("x of the corners", x.len(), X.len()),
             ("of_particles", of_particles.len(), particles),
@@ -155,6 +184,14 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
             if found != expected {
                 return Err(SetupError::LengthMismatch { array, found, expected });
             }
+        }
+        let is_cell = |p: usize| {
+            of_particles[p] as usize == p + 1
+                && ends.get(p).is_some_and(|end| *end == (p as u32 + 1) << D)
+        };
+        if of_cells && !(0..particles).all(is_cell) {
+            let (found, expected) = (corners.len(), particles << D);
+            return Err(SetupError::LengthMismatch { array: "corners of cells", found, expected });
         }
         for polyhedron in 0..polyhedra {
             let count = ends[polyhedron] as usize - start(ends, polyhedron);
@@ -176,8 +213,17 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         }
     }
 
+    /// The corners of a particle's domain.
+    pub fn of_particle(&self, p: usize) -> &[u32] {
+        &self.corners[self.places(p)]
+    }
+
     /// The places in `corners` of a particle.
+    #[inline]
     pub(crate) fn places(&self, p: usize) -> std::ops::Range<usize> {
+        if self.interpolation == Interpolation::Cell {
+            return p << D..(p + 1) << D;
+        }
         let polygons = self.polygons(p);
         start(&self.ends, polygons.start)..start(&self.ends, polygons.end)
     }
@@ -187,7 +233,8 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         start(&self.of_particles, p)..self.of_particles[p] as usize
     }
 
-    /// Writes the shares of means over a particle in the reference configuration, as many as it has [places](Self::places).
+    /// Writes the shares of means over a particle's polygons in the reference configuration, as many as it has
+    /// [places](Self::places).
     pub(crate) fn means(&self, p: usize, shares: &mut [Share<T, D>]) {
         if D == 3 {
             return polyhedra::means(self, p, shares);
@@ -203,7 +250,7 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
             let mut mean = SVector::zeros();
             for (share, &corner) in shares.iter_mut().zip(corners) {
                 mean += X[corner as usize];
-                (share.corner, share.w) = (corner, T::zero());
+                share.w = T::zero();
             }
             mean /= count;
             let (mut area, mut last) = (T::zero(), corners.len().saturating_sub(1));
@@ -224,12 +271,12 @@ impl<T: RealField + Copy, const D: usize> Polygons<T, D> {
         shares.iter_mut().for_each(|share| share.w *= third);
     }
 
-    /// Writes the shares of mean gradients over a particle at the present positions, and returns its area or volume.
-    pub(crate) fn slopes(&self, p: usize, shares: &mut [Share<T, D>]) -> T {
+    /// Writes the shares of mean gradients over a particle's polygons between corners at `x`, and returns their area or volume.
+    pub(crate) fn slopes(&self, x: &[SVector<T, D>], p: usize, shares: &mut [Share<T, D>]) -> T {
         if D == 3 {
-            return polyhedra::slopes(self, p, shares);
+            return polyhedra::slopes(self, x, p, shares);
         }
-        let (x, first) = (&self.x, self.places(p).start);
+        let first = self.places(p).start;
         // Twice the area.
         let mut whole = T::zero();
         for polygon in self.polygons(p) {

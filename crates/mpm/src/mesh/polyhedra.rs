@@ -13,12 +13,12 @@
 
 use nalgebra::{RealField, SVector};
 
-use super::{Polygons, Share, start};
+use super::{Mesh, Share, start};
 use crate::tensor::real;
 
-/// As [`Polygons::means`].
+/// As [`Mesh::means`].
 pub(super) fn means<T: RealField + Copy, const D: usize>(
-    own: &Polygons<T, D>,
+    own: &Mesh<T, D>,
     p: usize,
     shares: &mut [Share<T, D>],
 ) {
@@ -34,7 +34,7 @@ pub(super) fn means<T: RealField + Copy, const D: usize>(
         let mut centre = SVector::zeros();
         for (share, &corner) in shares.iter_mut().zip(corners) {
             centre += own.X[corner as usize];
-            (share.corner, share.w) = (corner, T::zero());
+            share.w = T::zero();
         }
         centre /= count;
         let mut volume = T::zero();
@@ -59,9 +59,10 @@ pub(super) fn means<T: RealField + Copy, const D: usize>(
     shares.iter_mut().for_each(|share| share.w *= quarter);
 }
 
-/// As [`Polygons::slopes`].
+/// As [`Mesh::slopes`].
 pub(super) fn slopes<T: RealField + Copy, const D: usize>(
-    own: &Polygons<T, D>,
+    own: &Mesh<T, D>,
+    x: &[SVector<T, D>],
     p: usize,
     shares: &mut [Share<T, D>],
 ) -> T {
@@ -73,7 +74,7 @@ pub(super) fn slopes<T: RealField + Copy, const D: usize>(
         let places = start(&own.ends, polyhedron)..own.ends[polyhedron] as usize;
         let corners = &own.corners[places.clone()];
         let shares = &mut shares[places.start - first..places.end - first];
-        let at = |place: u32| own.x[corners[place as usize] as usize];
+        let at = |place: u32| x[corners[place as usize] as usize];
         let about = at(0);
         for face in own.faces.of(polyhedron) {
             let mean = mean_of(face, at);

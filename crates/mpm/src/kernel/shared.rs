@@ -1,0 +1,499 @@
+//! P2G and G2P between particles and the corners that their domains share.
+//!
+//! Shares of cells are computed for eight particles at once, here and again where they are needed next: that takes less time than to
+//! read them from memory. Those of mesh, of which there are few, are stored.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::corner_exchange::CornerValues;
+use crate::domain::{MOST_CORNERS, Shares, inverse, shares_of_cell, volume_of_cell};
+use crate::geometry::Constants;
+use crate::kernel::any::{Contributions, Interpolated};
+use crate::kernel::copies::BLOCK;
+use crate::kernel::corners::GROUP;
+use crate::mesh::{Interpolation, Share};
+use crate::node::Node;
+use crate::shared_corners::SharedCorners;
+use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
+use crate::tensor::{determinant, product};
+
+/// The momenta at a corner that go by the arm to a node, one for each axis, in the order of a node's values.
+pub(crate) type AffineSum<T, const D: usize> = [Node<T, D>; D];
+
+/// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
+type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];
+
+/// Takes the corners of eight successive cells, or of fewer and the last of them again, from their places `x`.
+#[inline(always)]
+fn take_corners<T: Lanes, V: Vectors, const D: usize>(
+    corners: &SharedCorners<T, D>,
+    x: &[SVector<T, D>],
+    (first, count): (usize, usize),
+    of_group: &mut GroupCorners<T, V, D>,
+) {
+    let places = &corners.mesh.corners[first << D..(first + count) << D];
+    // In the rows of a lattice those of successive cells lie side by side in memory.
+    if count == GROUP && corners.is_next[first + 1..first + GROUP].iter().all(|is_next| *is_next) {
+        for corner in 0..1 << D {
+            let Some(x) = x.get(places[corner] as usize..).and_then(|x| x.first_chunk::<GROUP>())
+            else {
+                debug_assert!(false, "a corner that is not there");
+                return;
+            };
+            for n in 0..GROUP {
+                for a in 0..D {
+                    of_group[corner][a].lanes.0[n] = x[n][a];
+                }
+            }
+        }
+        return;
+    }
+    for n in 0..GROUP {
+        let own = &places[n.min(count - 1) << D..][..1 << D];
+        for corner in 0..1 << D {
+            let at = &x[own[corner] as usize];
+            for a in 0..D {
+                of_group[corner][a].lanes.0[n] = at[a];
+            }
+        }
+    }
+}
+
+/// A buffer for the corners of a group.
+#[inline(always)]
+fn no_corners<T: Lanes, V: Vectors, const D: usize>(vectors: V) -> GroupCorners<T, V, D> {
+    [[Eight { lanes: Lane8::zero(), vectors }; D]; MOST_CORNERS]
+}
+
+/// Whether successive particles are inside the grid and have a volume at the end of a step, the cells between corners as well.
+pub(crate) fn cells_are_valid_next<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    corners: &SharedCorners<T, D>,
+    (first, x, F): (usize, &[SVector<T, D>], &[SMatrix<T, D, D>]),
+) -> bool {
+    let mut all_valid = true;
+    dispatch(CheckCells { corners, first, F, all_valid: &mut all_valid });
+    all_valid && x.iter().all(|x| c.axis_outside(x).is_none())
+}
+
+struct CheckCells<'a, 'b, T, const D: usize> {
+    corners: &'a SharedCorners<T, D>,
+    first: usize,
+    F: &'a [SMatrix<T, D, D>],
+    all_valid: &'b mut bool,
+}
+
+impl<T: Lanes, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+    const WIDE: bool = D > 1;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { corners, first, F, all_valid } = self;
+        let mut all = true;
+        let mut x = no_corners(vectors);
+        for group in (0..F.len()).step_by(GROUP) {
+            let of_group = (first + group, GROUP.min(F.len() - group));
+            take_corners(corners, &corners.next, of_group, &mut x);
+            for volume in volume_of_cell(&x).lanes.0 {
+                all &= volume > T::zero();
+            }
+        }
+        for F in F {
+            all &= determinant(F) > T::zero();
+        }
+        *all_valid = all;
+    }
+}
+
+/// A buffer for the shares of a group.
+#[inline(always)]
+fn none<T: Lanes, V: Vectors, const D: usize>(vectors: V) -> Shares<Eight<T, V>, D> {
+    let zero = Eight { lanes: Lane8::zero(), vectors };
+    Shares { w: [zero; MOST_CORNERS], g: [[zero; D]; MOST_CORNERS] }
+}
+
+/// From the centres of cells to their corners, in cells of the grid.
+#[inline(always)]
+fn arms<N: Number, const D: usize>(
+    x: &[[N; D]; MOST_CORNERS],
+    shares: &Shares<N, D>,
+    inverse_spacing: N,
+) -> [[N; D]; MOST_CORNERS] {
+    let mut arms = *x;
+    for a in 0..D {
+        let mut centre = x[0][a] * shares.w[0];
+        for corner in 1..1 << D {
+            centre = centre + x[corner][a] * shares.w[corner];
+        }
+        for corner in 0..1 << D {
+            arms[corner][a] = (x[corner][a] - centre) * inverse_spacing;
+        }
+    }
+    arms
+}
+
+/// P2G of a block of successive particles, to the sums of their chunk.
+pub(crate) struct ToCorners<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) corners: &'a SharedCorners<T, D>,
+    /// Where the corners are.
+    pub(crate) at: &'a [SVector<T, D>],
+    /// The shares of the particles there; empty for cells.
+    pub(crate) shares: &'a [Share<T, D>],
+    /// The first of the particles, and how many.
+    pub(crate) particles: (usize, usize),
+    pub(crate) contributions: &'a Contributions<T, D, BLOCK>,
+    pub(crate) sums: &'a mut [Node<T, D>],
+    /// With affine momenta; else empty.
+    pub(crate) affine_sums: &'a mut [AffineSum<T, D>],
+}
+
+impl<T: Lanes, const D: usize> ToCorners<'_, T, D> {
+    /// Gives whether all cells have a volume.
+    pub(crate) fn add(self) -> bool {
+        let mut have_volume = true;
+        if self.affine_sums.is_empty() {
+            dispatch(Adding::<T, D, false> { given: self, have_volume: &mut have_volume });
+        } else {
+            dispatch(Adding::<T, D, true> { given: self, have_volume: &mut have_volume });
+        }
+        have_volume
+    }
+}
+
+struct Adding<'a, 'b, T, const D: usize, const AFFINE: bool> {
+    given: ToCorners<'a, T, D>,
+    have_volume: &'b mut bool,
+}
+
+/// What a particle gives at each of its corners.
+struct Giving<T, const D: usize> {
+    value: Lane8<T>,
+    /// `-V0 tau` along each axis.
+    fluxes: [Lane8<T>; D],
+    /// The affine momentum per cell along each axis.
+    affine: [Lane8<T>; D],
+}
+
+impl<T: Lanes, const D: usize> Giving<T, D> {
+    #[inline(always)]
+    fn new<V: Vectors, const AFFINE: bool>(
+        vectors: V,
+        contributions: &Contributions<T, D, BLOCK>,
+        k: usize,
+        spacing: Lane8<T>,
+    ) -> Self {
+        let zero = [Lane8::zero(); D];
+        let value = vectors.load8(&contributions.value[k].values);
+        let mut own = Self { value, fluxes: zero, affine: zero };
+        for a in 0..D {
+            own.fluxes[a] = vectors.mul8(contributions.slope_lanes(k, a, false), spacing);
+            if AFFINE {
+                own.affine[a] = contributions.affine_lanes(k, a);
+            }
+        }
+        own
+    }
+
+    /// Adds it at a corner with these shares, at these arms.
+    #[inline(always)]
+    fn add<V: Vectors, const AFFINE: bool>(
+        &self,
+        vectors: V,
+        (w, g, arm): (T, [T; D], [T; D]),
+        sum: &mut Node<T, D>,
+        affine_sum: Option<&mut AffineSum<T, D>>,
+    ) {
+        let w = vectors.splat8(w);
+        let mut value = self.value;
+        if AFFINE {
+            for a in 0..D {
+                value = vectors.mul_add8(self.affine[a], vectors.splat8(arm[a]), value);
+            }
+        }
+        let mut own = vectors.mul8(value, w);
+        for a in 0..D {
+            own = vectors.mul_add8(self.fluxes[a], vectors.splat8(g[a]), own);
+        }
+        sum.values = vectors.add8(vectors.load8(&sum.values), own).0;
+        if let (true, Some(affine_sum)) = (AFFINE, affine_sum) {
+            for a in 0..D {
+                let known = vectors.load8(&affine_sum[a].values);
+                affine_sum[a].values = vectors.mul_add8(self.affine[a], w, known).0;
+            }
+        }
+    }
+}
+
+impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D, AFFINE> {
+    const WIDE: bool = D > 1;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let ToCorners { c, corners, at, shares, particles, contributions, sums, affine_sums } =
+            self.given;
+        let (first, count) = particles;
+        let spacing = vectors.splat8(c.spacing());
+        let inverse_spacing = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
+        let mesh = &corners.mesh;
+        if mesh.interpolation == Interpolation::Triangles {
+            let start = mesh.places(first).start;
+            for k in 0..count {
+                let given = Giving::new::<V, AFFINE>(vectors, contributions, k, spacing);
+                let mut centre = SVector::<T, D>::zeros();
+                if AFFINE {
+                    for place in mesh.places(first + k) {
+                        let x = &at[mesh.corners[place] as usize];
+                        centre += x * shares[place - start].w;
+                    }
+                }
+                for place in mesh.places(first + k) {
+                    let Share { w, g } = shares[place - start];
+                    let x = &at[mesh.corners[place] as usize];
+                    let mut arm = [T::zero(); D];
+                    for a in 0..D {
+                        arm[a] = (x[a] - centre[a]) * c.inverse_spacing;
+                    }
+                    let sum = corners.sum_at[place] as usize;
+                    given.add::<V, AFFINE>(
+                        vectors,
+                        (w, g, arm),
+                        &mut sums[sum],
+                        affine_sums.get_mut(sum),
+                    );
+                }
+            }
+            return;
+        }
+        let (mut x, mut shares) = (no_corners(vectors), none(vectors));
+        for group in (0..count).step_by(GROUP) {
+            let of_group = GROUP.min(count - group);
+            take_corners(corners, at, (first + group, of_group), &mut x);
+            let volume = shares_of_cell(&x, &mut shares);
+            for volume in volume.lanes.0 {
+                *self.have_volume &= volume > T::zero();
+            }
+            let arms = if AFFINE { Some(arms(&x, &shares, inverse_spacing)) } else { None };
+            let sum_at = &corners.sum_at[(first + group) << D..][..of_group << D];
+            for n in 0..of_group {
+                let given = Giving::new::<V, AFFINE>(vectors, contributions, group + n, spacing);
+                for corner in 0..1 << D {
+                    let sum = sum_at[(n << D) + corner] as usize;
+                    let (mut g, mut arm) = ([T::zero(); D], [T::zero(); D]);
+                    for a in 0..D {
+                        g[a] = shares.g[corner][a].lanes.0[n];
+                        if let Some(arms) = &arms {
+                            arm[a] = arms[corner][a].lanes.0[n];
+                        }
+                    }
+                    given.add::<V, AFFINE>(
+                        vectors,
+                        (shares.w[corner].lanes.0[n], g, arm),
+                        &mut sums[sum],
+                        affine_sums.get_mut(sum),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// G2P of successive particles, from the values at all corners.
+pub(crate) struct FromCorners<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) corners: &'a SharedCorners<T, D>,
+    /// The shares of the particles; empty for cells.
+    pub(crate) shares: &'a [Share<T, D>],
+    pub(crate) values: &'a CornerValues<T, D>,
+    /// The first of the particles.
+    pub(crate) first: usize,
+    pub(crate) receiver: &'a mut [Interpolated<T, D>],
+}
+
+impl<T: Lanes, const D: usize> FromCorners<'_, T, D> {
+    /// With affine velocities or without. Those of polygons are the gradients of the second vector: values at corners do not tell the
+    /// inertia of the weights at nodes.
+    pub(crate) fn interpolate(self, is_affine: bool) {
+        if is_affine {
+            dispatch(Interpolating::<T, D, true>(self));
+        } else {
+            dispatch(Interpolating::<T, D, false>(self));
+        }
+    }
+}
+
+struct Interpolating<'a, T, const D: usize, const AFFINE: bool>(FromCorners<'a, T, D>);
+
+/// Values of corners over a particle, and their slopes along each axis.
+struct Over<T, const D: usize> {
+    value: Lane8<T>,
+    slopes: [Lane8<T>; D],
+}
+
+impl<T: Lanes, const D: usize> Over<T, D> {
+    #[inline(always)]
+    fn zero() -> Self {
+        Self { value: Lane8::zero(), slopes: [Lane8::zero(); D] }
+    }
+
+    /// Adds a corner with these shares. Products that make up a value are rounded before they are added, as in all kernels.
+    #[inline(always)]
+    fn add<V: Vectors>(&mut self, vectors: V, node: Lane8<T>, w: T, g: [T; D]) {
+        self.value = vectors.add8(self.value, vectors.mul8(node, vectors.splat8(w)));
+        for a in 0..D {
+            self.slopes[a] = vectors.mul_add8(node, vectors.splat8(g[a]), self.slopes[a]);
+        }
+    }
+
+    #[inline(always)]
+    fn store(&self, spacing: T, own: &mut Interpolated<T, D>) {
+        for i in 0..D {
+            (own.velocity[i], own.second[i]) = (self.value.0[i], self.value.0[D + i]);
+            for a in 0..D {
+                own.velocity_gradient[(i, a)] = self.slopes[a].0[i] * spacing;
+            }
+        }
+    }
+}
+
+impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T, D, AFFINE> {
+    const WIDE: bool = D > 1;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let FromCorners { c, corners, shares, values, first, receiver } = self.0;
+        let spacing = c.spacing();
+        let mesh = &corners.mesh;
+        if mesh.interpolation == Interpolation::Triangles {
+            let start = mesh.places(first).start;
+            for (k, own) in receiver.iter_mut().enumerate() {
+                let mut over = Over::zero();
+                for place in mesh.places(first + k) {
+                    let Share { w, g } = shares[place - start];
+                    let node = &values.nodes[mesh.corners[place] as usize];
+                    over.add(vectors, vectors.load8(&node.values), w, g);
+                }
+                over.store(spacing, own);
+                if AFFINE {
+                    for a in 0..D {
+                        for i in 0..D {
+                            own.affine[(i, a)] = over.slopes[a].0[D + i] * spacing;
+                        }
+                    }
+                }
+            }
+            return;
+        }
+        let (mut x, mut shares) = (no_corners(vectors), none(vectors));
+        for (group, receiver) in receiver.chunks_mut(GROUP).enumerate() {
+            let particles = (first + group * GROUP, receiver.len());
+            take_corners(corners, &mesh.x, particles, &mut x);
+            shares_of_cell(&x, &mut shares);
+            let of_affine = if AFFINE { Some(OfAffine::new(c, &x, &shares)) } else { None };
+            for (n, own) in receiver.iter_mut().enumerate() {
+                let own_corners = mesh.of_particle(particles.0 + n);
+                let mut over = Over::zero();
+                for corner in 0..1 << D {
+                    let node = &values.nodes[own_corners[corner] as usize];
+                    let mut g = [T::zero(); D];
+                    for a in 0..D {
+                        g[a] = shares.g[corner][a].lanes.0[n];
+                    }
+                    let w = shares.w[corner].lanes.0[n];
+                    over.add(vectors, vectors.load8(&node.values), w, g);
+                }
+                over.store(spacing, own);
+                if let Some(of_affine) = &of_affine {
+                    own.affine = of_affine.velocity(n, &shares, own_corners, values);
+                }
+            }
+        }
+    }
+}
+
+/// What affine velocities of a group of cells are computed with: `B D^-1`. Of the weights `sum_c w_c N_i(x_c)` at nodes the moments
+/// `B = sum v S arm` and the inertia `D = sum S arm arm` about the centre are those of the corners, with those of the hat functions
+/// around each.
+struct OfAffine<T, V, const D: usize> {
+    /// From the centres to the corners, in cells.
+    arms: [[Eight<T, V>; D]; MOST_CORNERS],
+    inverse_inertia: [[Eight<T, V>; D]; D],
+}
+
+impl<T: Lanes, V: Vectors, const D: usize> OfAffine<T, V, D> {
+    #[inline(always)]
+    fn new(
+        c: &Constants<T, D>,
+        x: &[[Eight<T, V>; D]; MOST_CORNERS],
+        shares: &Shares<Eight<T, V>, D>,
+    ) -> Self {
+        let vectors = x[0][0].vectors;
+        let constant = |value: T| Eight { lanes: vectors.splat8(value), vectors };
+        let (inverse_spacing, one) = (constant(c.inverse_spacing), constant(T::one()));
+        let arms = arms(x, shares, inverse_spacing);
+        let mut inertia = [[constant(T::zero()); D]; D];
+        for corner in 0..1 << D {
+            let w = shares.w[corner];
+            for a in 0..D {
+                let mut place = (x[corner][a] - constant(c.lower[a])) * inverse_spacing;
+                for n in 0..GROUP {
+                    place.lanes.0[n] -= place.lanes.0[n].floor();
+                }
+                inertia[a][a] = inertia[a][a] + w * place * (one - place);
+                for b in 0..=a {
+                    inertia[a][b] = inertia[a][b] + w * (arms[corner][a] * arms[corner][b]);
+                }
+            }
+        }
+        for a in 0..D {
+            for b in a + 1..D {
+                inertia[a][b] = inertia[b][a];
+            }
+        }
+        Self { arms, inverse_inertia: inverse(&inertia) }
+    }
+
+    /// The affine velocity per cell of cell `n` of the group.
+    #[inline(always)]
+    fn velocity(
+        &self,
+        n: usize,
+        shares: &Shares<Eight<T, V>, D>,
+        corners: &[u32],
+        values: &CornerValues<T, D>,
+    ) -> SMatrix<T, D, D> {
+        let mut moments = SMatrix::<T, D, D>::zeros();
+        let mut inverse = SMatrix::zeros();
+        for corner in 0..1 << D {
+            let w = shares.w[corner].lanes.0[n];
+            let place = corners[corner] as usize;
+            let (v, of_hats) = (&values.nodes[place].values, &values.moments[place]);
+            for a in 0..D {
+                let arm = self.arms[corner][a].lanes.0[n];
+                for i in 0..D {
+                    moments[(i, a)] += w * (v[i] * arm + of_hats[(i, a)]);
+                }
+            }
+        }
+        for a in 0..D {
+            for b in 0..D {
+                inverse[(a, b)] = self.inverse_inertia[a][b].lanes.0[n];
+            }
+        }
+        product(&moments, &inverse)
+    }
+}
+
+/// The second moments of the hat functions around a point, in cells.
+#[inline(always)]
+pub(crate) fn variance<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    x: &SVector<T, D>,
+) -> SVector<T, D> {
+    let mut variance = SVector::from(c.in_cells(x));
+    for place in variance.iter_mut() {
+        *place -= place.floor();
+        *place *= T::one() - *place;
+    }
+    variance
+}
