@@ -17,7 +17,8 @@ use crate::health::{Invalid, Outcome, SharedOutcome};
 use crate::kernel::block::Seen;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
-use crate::kernel::shared::{AffineSum, variance};
+use crate::kernel::points::{FromGrid, ToGrid, affine_at};
+use crate::kernel::shared::AffineSum;
 use crate::mesh::{Interpolation, Mesh};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
@@ -178,41 +179,32 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         (band, first): (&mut [Node<T, D>], usize),
         ids: &[u32],
     ) {
-        let is_affine = self.is_affine;
+        let Self { sums, is_affine, at_nodes, .. } = self;
+        let affine_sums = if *is_affine { &self.affine_sums[..] } else { &[] };
+        if corners.at_corner.on_axis == OnAxis::Hat {
+            return ToGrid { c, corners, sums, affine_sums, band, first, ids }.add();
+        }
         let mut copies = Copies::new();
-        let mut buffers = self.buffers.take(&self.at_nodes, is_affine);
+        let mut buffers = self.buffers.take(at_nodes, *is_affine);
         for ids in ids.chunks(BLOCK) {
             let Buffers { block, contributions, .. } = &mut *buffers;
             contributions.without_stress();
             for (k, &corner) in ids.iter().enumerate() {
                 copies.x[k] = corners.at(corner as usize);
-                let sums = corners.sums_of(corner as usize);
-                let [first, others @ ..] = sums else { continue };
-                let mut value = self.sums[*first as usize];
-                others.iter().for_each(|&sum| value.add(&self.sums[sum as usize]));
+                let mut value = Node::zero();
+                for &sum in corners.sums_of(corner as usize) {
+                    value.add(&sums[sum as usize]);
+                }
                 contributions.value[k] = value;
-                if is_affine {
-                    contributions.affine[k] = self.affine_at(corners, sums);
+                if *is_affine {
+                    let along = affine_at(corners, affine_sums, corner as usize);
+                    contributions.affine[k] = SMatrix::from_fn(|i, a| along[a].0[i]);
                 }
             }
-            block.compute_weights(c, &self.at_nodes, ids, copies.kinematics());
+            block.compute_weights(c, at_nodes, ids, copies.kinematics());
             block.p2g(&c.strides, band, first, contributions, ids.len());
         }
         self.buffers.give_back(buffers);
-    }
-
-    /// The affine momentum at a corner with these sums, along the axes of the grid.
-    fn affine_at(&self, corners: &SharedCorners<T, D>, sums: &[u32]) -> SMatrix<T, D, D> {
-        let mut own = SMatrix::zeros();
-        for &sum in sums {
-            for (a, along) in self.affine_sums[sum as usize].iter().enumerate() {
-                (0..D).for_each(|i| own[(i, a)] += along.values[i]);
-            }
-        }
-        match &corners.mesh.turn {
-            Some(turn) => own * turn.transpose(),
-            None => own,
-        }
     }
 
     /// Interpolates the values of nodes at all corners.
@@ -222,44 +214,43 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         corners: &SharedCorners<T, D>,
         nodes: &[Node<T, D>],
     ) {
-        let Self { values, buffers, at_nodes, .. } = self;
-        let (buffers, at_nodes) = (&*buffers, &*at_nodes);
-        let CornerValues { nodes: at_corners, moments } = values;
+        self.interpolate_and_follow(c, corners, nodes, &mut []);
+    }
+
+    /// The same, and the corners follow these values in a step, for their `next` positions; unless these are empty.
+    pub(crate) fn interpolate_and_follow(
+        &mut self,
+        c: &Constants<T, D>,
+        corners: &SharedCorners<T, D>,
+        nodes: &[Node<T, D>],
+        next: &mut [SVector<T, D>],
+    ) {
         let own = corners.own();
-        let mut of_moments = moments.chunks_mut(CHUNK);
-        let chunks = at_corners[..own].chunks_mut(CHUNK).enumerate();
+        let CornerValues { nodes: values, moments } = &mut self.values;
+        let (own_next, other_next) = next.split_at_mut(own.min(next.len()));
+        let (mut of_moments, mut of_next) = (moments.chunks_mut(CHUNK), own_next.chunks_mut(CHUNK));
+        let chunks = values[..own].chunks_mut(CHUNK).enumerate();
         let chunks: Vec<_> = chunks
-            .map(|(number, values)| (number * CHUNK, values, of_moments.next().unwrap_or_default()))
+            .map(|(number, values)| Corners {
+                first: number * CHUNK,
+                values,
+                moments: of_moments.next().unwrap_or_default(),
+                next: of_next.next().unwrap_or_default(),
+            })
             .collect();
-        each(chunks, &|(first, values, moments)| {
-            let mut copies = Copies::new();
-            let mut own = buffers.take(at_nodes, false);
-            let Buffers { block, interpolated, .. } = &mut *own;
-            let mut of_moments = moments.chunks_mut(BLOCK);
-            for (index, values) in values.chunks_mut(BLOCK).enumerate() {
-                let ids = successive(first + index * BLOCK);
-                let ids = &ids[..values.len()];
-                for (x, &corner) in copies.x.iter_mut().zip(ids) {
-                    *x = corners.at(corner as usize);
-                }
-                let interpolated = &mut interpolated[..values.len()];
-                block.compute_weights(c, at_nodes, ids, copies.kinematics());
-                block.g2p((c, at_nodes), Seen::Nodes(nodes), interpolated);
-                for (value, own) in values.iter_mut().zip(&*interpolated) {
-                    *value = Node::new(&own.velocity, &own.second, T::zero());
-                }
-                let moments = of_moments.next().unwrap_or_default().iter_mut();
-                for (moments, (own, x)) in moments.zip(interpolated.iter().zip(&copies.x)) {
-                    // The slope of hat functions along an axis times the variance: the nodes of an axis are two.
-                    let variance = variance(c, x);
-                    *moments = own.velocity_gradient * SMatrix::from_diagonal(&variance);
-                }
+        let (buffers, at_nodes) = (&self.buffers, &self.at_nodes);
+        each(chunks, &|Corners { first, values, moments, next }| {
+            if corners.at_corner.on_axis == OnAxis::Hat {
+                FromGrid { c, corners, nodes, first, values, moments }.interpolate();
+            } else {
+                from_grid((c, corners), (at_nodes, buffers), nodes, first, values);
             }
-            buffers.give_back(own);
+            corners.follow(c, first, values, next);
         });
         if let Some(halo) = &corners.halo {
-            halo.exchange(values);
+            halo.exchange(&mut self.values);
         }
+        corners.follow(c, own, &self.values.nodes[own..], other_next);
     }
 
     /// The first node that a corner reaches.
@@ -306,6 +297,43 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         });
         found.all()
     }
+}
+
+/// Some successive corners, with what belongs to them.
+struct Corners<'a, T, const D: usize> {
+    first: usize,
+    values: &'a mut [Node<T, D>],
+    /// Empty where they are not needed.
+    moments: &'a mut [SMatrix<T, D, D>],
+    /// Empty where they do not move.
+    next: &'a mut [SVector<T, D>],
+}
+
+/// Values of nodes at corners from `first` on.
+fn from_grid<T: Lanes, const D: usize>(
+    (c, corners): (&Constants<T, D>, &SharedCorners<T, D>),
+    (at_nodes, buffers): (&Support<T, D>, &BufferPool<T, D>),
+    nodes: &[Node<T, D>],
+    first: usize,
+    values: &mut [Node<T, D>],
+) {
+    let mut copies = Copies::new();
+    let mut own = buffers.take(at_nodes, false);
+    let Buffers { block, interpolated, .. } = &mut *own;
+    for (index, values) in values.chunks_mut(BLOCK).enumerate() {
+        let ids = successive(first + index * BLOCK);
+        let ids = &ids[..values.len()];
+        for (x, &corner) in copies.x.iter_mut().zip(ids) {
+            *x = corners.at(corner as usize);
+        }
+        let interpolated = &mut interpolated[..values.len()];
+        block.compute_weights(c, at_nodes, ids, copies.kinematics());
+        block.g2p((c, at_nodes), Seen::Nodes(nodes), interpolated);
+        for (value, own) in values.iter_mut().zip(&*interpolated) {
+            *value = Node::new(&own.velocity, &own.second, T::zero());
+        }
+    }
+    buffers.give_back(own);
 }
 
 /// The reason why a corner may not be where it is, with a particle at it.

@@ -176,8 +176,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     pub(crate) fn move_corners(&mut self) {
         let Self { constants, nodes, support, exchange, .. } = self;
         if let Support::Mesh(corners) = support {
-            exchange.interpolate(constants, corners, nodes);
-            corners.follow(constants, &exchange.values.nodes);
+            let mut next = std::mem::take(&mut corners.next);
+            exchange.interpolate_and_follow(constants, corners, nodes, &mut next);
+            corners.next = next;
         }
     }
 }

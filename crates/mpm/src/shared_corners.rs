@@ -9,9 +9,10 @@ use crate::corner_halo::CornerHalo;
 use crate::domain::volume_of_cell;
 use crate::fault::Fault;
 use crate::geometry::Constants;
+use crate::kernel::shared::goes_on;
 use crate::mesh::{Interpolation, Mesh, Share};
 use crate::node::Node;
-use crate::parallel::chunks::{each, each_chunk};
+use crate::parallel::chunks::each;
 use crate::shape_function::ProductShape;
 use crate::simd::{Lanes, One};
 
@@ -35,6 +36,8 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     pub(crate) measured: Measured<T, D>,
     /// Cells: whether each corner of a particle is the one after that of the particle before.
     pub(crate) is_next: Vec<bool>,
+    /// Cells: whether a particle begins with the corners with which the one before it ends.
+    pub(crate) goes_on: Vec<bool>,
     /// Particles whose contributions are summed together.
     pub(crate) chunks: Vec<Chunk>,
     /// For each place in the list of corners which of its chunk's sums is that of its corner.
@@ -202,7 +205,8 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             next: mesh.x.clone(),
             is_measured: false,
             measured: Measured::new(&mesh),
-            is_next: are_next(&mesh),
+            is_next: of_pairs(&mesh, is_next),
+            goes_on: of_pairs(&mesh, goes_on),
             chunks,
             sum_at,
             sums,
@@ -291,23 +295,26 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         (0..self.mesh.of_particles.len()).find(|&p| self.mesh.places(p).end > place).unwrap_or(0)
     }
 
-    /// Stores the positions after a step with the velocities `values` of the corners.
-    pub(crate) fn follow(&mut self, c: &Constants<T, D>, values: &[Node<T, D>]) {
-        let Self { mesh, next, .. } = self;
-        let x = &mesh.x[..];
-        // What wide splines leave of the velocity across a wall, which is zero but for rounding, would take a corner off the grid.
-        let is_on_wall = |x, axis| mesh.turn.is_none() && c.is_on_wall(x, axis);
-        each_chunk(next, CHUNK, &|chunk, next| {
-            let first = chunk * CHUNK;
-            for ((next, x), value) in next.iter_mut().zip(&x[first..]).zip(&values[first..]) {
-                *next = *x;
-                if !c.planted.is(Fault::CornersStay) {
-                    for a in (0..D).filter(|a| !is_on_wall(x, *a)) {
-                        next[a] += value.values[a] * c.time_step;
+    /// Writes the positions after a step of corners from `first` on, which have these velocities.
+    pub(crate) fn follow(
+        &self,
+        c: &Constants<T, D>,
+        first: usize,
+        velocities: &[Node<T, D>],
+        next: &mut [SVector<T, D>],
+    ) {
+        let Mesh { x, turn, .. } = &self.mesh;
+        for ((next, x), velocity) in next.iter_mut().zip(&x[first..]).zip(velocities) {
+            *next = *x;
+            if !c.planted.is(Fault::CornersStay) {
+                for a in 0..D {
+                    // What rounding leaves of the velocity across a wall would take a corner off the grid.
+                    if turn.is_some() || !c.is_on_wall(x, a) {
+                        next[a] += velocity.values[a] * c.time_step;
                     }
                 }
             }
-        });
+        }
     }
 
     /// Puts the corners at their new places, at which shares are known or not.
@@ -318,17 +325,22 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     }
 }
 
-/// See [`SharedCorners::is_next`].
-fn are_next<T: Lanes, const D: usize>(mesh: &Mesh<T, D>) -> Vec<bool> {
-    let of_one = 1 << D;
-    let pairs = mesh.corners.chunks(of_one).zip(mesh.corners.chunks(of_one).skip(1));
-    let is_next = |(before, own): (&[u32], &[u32])| {
-        own.iter().zip(before).all(|(corner, before)| *corner == before + 1)
-    };
+/// For each cell whether this holds of the corners of the one before it and of its own.
+fn of_pairs<T: Lanes, const D: usize>(
+    mesh: &Mesh<T, D>,
+    holds: fn(&[u32], &[u32]) -> bool,
+) -> Vec<bool> {
+    let cells = || mesh.corners.chunks(1 << D);
+    let of_pairs = cells().zip(cells().skip(1)).map(|(before, own)| holds(before, own));
     match mesh.interpolation {
         Interpolation::Triangles => Vec::new(),
-        Interpolation::Cell => std::iter::once(false).chain(pairs.map(is_next)).collect(),
+        Interpolation::Cell => std::iter::once(false).chain(of_pairs).collect(),
     }
+}
+
+/// Whether each corner of a cell is the one after that of the cell before.
+fn is_next(before: &[u32], own: &[u32]) -> bool {
+    own.iter().zip(before).all(|(corner, before)| *corner == before + 1)
 }
 
 /// Puts one of each of ascending numbers first, and tells how many these are.

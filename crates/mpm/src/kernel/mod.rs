@@ -3,7 +3,8 @@
 //! A [`block`] has the weights of 64 particles, whose data lie side by side in [`copies`]. Weights that are products over the axes
 //! come from [`product`], which hands the sums over nodes to [`lanes_plane`] in one and two dimensions, to [`lanes_space`] in three,
 //! and to [`any`] for the extended support of a large GIMP box. CPDI has weights and sums of its own in [`corners`];
-//! domains on shared corners, those of CPDI2 among them, have theirs in [`shared`]. Passes take both from [`buffers`], which outlive them.
+//! domains on shared corners, those of CPDI2 among them, have theirs in [`shared`],
+//! and these corners, where they reach nodes by hat functions, in [`points`]. Passes take both from [`buffers`], which outlive them.
 //! [`any`] also defines the values on either side: [`Contributions`](any::Contributions) to the grid,
 //! [`Interpolated`](any::Interpolated) values from it.
 
@@ -14,5 +15,6 @@ pub(crate) mod copies;
 pub(crate) mod corners;
 mod lanes_plane;
 mod lanes_space;
+pub(crate) mod points;
 mod product;
 pub(crate) mod shared;

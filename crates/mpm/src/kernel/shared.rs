@@ -195,15 +195,15 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
         own
     }
 
-    /// Adds it at a corner with these shares, at these arms.
+    /// Adds it at a corner with these shares, at these arms, to what the corner has.
     #[inline(always)]
     fn add<V: Vectors, const AFFINE: bool>(
         &self,
         vectors: V,
         (w, g, arm): (T, [T; D], [T; D]),
-        sum: &mut Node<T, D>,
+        sum: Lane8<T>,
         affine_sum: Option<&mut AffineSum<T, D>>,
-    ) {
+    ) -> Lane8<T> {
         let w = vectors.splat8(w);
         let mut value = self.value;
         if AFFINE {
@@ -215,14 +215,28 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
         for a in 0..D {
             own = vectors.mul_add8(self.fluxes[a], vectors.splat8(g[a]), own);
         }
-        sum.values = vectors.add8(vectors.load8(&sum.values), own).0;
         if let (true, Some(affine_sum)) = (AFFINE, affine_sum) {
             for a in 0..D {
                 let known = vectors.load8(&affine_sum[a].values);
                 affine_sum[a].values = vectors.mul_add8(self.affine[a], w, known).0;
             }
         }
+        vectors.add8(sum, own)
     }
+}
+
+/// The corners of a cell in pairs, the one that a row of cells reaches first and the one that the next cell of the row has as well.
+const PAIRS: [[usize; 2]; MOST_CORNERS / 2] = [[0, 1], [3, 2], [4, 5], [7, 6]];
+
+/// Whether a cell begins with the corners with which the one before it ends, and no corner is among them twice.
+pub(crate) fn goes_on(before: &[u32], own: &[u32]) -> bool {
+    let pairs = &PAIRS[..own.len() / 2];
+    let mut all: Vec<u32> = before.to_vec();
+    all.extend(pairs.iter().map(|[_, last]| own[*last]));
+    let count = all.len();
+    all.sort_unstable();
+    all.dedup();
+    all.len() == count && pairs.iter().all(|[first, last]| own[*first] == before[*last])
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D, AFFINE> {
@@ -255,17 +269,18 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
                         arm[a] = (x[a] - centre[a]) * c.inverse_spacing;
                     }
                     let sum = corners.sum_at[place] as usize;
-                    given.add::<V, AFFINE>(
-                        vectors,
-                        (w, g, arm),
-                        &mut sums[sum],
-                        affine_sums.get_mut(sum),
-                    );
+                    let known = vectors.load8(&sums[sum].values);
+                    let affine_sum = affine_sums.get_mut(sum);
+                    sums[sum].values =
+                        given.add::<V, AFFINE>(vectors, (w, g, arm), known, affine_sum).0;
                 }
             }
             return;
         }
         let (mut x, mut shares) = (no_corners(vectors), none(vectors));
+        // The sums of corners that the next cell may have as well stay in registers: it would wait for them to pass through memory.
+        let mut kept = [Lane8::zero(); MOST_CORNERS / 2];
+        let mut kept_at = [usize::MAX; MOST_CORNERS / 2];
         for group in (0..count).step_by(GROUP) {
             let of_group = GROUP.min(count - group);
             take_corners(corners, at, (first + group, of_group), &mut x);
@@ -277,22 +292,44 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
             let sum_at = &corners.sum_at[(first + group) << D..][..of_group << D];
             for n in 0..of_group {
                 let given = Giving::new::<V, AFFINE>(vectors, contributions, group + n, spacing);
-                for corner in 0..1 << D {
-                    let sum = sum_at[(n << D) + corner] as usize;
-                    let (mut g, mut arm) = ([T::zero(); D], [T::zero(); D]);
-                    for a in 0..D {
-                        g[a] = shares.g[corner][a].lanes.0[n];
-                        if let Some(arms) = &arms {
-                            arm[a] = arms[corner][a].lanes.0[n];
+                let own_sums = &sum_at[n << D..][..1 << D];
+                let goes_on = group + n > 0 && corners.goes_on[first + group + n];
+                if !goes_on {
+                    for pair in 0..1 << (D - 1) {
+                        if let Some(sum) = sums.get_mut(kept_at[pair]) {
+                            sum.values = kept[pair].0;
                         }
                     }
-                    given.add::<V, AFFINE>(
-                        vectors,
-                        (shares.w[corner].lanes.0[n], g, arm),
-                        &mut sums[sum],
-                        affine_sums.get_mut(sum),
-                    );
                 }
+                for pair in 0..1 << (D - 1) {
+                    for (place, corner) in PAIRS[pair].into_iter().enumerate() {
+                        let sum = own_sums[corner] as usize;
+                        let (mut g, mut arm) = ([T::zero(); D], [T::zero(); D]);
+                        for a in 0..D {
+                            g[a] = shares.g[corner][a].lanes.0[n];
+                            if let Some(arms) = &arms {
+                                arm[a] = arms[corner][a].lanes.0[n];
+                            }
+                        }
+                        let share = (shares.w[corner].lanes.0[n], g, arm);
+                        let known = match place == 0 && goes_on {
+                            true => kept[pair],
+                            false => vectors.load8(&sums[sum].values),
+                        };
+                        let affine_sum = affine_sums.get_mut(sum);
+                        let new = given.add::<V, AFFINE>(vectors, share, known, affine_sum);
+                        if place == 0 {
+                            sums[sum].values = new.0;
+                        } else {
+                            (kept[pair], kept_at[pair]) = (new, sum);
+                        }
+                    }
+                }
+            }
+        }
+        for pair in 0..1 << (D - 1) {
+            if let Some(sum) = sums.get_mut(kept_at[pair]) {
+                sum.values = kept[pair].0;
             }
         }
     }
@@ -482,18 +519,4 @@ impl<T: Lanes, V: Vectors, const D: usize> OfAffine<T, V, D> {
         }
         product(&moments, &inverse)
     }
-}
-
-/// The second moments of the hat functions around a point, in cells.
-#[inline(always)]
-pub(crate) fn variance<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    x: &SVector<T, D>,
-) -> SVector<T, D> {
-    let mut variance = SVector::from(c.in_cells(x));
-    for place in variance.iter_mut() {
-        *place -= place.floor();
-        *place *= T::one() - *place;
-    }
-    variance
 }
