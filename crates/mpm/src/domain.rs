@@ -49,7 +49,7 @@ pub(crate) struct Shares<N, const D: usize> {
 
 /// On which side of the centre corner `index` of a parallelogram lies along an axis.
 #[inline(always)]
-fn is_upper(index: usize, axis: usize) -> bool {
+pub(crate) fn is_upper(index: usize, axis: usize) -> bool {
     index >> axis & 1 == 1
 }
 

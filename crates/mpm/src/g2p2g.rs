@@ -15,7 +15,7 @@ use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::BlockLaw;
+use crate::kernel::block::{Block, BlockLaw, Seen};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, Kinematics};
 use crate::node::Node;
@@ -115,7 +115,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// The same for a block of particles.
     fn advance_block(
         &self,
-        Buffers { block, contributions, .. }: &mut Buffers<T, D>,
+        Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],
@@ -129,7 +129,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             block.compute_weights(c, support, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
-        let advance = AdvanceParticles {
+        let mut advance = AdvanceParticles {
             c,
             time_step: c.time_step,
             per_cell: c.time_step * c.inverse_spacing,
@@ -138,7 +138,15 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             F,
             contributions,
         };
-        block.g2p_with(&c.strides, nodes, ids.len(), advance);
+        if let Block::Product(weights) = block {
+            weights.g2p_with(&c.strides, nodes, ids.len(), advance);
+        } else {
+            let interpolated = &mut interpolated[..ids.len()];
+            block.g2p((c, support), Seen::Nodes(nodes), interpolated);
+            for (k, interpolated) in interpolated.iter().enumerate() {
+                advance.receive(k, interpolated);
+            }
+        }
         block.compute_weights(c, support, ids, Kinematics { x, F });
         if !support.are_valid(c, ids, &[bin; BLOCK], Kinematics { x, F }) {
             let mut outcome = Outcome::default();

@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram};
 use crate::geometry::Constants;
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::corners::{GROUP, OfGroup, gather, padded, parallelograms};
+use crate::kernel::parallelograms::{GROUP, OfGroup, gather, padded, parallelograms};
 use crate::shape_function::{
     EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
 };

@@ -31,8 +31,7 @@ pub(crate) fn is_fused<T, const D: usize>(
     let stress_last = integrator.early() == 0.0 && !integrator.reprojects();
     stress_last
         && match support {
-            Support::Product(_) => transfer == Transfer::Flip,
-            Support::Cpdi { .. } => false,
+            Support::Product(_) | Support::Cpdi { .. } => transfer == Transfer::Flip,
             Support::Mesh(_) => !matches!(transfer.taken(), Taken::Filtered(_)),
         }
 }

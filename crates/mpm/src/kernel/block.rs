@@ -4,9 +4,9 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::corner_exchange::CornerValues;
 use crate::geometry::Constants;
-use crate::kernel::any::{Contributions, Interpolated, Receive};
+use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::corners::CornerWeights;
+use crate::kernel::parallelograms::ParallelogramWeights;
 use crate::kernel::product::ProductWeights;
 use crate::kernel::shared::FromCorners;
 use crate::material::LibraryLaw;
@@ -44,8 +44,8 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
 pub(crate) enum Block<T, const D: usize> {
     /// Products over the axes.
     Product(ProductWeights<T, D>),
-    /// Means over domains with corners of their own, for CPDI.
-    Corners(CornerWeights<T, D>),
+    /// Means over parallelograms, for CPDI.
+    Parallelograms(ParallelogramWeights<T, D>),
     /// Means over domains between shared corners, of particles from this one on.
     Shared {
         /// Whether there are affine velocities (APIC).
@@ -68,7 +68,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
             Support::Product(shape) => Self::Product(ProductWeights::new(shape, is_affine)),
-            Support::Cpdi { .. } => Self::Corners(CornerWeights::new(is_affine)),
+            Support::Cpdi { .. } => Self::Parallelograms(ParallelogramWeights::new(is_affine)),
             Support::Mesh(_) => Self::Shared { is_affine, first: 0 },
         }
     }
@@ -85,8 +85,8 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Product(weights), Support::Product(shape)) => {
                 weights.compute(c, shape, kinematics);
             }
-            (Self::Corners(weights), Support::Cpdi { half_edges }) => {
-                weights.corners.of_parallelograms(c, half_edges, ids, kinematics);
+            (Self::Parallelograms(weights), Support::Cpdi { half_edges }) => {
+                weights.compute(c, half_edges, ids, kinematics);
             }
             (Self::Shared { first, .. }, Support::Mesh(_)) => {
                 *first = ids.first().map_or(0, |id| *id as usize);
@@ -113,25 +113,10 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     ) {
         match self {
             Self::Product(weights) => weights.p2g(strides, band, first, contributions, count),
-            Self::Corners(weights) => weights.p2g(strides, band, first, contributions, count),
-            Self::Shared { .. } => debug_assert!(false, "these give to corners"),
-        }
-    }
-
-    /// G2P of the first `count` particles, to a receiver that is compiled into the kernel: for weights that are products over
-    /// the axes, without affine velocities.
-    pub(crate) fn g2p_with(
-        &self,
-        strides: &[usize; D],
-        nodes: &[Node<T, D>],
-        count: usize,
-        receiver: impl Receive<T, D>,
-    ) {
-        match self {
-            Self::Product(weights) => weights.g2p_with(strides, nodes, count, receiver),
-            Self::Corners(_) | Self::Shared { .. } => {
-                debug_assert!(false, "single passes are for products");
+            Self::Parallelograms(weights) => {
+                weights.p2g(strides, band, first, contributions, count)
             }
+            Self::Shared { .. } => debug_assert!(false, "these give to corners"),
         }
     }
 
@@ -146,7 +131,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Product(weights), Seen::Nodes(nodes), _) => {
                 weights.g2p(&c.strides, nodes, receiver);
             }
-            (Self::Corners(weights), Seen::Nodes(nodes), _) => {
+            (Self::Parallelograms(weights), Seen::Nodes(nodes), _) => {
                 weights.g2p(&c.strides, nodes, receiver);
             }
             (

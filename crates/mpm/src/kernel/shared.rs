@@ -10,7 +10,7 @@ use crate::domain::{MOST_CORNERS, Shares, inverse, shares_of_cell, volume_of_cel
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
-use crate::kernel::corners::GROUP;
+use crate::kernel::parallelograms::GROUP;
 use crate::mesh::{Interpolation, Share};
 use crate::node::Node;
 use crate::shared_corners::SharedCorners;

@@ -1,14 +1,20 @@
 //! P2G and G2P of CPDI, whose weights are means over parallelograms.
 //!
-//! Weights are computed for eight particles at once, as sums over the corners. Most domains lie within two cells along each axis,
-//! and reach 3 nodes; the others go from corner to corner, one particle at a time.
+//! With half-edges `E` the corners of a parallelogram are `x_c = x + E s_c`, `s_a` of -1 and 1, and a weight and its gradient
+//!
+//! ```text
+//! S_i = H_0 / 2^D,  G_i = sum_a g_a H_a,  g = E^-T / 2^D;   H_0 = sum_c N_i(x_c),  H_a = sum_c s_a N_i(x_c)
+//! ```
+//!
+//! The sums `H` are computed for eight particles at once. Most domains lie within two cells along each axis, and reach 3 nodes; the others
+//! go from corner to corner, one particle at a time.
 
 use std::array;
 
 use nalgebra::SMatrix;
 
 use crate::domain::{
-    HalfEdges, MOST_CORNERS, REACHED, Shares, corner_of_parallelogram, deformed, inverse,
+    HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, deformed, inverse, is_upper,
     slopes_of_parallelogram,
 };
 use crate::geometry::Constants;
@@ -28,61 +34,53 @@ pub(crate) const GROUP: usize = 8;
 /// Nodes that a domain within two cells reaches in all.
 const MOST_REACHED: usize = 27;
 
-/// The corners of the domains of a block of particles; `[corner][k]` or `[corner][axis][k]` is of particle `k`.
+/// The parallelograms of a block of particles; `[corner][axis][k]` is of particle `k`.
 ///
 /// All positions are in cells from the first node of the particle, the one below its lowest corner along each axis.
-pub(crate) struct Corners<T, const D: usize> {
+pub(crate) struct Parallelograms<T, const D: usize> {
     /// Whether there are affine velocities (APIC).
     is_affine: bool,
     /// Index of the first node.
     first_node: [usize; BLOCK],
     /// Whether all corners are within two cells along each axis.
     is_small: [bool; BLOCK],
-    /// Positions.
+    /// Positions of the corners.
     at: [[PerParticle<T>; D]; MOST_CORNERS],
-    /// Share of a mean over the domain.
-    w: [PerParticle<T>; MOST_CORNERS],
-    /// Share of a mean gradient, per cell.
-    g: [[PerParticle<T>; D]; MOST_CORNERS],
-    /// The domain's centre; valid where `is_affine`.
+    /// `g[i][a]`, per cell.
+    g: [[PerParticle<T>; D]; D],
+    /// The centre; valid where `is_affine`.
     centre: [PerParticle<T>; D],
+    /// The inverse of the inertia `sum S arm arm` about the centre; valid where `is_affine`.
+    inverse_inertia: [[PerParticle<T>; D]; D],
 }
 
-impl<T: Lanes, const D: usize> Corners<T, D> {
-    pub(crate) fn new(is_affine: bool) -> Self {
+impl<T: Lanes, const D: usize> Parallelograms<T, D> {
+    fn new(is_affine: bool) -> Self {
         let zero = [Lane8::zero(); BLOCK / GROUP];
         Self {
             is_affine,
             first_node: [0; BLOCK],
             is_small: [true; BLOCK],
             at: [[zero; D]; MOST_CORNERS],
-            w: [zero; MOST_CORNERS],
-            g: [[zero; D]; MOST_CORNERS],
+            g: [[zero; D]; D],
             centre: [zero; D],
+            inverse_inertia: [[zero; D]; D],
         }
     }
 
-    /// Of the parallelograms that F makes of those with these half-edges.
-    pub(crate) fn of_parallelograms(
-        &mut self,
-        c: &Constants<T, D>,
-        half_edges: &HalfEdges<T, D>,
-        ids: &[u32],
-        kinematics: Kinematics<'_, T, D>,
-    ) {
-        dispatch(Parallelograms { corners: self, c, half_edges, ids: &padded(ids), kinematics });
-    }
-
-    /// Takes the corners of a group, in cells from the lower corner of the grid, and their shares of means.
+    /// Takes those of a group.
     #[inline(always)]
     fn take<V: Vectors>(
         &mut self,
         vectors: V,
         c: &Constants<T, D>,
         group: usize,
-        at: &[[Eight<T, V>; D]; MOST_CORNERS],
-        shares: &Shares<Eight<T, V>, D>,
+        OfGroup { xi, E }: &OfGroup<T, V, D>,
     ) {
+        let mut at = [*xi; MOST_CORNERS];
+        for corner in 0..1 << D {
+            at[corner] = corner_of_parallelogram(xi, E, corner);
+        }
         let mut first = [-c.nodes_before; GROUP];
         let mut reach = Lane8::zero();
         for a in 0..D {
@@ -99,13 +97,15 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
             }
             reach = vectors.max8(reach, vectors.sub8(high, node.lanes));
             for corner in 0..1 << D {
-                store(&mut self.at[corner][a], group, at[corner][a] - node);
+                at[corner][a] = at[corner][a] - node;
+                store(&mut self.at[corner][a], group, at[corner][a]);
             }
+            store(&mut self.centre[a], group, xi[a] - node);
         }
-        for corner in 0..1 << D {
-            store(&mut self.w[corner], group, shares.w[corner]);
+        let (_, g) = slopes_of_parallelogram(E);
+        for i in 0..D {
             for a in 0..D {
-                store(&mut self.g[corner][a], group, shares.g[corner][a]);
+                store(&mut self.g[i][a], group, g[i][a]);
             }
         }
         for n in 0..GROUP {
@@ -113,58 +113,64 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
             self.is_small[group * GROUP + n] = reach.0[n] <= real(2.0);
         }
         if self.is_affine {
+            let inverse = inverse(&inertia(E, &at));
             for a in 0..D {
-                let mut centre = load(vectors, &self.at[0][a], group) * shares.w[0];
-                for corner in 1..1 << D {
-                    centre = centre + load(vectors, &self.at[corner][a], group) * shares.w[corner];
+                for b in 0..D {
+                    store(&mut self.inverse_inertia[a][b], group, inverse[a][b]);
                 }
-                store(&mut self.centre[a], group, centre);
             }
         }
     }
+}
 
-    /// The inverse of the inertia `sum S arm arm` about the centres, in cells: of each corner its own, and that of the hat functions
-    /// around it.
-    #[inline(always)]
-    fn inverse_inertia<V: Vectors>(&self, vectors: V, group: usize) -> [[Eight<T, V>; D]; D] {
-        let zero = Eight { lanes: Lane8::zero(), vectors };
-        let mut inertia = [[zero; D]; D];
-        for corner in 0..1 << D {
-            let w = load(vectors, &self.w[corner], group);
-            let mut arms = [zero; D];
-            for a in 0..D {
-                let at = load(vectors, &self.at[corner][a], group);
-                arms[a] = at - load(vectors, &self.centre[a], group);
-                let mut place = at;
-                for n in 0..GROUP {
-                    place.lanes.0[n] -= place.lanes.0[n].floor();
-                }
-                inertia[a][a] = inertia[a][a] + w * place * (zero.constant(1.0) - place);
+/// The inertia `sum S arm arm` about the centres, in cells: of the corners its own, `E E^T`, and that of the hat functions around each.
+#[inline(always)]
+fn inertia<T: Lanes, V: Vectors, const D: usize>(
+    E: &[[Eight<T, V>; D]; D],
+    at: &[[Eight<T, V>; D]; MOST_CORNERS],
+) -> [[Eight<T, V>; D]; D] {
+    let (zero, one) = (E[0][0].constant(0.0), E[0][0].constant(1.0));
+    let share = zero.constant(1.0 / f64::from(1 << D));
+    let mut inertia = [[zero; D]; D];
+    for a in 0..D {
+        for corner in &at[..1 << D] {
+            let mut place = corner[a];
+            for n in 0..GROUP {
+                place.lanes.0[n] -= place.lanes.0[n].floor();
             }
-            for a in 0..D {
-                for b in 0..=a {
-                    inertia[a][b] = inertia[a][b] + w * (arms[a] * arms[b]);
-                }
-            }
+            inertia[a][a] = inertia[a][a] + share * (place * (one - place));
         }
-        for a in 0..D {
-            for b in a + 1..D {
-                inertia[a][b] = inertia[b][a];
-            }
-        }
-        inverse(&inertia)
     }
+    for a in 0..D {
+        for b in 0..D {
+            for edge in 0..D {
+                inertia[a][b] = inertia[a][b] + E[a][edge] * E[b][edge];
+            }
+        }
+    }
+    inertia
 }
 
 /// The weights of a block of particles, and a buffer for those of a group.
-pub(crate) struct CornerWeights<T, const D: usize> {
-    pub(crate) corners: Corners<T, D>,
+pub(crate) struct ParallelogramWeights<T, const D: usize> {
+    own: Parallelograms<T, D>,
     of_group: GroupWeights<T, D>,
 }
 
-impl<T: Lanes, const D: usize> CornerWeights<T, D> {
+impl<T: Lanes, const D: usize> ParallelogramWeights<T, D> {
     pub(crate) fn new(is_affine: bool) -> Self {
-        Self { corners: Corners::new(is_affine), of_group: GroupWeights::zero() }
+        Self { own: Parallelograms::new(is_affine), of_group: GroupWeights::zero() }
+    }
+
+    /// Of the parallelograms that F makes of those with these half-edges.
+    pub(crate) fn compute(
+        &mut self,
+        c: &Constants<T, D>,
+        half_edges: &HalfEdges<T, D>,
+        ids: &[u32],
+        kinematics: Kinematics<'_, T, D>,
+    ) {
+        dispatch(Compute { own: &mut self.own, c, half_edges, ids: &padded(ids), kinematics });
     }
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
@@ -176,11 +182,11 @@ impl<T: Lanes, const D: usize> CornerWeights<T, D> {
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
-        let Self { corners, of_group: weights } = self;
-        let corners = &*corners;
-        if corners.is_affine {
+        let Self { own, of_group: weights } = self;
+        let own = &*own;
+        if own.is_affine {
             dispatch(P2g::<_, D, true> {
-                corners,
+                own,
                 weights,
                 strides,
                 band,
@@ -190,7 +196,7 @@ impl<T: Lanes, const D: usize> CornerWeights<T, D> {
             });
         } else {
             dispatch(P2g::<_, D, false> {
-                corners,
+                own,
                 weights,
                 strides,
                 band,
@@ -208,12 +214,12 @@ impl<T: Lanes, const D: usize> CornerWeights<T, D> {
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
     ) {
-        let Self { corners, of_group: weights } = self;
-        let corners = &*corners;
-        if corners.is_affine {
-            dispatch(G2p::<_, D, true> { corners, weights, strides, nodes, receiver });
+        let Self { own, of_group: weights } = self;
+        let own = &*own;
+        if own.is_affine {
+            dispatch(G2p::<_, D, true> { own, weights, strides, nodes, receiver });
         } else {
-            dispatch(G2p::<_, D, false> { corners, weights, strides, nodes, receiver });
+            dispatch(G2p::<_, D, false> { own, weights, strides, nodes, receiver });
         }
     }
 }
@@ -227,11 +233,6 @@ pub(crate) fn padded(ids: &[u32]) -> [usize; BLOCK] {
 #[inline(always)]
 fn store<T: Lanes, V: Vectors>(array: &mut PerParticle<T>, group: usize, numbers: Eight<T, V>) {
     array[group] = numbers.lanes;
-}
-
-#[inline(always)]
-fn load<T: Lanes, V: Vectors>(vectors: V, array: &PerParticle<T>, group: usize) -> Eight<T, V> {
-    Eight { lanes: array[group], vectors }
 }
 
 /// One number of each particle of a group.
@@ -248,31 +249,23 @@ pub(crate) fn gather<T: Lanes, V: Vectors>(
     Eight { lanes, vectors }
 }
 
-struct Parallelograms<'a, T, const D: usize> {
-    corners: &'a mut Corners<T, D>,
+struct Compute<'a, T, const D: usize> {
+    own: &'a mut Parallelograms<T, D>,
     c: &'a Constants<T, D>,
     half_edges: &'a HalfEdges<T, D>,
     ids: &'a [usize; BLOCK],
     kinematics: Kinematics<'a, T, D>,
 }
 
-impl<T: Lanes, const D: usize> Loop for Parallelograms<'_, T, D> {
+impl<T: Lanes, const D: usize> Loop for Compute<'_, T, D> {
     const WIDE: bool = D > 1;
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, c, half_edges, ids, kinematics } = self;
+        let Self { own, c, half_edges, ids, kinematics } = self;
         for group in 0..BLOCK / GROUP {
-            let OfGroup { xi, E } = parallelograms(vectors, c, half_edges, ids, kinematics, group);
-            let (w, slopes) = slopes_of_parallelogram(&E);
-            let mut at = [xi; MOST_CORNERS];
-            let mut shares = Shares { w: [w; MOST_CORNERS], g: at };
-            for corner in 0..1 << D {
-                at[corner] = corner_of_parallelogram(&xi, &E, corner);
-                let none = [w.constant(0.0); D];
-                shares.g[corner] = corner_of_parallelogram(&none, &slopes, corner);
-            }
-            corners.take(vectors, c, group, &at, &shares);
+            let of_group = parallelograms(vectors, c, half_edges, ids, kinematics, group);
+            own.take(vectors, c, group, &of_group);
         }
     }
 }
@@ -313,8 +306,8 @@ pub(crate) fn parallelograms<T: Lanes, V: Vectors, const D: usize>(
 /// group's particle `n`.
 struct GroupWeights<T, const D: usize> {
     S: [Lane8<T>; MOST_REACHED],
-    /// Gradients per cell along each axis.
-    G: [[Lane8<T>; MOST_REACHED]; D],
+    /// `H_a` for each axis.
+    H: [[Lane8<T>; MOST_REACHED]; D],
     /// How many nodes the group reaches along each axis: two where all its domains lie within one cell.
     reached: [usize; D],
     /// Hat functions of the nodes along each axis at each corner.
@@ -329,7 +322,7 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
         let zero = Lane8::zero();
         Self {
             S: [zero; MOST_REACHED],
-            G: [[zero; MOST_REACHED]; D],
+            H: [[zero; MOST_REACHED]; D],
             reached: [REACHED; D],
             hats: [[[zero; REACHED]; D]; MOST_CORNERS],
             of_row: [zero; MOST_CORNERS],
@@ -337,12 +330,13 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
     }
 
     #[inline(always)]
-    fn compute<V: Vectors>(&mut self, vectors: V, corners: &Corners<T, D>, group: usize) {
+    fn compute<V: Vectors>(&mut self, vectors: V, own: &Parallelograms<T, D>, group: usize) {
         let (none, one) = (vectors.splat8(T::zero()), vectors.splat8(T::one()));
+        let share = vectors.splat8(real(1.0 / f64::from(1 << D)));
         let mut reach = [none; D];
         for corner in 0..1 << D {
             for a in 0..D {
-                let at = load(vectors, &corners.at[corner][a], group).lanes;
+                let at = own.at[corner][a][group];
                 reach[a] = vectors.max8(at, reach[a]);
                 let first = vectors.max8(vectors.sub8(one, at), none);
                 let last = vectors.max8(vectors.sub8(at, one), none);
@@ -368,21 +362,24 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
             }
             for i in 0..REACHED {
                 // In registers until all corners are done.
-                let (mut S, mut G) = (none, [none; D]);
+                let mut sums = [none; MOST_CORNERS];
                 for corner in 0..1 << D {
-                    let hat = vectors.mul8(self.of_row[corner], self.hats[corner][0][i]);
-                    let w = load(vectors, &corners.w[corner], group).lanes;
-                    S = vectors.mul_add8(w, hat, S);
-                    for a in 0..D {
-                        let g = load(vectors, &corners.g[corner][a], group).lanes;
-                        G[a] = vectors.mul_add8(g, hat, G[a]);
-                    }
+                    sums[corner] = vectors.mul8(self.of_row[corner], self.hats[corner][0][i]);
                 }
                 let node = row * REACHED + i;
-                self.S[node] = S;
+                // Sums and differences of pairs along one axis, then of their sums along the next.
                 for a in 0..D {
-                    self.G[a][node] = G[a];
+                    let pairs = 1 << (D - 1 - a);
+                    let mut H = none;
+                    for pair in 0..pairs {
+                        let (lower, upper) = (sums[2 * pair], sums[2 * pair + 1]);
+                        let difference = vectors.sub8(upper, lower);
+                        H = if pair == 0 { difference } else { vectors.add8(H, difference) };
+                        sums[pair] = vectors.add8(lower, upper);
+                    }
+                    self.H[a][node] = H;
                 }
+                self.S[node] = vectors.mul8(sums[0], share);
             }
         }
     }
@@ -424,7 +421,7 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
 }
 
 struct P2g<'a, T, const D: usize, const AFFINE: bool> {
-    corners: &'a Corners<T, D>,
+    own: &'a Parallelograms<T, D>,
     weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
     band: &'a mut [Node<T, D>],
@@ -438,32 +435,31 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, weights, strides, band, first, contributions, count } = self;
+        let Self { own, weights, strides, band, first, contributions, count } = self;
         let count = count.min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
-            weights.compute(vectors, corners, group);
+            weights.compute(vectors, own, group);
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
-                if !corners.is_small[k] {
-                    p2g_from_corners::<T, D, AFFINE>(
-                        corners,
-                        strides,
-                        band,
-                        first,
-                        (contributions, k),
-                    );
+                if !own.is_small[k] {
+                    p2g_from_corners::<T, D, AFFINE>(own, strides, band, first, (contributions, k));
                     continue;
                 }
                 let value = vectors.load8(&contributions.value[k].values);
                 let mut fluxes = [Lane8::zero(); D];
                 let mut affine = [Lane8::zero(); D];
+                // What goes by `G_i` along the axes goes by `H_a` here.
                 for axis in 0..D {
-                    fluxes[axis] = contributions.slope_lanes(k, axis, false);
+                    let flux = contributions.slope_lanes(k, axis, false);
+                    for a in 0..D {
+                        let g = vectors.splat8(own.g[axis][a][group].0[n]);
+                        fluxes[a] = vectors.mul_add8(flux, g, fluxes[a]);
+                    }
                     if AFFINE {
                         affine[axis] = contributions.affine_lanes(k, axis);
                     }
                 }
-                let start = corners.first_node[k] - first;
+                let start = own.first_node[k] - first;
                 for row in 0..weights.rows() {
                     let place = weights.place(row);
                     let start = start + GroupWeights::<T, D>::start(strides, &place);
@@ -475,7 +471,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                     let mut of_row = value;
                     if AFFINE {
                         for a in 1..D {
-                            let arm = vectors.splat8(corners.arm(k, a, place[a]));
+                            let arm = vectors.splat8(own.arm(k, a, place[a]));
                             of_row = vectors.mul_add8(affine[a], arm, of_row);
                         }
                     }
@@ -483,14 +479,14 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                         let node = row * REACHED + i;
                         let mut sum = vectors.load8(values);
                         for a in 0..D {
-                            let G = vectors.splat8(weights.G[a][node].0[n]);
-                            sum = vectors.mul_add8(fluxes[a], G, sum);
+                            let H = vectors.splat8(weights.H[a][node].0[n]);
+                            sum = vectors.mul_add8(fluxes[a], H, sum);
                         }
                         let mut of_node = of_row;
                         if AFFINE {
                             of_node = vectors.mul_add8(
                                 affine[0],
-                                vectors.splat8(corners.arm(k, 0, i)),
+                                vectors.splat8(own.arm(k, 0, i)),
                                 of_row,
                             );
                         }
@@ -504,7 +500,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 }
 
 struct G2p<'a, T, const D: usize, const AFFINE: bool> {
-    corners: &'a Corners<T, D>,
+    own: &'a Parallelograms<T, D>,
     weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
     nodes: &'a [Node<T, D>],
@@ -516,39 +512,21 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, weights, strides, nodes, receiver } = self;
+        let Self { own, weights, strides, nodes, receiver } = self;
         let count = receiver.len().min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
-            weights.compute(vectors, corners, group);
-            let mut inverse_inertia = [[Lane8::zero(); D]; D];
-            if AFFINE {
-                let inverse = corners.inverse_inertia(vectors, group);
-                for a in 0..D {
-                    for b in 0..D {
-                        inverse_inertia[a][b] = inverse[a][b].lanes;
-                    }
-                }
-            }
+            weights.compute(vectors, own, group);
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
-                let mut inverse = SMatrix::zeros();
-                if AFFINE {
-                    for a in 0..D {
-                        for b in 0..D {
-                            inverse[(a, b)] = inverse_inertia[a][b].0[n];
-                        }
-                    }
-                }
-                if !corners.is_small[k] {
-                    let sums = g2p_from_corners::<T, D, AFFINE>(corners, strides, nodes, k);
-                    receiver[k] = sums.interpolated(AFFINE, &inverse);
+                if !own.is_small[k] {
+                    let sums = g2p_from_corners::<T, D, AFFINE>(own, strides, nodes, k);
+                    receiver[k] = sums.interpolated::<AFFINE>(own, k);
                     continue;
                 }
-                let Sums { mut value, mut gradients, mut moments } = Sums::zero();
+                let Sums { mut value, mut slopes, mut moments } = Sums::zero();
                 for row in 0..weights.rows() {
                     let place = weights.place(row);
-                    let start =
-                        corners.first_node[k] + GroupWeights::<T, D>::start(strides, &place);
+                    let start = own.first_node[k] + GroupWeights::<T, D>::start(strides, &place);
                     let nodes = nodes.get(start..).and_then(|n| n.first_chunk::<REACHED>());
                     let Some(nodes) = nodes else {
                         debug_assert!(false, "a domain beyond the grid");
@@ -561,23 +539,23 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
                         let weighted = vectors.mul8(nodal, vectors.splat8(weights.S[node].0[n]));
                         of_row = if i == 0 { weighted } else { vectors.add8(of_row, weighted) };
                         for a in 0..D {
-                            let G = vectors.splat8(weights.G[a][node].0[n]);
-                            gradients[a] = vectors.mul_add8(nodal, G, gradients[a]);
+                            let H = vectors.splat8(weights.H[a][node].0[n]);
+                            slopes[a] = vectors.mul_add8(nodal, H, slopes[a]);
                         }
                         if AFFINE {
-                            let arm = vectors.splat8(corners.arm(k, 0, i));
+                            let arm = vectors.splat8(own.arm(k, 0, i));
                             moments[0] = vectors.mul_add8(weighted, arm, moments[0]);
                         }
                     }
                     value = if row == 0 { of_row } else { vectors.add8(value, of_row) };
                     if AFFINE {
                         for a in 1..D {
-                            let arm = vectors.splat8(corners.arm(k, a, place[a]));
+                            let arm = vectors.splat8(own.arm(k, a, place[a]));
                             moments[a] = vectors.mul_add8(of_row, arm, moments[a]);
                         }
                     }
                 }
-                receiver[k] = Sums { value, gradients, moments }.interpolated(AFFINE, &inverse);
+                receiver[k] = Sums { value, slopes, moments }.interpolated::<AFFINE>(own, k);
             }
         }
     }
@@ -595,7 +573,7 @@ struct Place<T, const D: usize> {
     arm: [T; D],
 }
 
-impl<T: Lanes, const D: usize> Corners<T, D> {
+impl<T: Lanes, const D: usize> Parallelograms<T, D> {
     /// Calls `visit` for each node around each corner of a particle.
     fn for_nodes(&self, strides: &[usize; D], k: usize, mut visit: impl FnMut(Place<T, D>)) {
         for corner in 0..1 << D {
@@ -616,6 +594,14 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
         }
     }
 
+    /// The share of a mean gradient along an axis that a corner has, per cell.
+    fn gradient_share(&self, corner: usize, axis: usize, k: usize) -> T {
+        (0..D).fold(T::zero(), |sum, a| {
+            let g = self.g[axis][a][k / GROUP].0[k % GROUP];
+            if is_upper(corner, a) { sum + g } else { sum - g }
+        })
+    }
+
     /// From the centre of a particle's domain to a node along an axis, in cells.
     #[inline(always)]
     fn arm(&self, k: usize, axis: usize, place: usize) -> T {
@@ -626,7 +612,8 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
 /// The sums of G2P over nodes, with all numbers of a node.
 struct Sums<T, const D: usize> {
     value: Lane8<T>,
-    gradients: [Lane8<T>; D],
+    /// By `H_a`.
+    slopes: [Lane8<T>; D],
     /// Of the values times the arms along each axis.
     moments: [Lane8<T>; D],
 }
@@ -635,55 +622,65 @@ impl<T: Lanes, const D: usize> Sums<T, D> {
     #[inline(always)]
     fn zero() -> Self {
         let zero = Lane8::zero();
-        Self { value: zero, gradients: [zero; D], moments: [zero; D] }
+        Self { value: zero, slopes: [zero; D], moments: [zero; D] }
     }
 
-    /// The result, with the inverse of the inertia where there are affine velocities.
+    /// The result for particle `k`.
     #[inline(always)]
-    fn interpolated(
+    fn interpolated<const AFFINE: bool>(
         &self,
-        is_affine: bool,
-        inverse_inertia: &SMatrix<T, D, D>,
+        own: &Parallelograms<T, D>,
+        k: usize,
     ) -> Interpolated<T, D> {
-        let mut own = Interpolated::zero();
-        let mut moments = SMatrix::zeros();
+        let (group, n) = (k / GROUP, k % GROUP);
+        let mut result = Interpolated::zero();
         for i in 0..D {
-            (own.velocity[i], own.second[i]) = (self.value.0[i], self.value.0[D + i]);
+            (result.velocity[i], result.second[i]) = (self.value.0[i], self.value.0[D + i]);
             for j in 0..D {
-                own.velocity_gradient[(i, j)] = self.gradients[j].0[i];
-                moments[(i, j)] = self.moments[j].0[D + i];
+                let mut slope = self.slopes[0].0[i] * own.g[j][0][group].0[n];
+                for a in 1..D {
+                    slope += self.slopes[a].0[i] * own.g[j][a][group].0[n];
+                }
+                result.velocity_gradient[(i, j)] = slope;
             }
         }
-        if is_affine {
-            own.affine = product(&moments, inverse_inertia);
+        if AFFINE {
+            let (mut moments, mut inverse) = (SMatrix::zeros(), SMatrix::zeros());
+            for i in 0..D {
+                for j in 0..D {
+                    moments[(i, j)] = self.moments[j].0[D + i];
+                    inverse[(i, j)] = own.inverse_inertia[i][j][group].0[n];
+                }
+            }
+            result.affine = product(&moments, &inverse);
         }
-        own
+        result
     }
 }
 
 /// P2G of particle `k`, whose domain need not be small.
 #[inline(never)]
 fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
-    corners: &Corners<T, D>,
+    own: &Parallelograms<T, D>,
     strides: &[usize; D],
     band: &mut [Node<T, D>],
     first: usize,
     (contributions, k): (&Contributions<T, D, BLOCK>, usize),
 ) {
-    let start = corners.first_node[k] - first;
+    let start = own.first_node[k] - first;
     let value = contributions.value[k].values;
     let fluxes: [_; D] = array::from_fn(|a| contributions.slope_lanes(k, a, false).0);
     let affine: [_; D] = array::from_fn(|a| contributions.affine_lanes(k, a).0);
-    corners.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
+    own.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
         let Some(Node { values }) = band.get_mut(start + node) else {
             debug_assert!(false, "a corner beyond its band");
             return;
         };
-        let w = corners.w[corner][k / GROUP].0[k % GROUP] * hat;
+        let w = hat * real(1.0 / f64::from(1 << D));
         for (q, sum) in values.iter_mut().enumerate() {
             let mut given = value[q];
             for a in 0..D {
-                *sum += fluxes[a][q] * (corners.g[corner][a][k / GROUP].0[k % GROUP] * hat);
+                *sum += fluxes[a][q] * (own.gradient_share(corner, a, k) * hat);
                 if AFFINE {
                     given += affine[a][q] * arm[a];
                 }
@@ -696,28 +693,29 @@ fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
 /// G2P of particle `k`, whose domain need not be small.
 #[inline(never)]
 fn g2p_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
-    corners: &Corners<T, D>,
+    own: &Parallelograms<T, D>,
     strides: &[usize; D],
     nodes: &[Node<T, D>],
     k: usize,
 ) -> Sums<T, D> {
-    let start = corners.first_node[k];
-    let Sums { mut value, mut gradients, mut moments } = Sums::zero();
-    corners.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
+    let start = own.first_node[k];
+    let Sums { mut value, mut slopes, mut moments } = Sums::zero();
+    own.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
         let Some(Node { values }) = nodes.get(start + node) else {
             debug_assert!(false, "a corner beyond the grid");
             return;
         };
-        let w = corners.w[corner][k / GROUP].0[k % GROUP] * hat;
+        let w = hat * real(1.0 / f64::from(1 << D));
         for (q, nodal) in values.iter().enumerate() {
             value.0[q] += *nodal * w;
             for a in 0..D {
-                gradients[a].0[q] += *nodal * (corners.g[corner][a][k / GROUP].0[k % GROUP] * hat);
+                let signed = if is_upper(corner, a) { hat } else { -hat };
+                slopes[a].0[q] += *nodal * signed;
                 if AFFINE {
                     moments[a].0[q] += *nodal * w * arm[a];
                 }
             }
         }
     });
-    Sums { value, gradients, moments }
+    Sums { value, slopes, moments }
 }
