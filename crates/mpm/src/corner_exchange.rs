@@ -18,14 +18,14 @@ use crate::kernel::block::Seen;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
-use crate::kernel::shared::AffineSum;
+use crate::kernel::shared::AlongAxes;
 use crate::mesh::{Interpolation, Mesh};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::shape_function::{OnAxis, ProductShape};
 use crate::shared_corners::{CHUNK, Chunk, SharedCorners};
-use crate::simd::Lanes;
+use crate::simd::{Lane4, Lanes};
 use crate::support::Support;
 
 /// What says the stress on the boundary, and the time.
@@ -40,7 +40,7 @@ pub(crate) struct Exchange<T, const D: usize> {
     /// Whether they count in the sums at hand.
     is_affine: bool,
     /// APIC: the same of affine momenta; else empty.
-    affine_sums: Vec<AffineSum<T, D>>,
+    affine_sums: Vec<AlongAxes<T, D>>,
     /// The values of the grid at each corner here.
     pub(crate) values: CornerValues<T, D>,
     /// Whether velocities are projected again.
@@ -59,13 +59,13 @@ pub(crate) struct Exchange<T, const D: usize> {
 pub(crate) struct ChunkSums<'a, T, const D: usize> {
     pub(crate) sums: &'a mut [Node<T, D>],
     /// Of affine momenta, where they count.
-    pub(crate) affine_sums: &'a mut [AffineSum<T, D>],
+    pub(crate) affine_sums: &'a mut [AlongAxes<T, D>],
 }
 
 impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
     pub(crate) fn clear(&mut self) {
         self.sums.fill(Node::zero());
-        self.affine_sums.fill([Node::zero(); D]);
+        self.affine_sums.fill([Lane4::zero(); D]);
     }
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct CornerValues<T, const D: usize> {
     /// Interpolated values of nodes.
     pub(crate) nodes: Vec<Node<T, D>>,
     /// APIC of cells: the moments `sum v N_i arm` about each corner, in cells; else empty.
-    pub(crate) moments: Vec<SMatrix<T, D, D>>,
+    pub(crate) moments: Vec<AlongAxes<T, D>>,
 }
 
 impl<T: Lanes, const D: usize> CornerValues<T, D> {
@@ -84,7 +84,7 @@ impl<T: Lanes, const D: usize> CornerValues<T, D> {
 
     fn fit(&mut self, count: usize, has_moments: bool) {
         self.nodes.resize(count, Node::zero());
-        self.moments.resize(if has_moments { count } else { 0 }, SMatrix::zeros());
+        self.moments.resize(if has_moments { count } else { 0 }, [Lane4::zero(); D]);
     }
 }
 
@@ -118,7 +118,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         let (zero, none) = (Node::zero(), SMatrix::zeros());
         self.sums.resize(corners.sums(), zero);
         if self.has_affine {
-            self.affine_sums.resize(corners.sums(), [zero; D]);
+            self.affine_sums.resize(corners.sums(), [Lane4::zero(); D]);
         }
         self.values.fit(corners.count(), has_moments);
         if self.reprojects {
@@ -304,7 +304,7 @@ struct Corners<'a, T, const D: usize> {
     first: usize,
     values: &'a mut [Node<T, D>],
     /// Empty where they are not needed.
-    moments: &'a mut [SMatrix<T, D, D>],
+    moments: &'a mut [AlongAxes<T, D>],
     /// Empty where they do not move.
     next: &'a mut [SVector<T, D>],
 }

@@ -53,7 +53,8 @@ impl CornerHalo {
             let mut numbers = Vec::with_capacity(per_corner * corners.len());
             for &corner in corners {
                 numbers.extend(&nodes[corner as usize].values[..2 * D]);
-                numbers.extend(moments.get(corner as usize).into_iter().flatten());
+                let moments = moments.get(corner as usize).into_iter().flatten();
+                moments.for_each(|along| numbers.extend(&along.0[..D]));
             }
             numbers
         };
@@ -64,7 +65,9 @@ impl CornerHalo {
             let vector = |first: usize| SVector::from_fn(|a, _| numbers[first + a]);
             nodes[corner as usize] = Node::new(&vector(0), &vector(D), T::zero());
             if let Some(moments) = moments.get_mut(corner as usize) {
-                moments.copy_from_slice(&numbers[2 * D..]);
+                for (along, numbers) in moments.iter_mut().zip(numbers[2 * D..].chunks(D)) {
+                    along.0[..D].copy_from_slice(numbers);
+                }
             }
         }
     }

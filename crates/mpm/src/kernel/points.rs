@@ -1,9 +1,9 @@
 //! P2G and G2P of corners as points, by hat functions: values alone pass, and affine momenta.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 use crate::geometry::Constants;
-use crate::kernel::shared::AffineSum;
+use crate::kernel::shared::AlongAxes;
 use crate::node::Node;
 use crate::shape_function::{index, node_below};
 use crate::shared_corners::SharedCorners;
@@ -57,7 +57,7 @@ pub(crate) struct ToGrid<'a, T, const D: usize> {
     pub(crate) corners: &'a SharedCorners<T, D>,
     pub(crate) sums: &'a [Node<T, D>],
     /// Empty where there are no affine momenta.
-    pub(crate) affine_sums: &'a [AffineSum<T, D>],
+    pub(crate) affine_sums: &'a [AlongAxes<T, D>],
     pub(crate) band: &'a mut [Node<T, D>],
     pub(crate) first: usize,
     pub(crate) ids: &'a [u32],
@@ -154,14 +154,14 @@ fn put<T: Lanes, V: Vectors, const D: usize>(
 #[inline(always)]
 pub(crate) fn affine_at<T: Lanes, const D: usize>(
     corners: &SharedCorners<T, D>,
-    affine_sums: &[AffineSum<T, D>],
+    affine_sums: &[AlongAxes<T, D>],
     corner: usize,
 ) -> [Lane8<T>; D] {
     let mut own = [Lane8::zero(); D];
     for &sum in corners.sums_of(corner) {
         for a in 0..D {
             for i in 0..D {
-                own[a].0[i] += affine_sums[sum as usize][a].values[i];
+                own[a].0[i] += affine_sums[sum as usize][a].0[i];
             }
         }
     }
@@ -188,7 +188,7 @@ pub(crate) struct FromGrid<'a, T, const D: usize> {
     /// The values of each, but for its mass.
     pub(crate) values: &'a mut [Node<T, D>],
     /// The moments `sum v N_i arm` about each, in cells; empty where they are not needed.
-    pub(crate) moments: &'a mut [SMatrix<T, D, D>],
+    pub(crate) moments: &'a mut [AlongAxes<T, D>],
 }
 
 impl<T: Lanes, const D: usize> FromGrid<'_, T, D> {
@@ -236,7 +236,7 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
                 for a in 0..D {
                     let variance = around.r[a] * (T::one() - around.r[a]);
                     for i in 0..D {
-                        moments[(i, a)] = slopes[a].0[i] * variance;
+                        moments[a].0[i] = slopes[a].0[i] * variance;
                     }
                 }
             }

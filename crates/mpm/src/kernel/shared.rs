@@ -14,11 +14,12 @@ use crate::kernel::parallelograms::GROUP;
 use crate::mesh::{Interpolation, Share};
 use crate::node::Node;
 use crate::shared_corners::SharedCorners;
-use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
-use crate::tensor::{determinant, product};
+use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
+use crate::tensor::determinant;
 
-/// The momenta at a corner that go by the arm to a node, one for each axis, in the order of a node's values.
-pub(crate) type AffineSum<T, const D: usize> = [Node<T, D>; D];
+/// Vectors at a corner, one for each axis: of momenta that go by the arm to a node, or of moments of velocities. The last number of four is
+/// zero.
+pub(crate) type AlongAxes<T, const D: usize> = [Lane4<T>; D];
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
 type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];
@@ -145,7 +146,7 @@ pub(crate) struct ToCorners<'a, T, const D: usize> {
     pub(crate) contributions: &'a Contributions<T, D, BLOCK>,
     pub(crate) sums: &'a mut [Node<T, D>],
     /// With affine momenta; else empty.
-    pub(crate) affine_sums: &'a mut [AffineSum<T, D>],
+    pub(crate) affine_sums: &'a mut [AlongAxes<T, D>],
 }
 
 impl<T: Lanes, const D: usize> ToCorners<'_, T, D> {
@@ -202,7 +203,7 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
         vectors: V,
         (w, g, arm): (T, [T; D], [T; D]),
         sum: Lane8<T>,
-        affine_sum: Option<&mut AffineSum<T, D>>,
+        affine_sum: Option<&mut AlongAxes<T, D>>,
     ) -> Lane8<T> {
         let w = vectors.splat8(w);
         let mut value = self.value;
@@ -216,9 +217,13 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
             own = vectors.mul_add8(self.fluxes[a], vectors.splat8(g[a]), own);
         }
         if let (true, Some(affine_sum)) = (AFFINE, affine_sum) {
+            let w = vectors.splat(w.0[0]);
             for a in 0..D {
-                let known = vectors.load8(&affine_sum[a].values);
-                affine_sum[a].values = vectors.mul_add8(self.affine[a], w, known).0;
+                let mut affine = Lane4::zero();
+                for i in 0..D {
+                    affine.0[i] = self.affine[a].0[i];
+                }
+                affine_sum[a] = vectors.mul_add(affine, w, affine_sum[a]);
             }
         }
         vectors.add8(sum, own)
@@ -441,7 +446,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
                 }
                 over.store(spacing, own);
                 if let Some(of_affine) = &of_affine {
-                    own.affine = of_affine.velocity(n, &shares, own_corners, values);
+                    own.affine = of_affine.velocity(vectors, n, &shares, own_corners, values);
                 }
             }
         }
@@ -494,29 +499,37 @@ impl<T: Lanes, V: Vectors, const D: usize> OfAffine<T, V, D> {
     #[inline(always)]
     fn velocity(
         &self,
+        vectors: V,
         n: usize,
         shares: &Shares<Eight<T, V>, D>,
         corners: &[u32],
         values: &CornerValues<T, D>,
     ) -> SMatrix<T, D, D> {
-        let mut moments = SMatrix::<T, D, D>::zeros();
-        let mut inverse = SMatrix::zeros();
+        let mut moments = [Lane4::zero(); D];
         for corner in 0..1 << D {
-            let w = shares.w[corner].lanes.0[n];
+            let w = vectors.splat(shares.w[corner].lanes.0[n]);
             let place = corners[corner] as usize;
-            let (v, of_hats) = (&values.nodes[place].values, &values.moments[place]);
+            let mut v = Lane4::zero();
+            for i in 0..D {
+                v.0[i] = values.nodes[place].values[i];
+            }
             for a in 0..D {
-                let arm = self.arms[corner][a].lanes.0[n];
-                for i in 0..D {
-                    moments[(i, a)] += w * (v[i] * arm + of_hats[(i, a)]);
-                }
+                let arm = vectors.splat(self.arms[corner][a].lanes.0[n]);
+                let about = vectors.mul_add(v, arm, values.moments[place][a]);
+                moments[a] = vectors.mul_add(about, w, moments[a]);
             }
         }
+        let mut affine = SMatrix::zeros();
         for a in 0..D {
+            let mut column = Lane4::zero();
             for b in 0..D {
-                inverse[(a, b)] = self.inverse_inertia[a][b].lanes.0[n];
+                let inverse = vectors.splat(self.inverse_inertia[b][a].lanes.0[n]);
+                column = vectors.mul_add(moments[b], inverse, column);
+            }
+            for i in 0..D {
+                affine[(i, a)] = column.0[i];
             }
         }
-        product(&moments, &inverse)
+        affine
     }
 }
