@@ -11,14 +11,13 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
+use crate::corner_values::{AlongAxes, CornerValues, Seen};
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeUpdate};
 use crate::health::{Invalid, Outcome, SharedOutcome};
-use crate::kernel::block::Seen;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
-use crate::kernel::shared::AlongAxes;
 use crate::mesh::{Interpolation, Mesh};
 use crate::node::Node;
 use crate::parallel::bins::Bins;
@@ -66,25 +65,6 @@ impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
     pub(crate) fn clear(&mut self) {
         self.sums.fill(Node::zero());
         self.affine_sums.fill([Lane4::zero(); D]);
-    }
-}
-
-/// Values of the grid at all corners.
-pub(crate) struct CornerValues<T, const D: usize> {
-    /// Interpolated values of nodes.
-    pub(crate) nodes: Vec<Node<T, D>>,
-    /// APIC of cells: the moments `sum v N_i arm` about each corner, in cells; else empty.
-    pub(crate) moments: Vec<AlongAxes<T, D>>,
-}
-
-impl<T: Lanes, const D: usize> CornerValues<T, D> {
-    pub(crate) fn none() -> Self {
-        Self { nodes: Vec::new(), moments: Vec::new() }
-    }
-
-    fn fit(&mut self, count: usize, has_moments: bool) {
-        self.nodes.resize(count, Node::zero());
-        self.moments.resize(if has_moments { count } else { 0 }, [Lane4::zero(); D]);
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use mmsmith_ranks::{Ranks, announce, exchange};
 use nalgebra::SVector;
 
-use crate::corner_exchange::CornerValues;
+use crate::corner_values::CornerValues;
 use crate::node::Node;
 use crate::simd::Lanes;
 

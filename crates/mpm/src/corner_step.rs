@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
-use crate::corner_exchange::{ChunkSums, CornerValues};
+use crate::corner_exchange::ChunkSums;
+use crate::corner_values::CornerValues;
 use crate::forcing::Forcing;
 use crate::g2p::{check_all, stretch, take_velocity};
 use crate::geometry::Constants;

@@ -40,6 +40,9 @@ impl<T: RealField + Copy, const D: usize> HalfEdges<T, D> {
     }
 }
 
+/// The corners of a cell in pairs, the one that a row of cells reaches first and the one that the next cell of the row has as well.
+pub(crate) const PAIRS: [[usize; 2]; MOST_CORNERS / 2] = [[0, 1], [3, 2], [4, 5], [7, 6]];
+
 /// The shares `w` of a mean and `g` of a mean gradient that the corners have.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shares<N, const D: usize> {

@@ -11,11 +11,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::{SMatrix, SVector};
 
 use crate::corner_exchange::Exchange;
+use crate::corner_values::Seen;
 use crate::fault::Fault;
 use crate::geometry::Constants;
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::Interpolated;
-use crate::kernel::block::{Block, Seen};
+use crate::kernel::block::Block;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::cells_are_valid_next;

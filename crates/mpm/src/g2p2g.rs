@@ -9,13 +9,14 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
+use crate::corner_values::Seen;
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
 use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::{Block, BlockLaw, Seen};
+use crate::kernel::block::{Block, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, Kinematics};
 use crate::node::Node;

@@ -57,7 +57,7 @@
 //!
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
 //! - `clip`: bodies of any shape; `mesh`: domains of particles on shared corners, cells of CPDI2, polygons and
-//!   polyhedra; `shared_corners`, `corner_exchange`, `corner_step`: P2G and G2P by way of corners.
+//!   polyhedra; `shared_corners`, `corner_values`, `corner_exchange`, `corner_step`: P2G and G2P by way of corners.
 //! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
 //!   them in vector instructions. `body`: particles with their domains.
 //! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
@@ -71,6 +71,7 @@ mod clip;
 mod corner_exchange;
 mod corner_halo;
 mod corner_step;
+mod corner_values;
 mod decomposition;
 mod directory;
 mod domain;

@@ -10,7 +10,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
-use crate::corner_exchange::{ChunkSums, CornerValues, Exchange, Loading};
+use crate::corner_exchange::{ChunkSums, Exchange, Loading};
+use crate::corner_values::CornerValues;
 use crate::fault::Fault;
 use crate::forcing::Forcing;
 use crate::geometry::Constants;

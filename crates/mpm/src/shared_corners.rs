@@ -6,10 +6,9 @@ use std::ops::Range;
 use nalgebra::SVector;
 
 use crate::corner_halo::CornerHalo;
-use crate::domain::volume_of_cell;
+use crate::domain::{PAIRS, volume_of_cell};
 use crate::fault::Fault;
 use crate::geometry::Constants;
-use crate::kernel::shared::goes_on;
 use crate::mesh::{Interpolation, Mesh, Share};
 use crate::node::Node;
 use crate::parallel::chunks::each;
@@ -336,6 +335,17 @@ fn of_pairs<T: Lanes, const D: usize>(
         Interpolation::Triangles => Vec::new(),
         Interpolation::Cell => std::iter::once(false).chain(of_pairs).collect(),
     }
+}
+
+/// Whether a cell begins with the corners with which the one before it ends, and no corner is among them twice.
+fn goes_on(before: &[u32], own: &[u32]) -> bool {
+    let pairs = &PAIRS[..own.len() / 2];
+    let mut all: Vec<u32> = before.to_vec();
+    all.extend(pairs.iter().map(|[_, last]| own[*last]));
+    let count = all.len();
+    all.sort_unstable();
+    all.dedup();
+    all.len() == count && pairs.iter().all(|[first, last]| own[*first] == before[*last])
 }
 
 /// Whether each corner of a cell is the one after that of the cell before.

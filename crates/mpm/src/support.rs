@@ -5,10 +5,9 @@ use std::array;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::body::Body;
-use crate::corner_exchange::CornerValues;
+use crate::corner_values::{CornerValues, Seen};
 use crate::domain::{HalfEdges, REACHED};
 use crate::geometry::Constants;
-use crate::kernel::block::Seen;
 use crate::mesh::Interpolation;
 use crate::node::Node;
 use crate::scheme::Shape;

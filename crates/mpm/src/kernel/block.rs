@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::corner_exchange::CornerValues;
+use crate::corner_values::Seen;
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
@@ -53,15 +53,6 @@ pub(crate) enum Block<T, const D: usize> {
         /// The first of the particles.
         first: usize,
     },
-}
-
-/// What particles take in G2P.
-#[derive(Clone, Copy)]
-pub(crate) enum Seen<'a, T, const D: usize> {
-    /// Values at nodes.
-    Nodes(&'a [Node<T, D>]),
-    /// Those of the grid at shared corners.
-    Corners(&'a CornerValues<T, D>),
 }
 
 impl<T: Lanes, const D: usize> Block<T, D> {

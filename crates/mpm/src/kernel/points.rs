@@ -2,8 +2,8 @@
 
 use nalgebra::SVector;
 
+use crate::corner_values::AlongAxes;
 use crate::geometry::Constants;
-use crate::kernel::shared::AlongAxes;
 use crate::node::Node;
 use crate::shape_function::{index, node_below};
 use crate::shared_corners::SharedCorners;

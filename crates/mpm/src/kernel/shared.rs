@@ -5,8 +5,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::corner_exchange::CornerValues;
-use crate::domain::{MOST_CORNERS, Shares, inverse, shares_of_cell, volume_of_cell};
+use crate::corner_values::{AlongAxes, CornerValues};
+use crate::domain::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
@@ -16,10 +16,6 @@ use crate::node::Node;
 use crate::shared_corners::SharedCorners;
 use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 use crate::tensor::determinant;
-
-/// Vectors at a corner, one for each axis: of momenta that go by the arm to a node, or of moments of velocities. The last number of four is
-/// zero.
-pub(crate) type AlongAxes<T, const D: usize> = [Lane4<T>; D];
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
 type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];
@@ -228,20 +224,6 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
         }
         vectors.add8(sum, own)
     }
-}
-
-/// The corners of a cell in pairs, the one that a row of cells reaches first and the one that the next cell of the row has as well.
-const PAIRS: [[usize; 2]; MOST_CORNERS / 2] = [[0, 1], [3, 2], [4, 5], [7, 6]];
-
-/// Whether a cell begins with the corners with which the one before it ends, and no corner is among them twice.
-pub(crate) fn goes_on(before: &[u32], own: &[u32]) -> bool {
-    let pairs = &PAIRS[..own.len() / 2];
-    let mut all: Vec<u32> = before.to_vec();
-    all.extend(pairs.iter().map(|[_, last]| own[*last]));
-    let count = all.len();
-    all.sort_unstable();
-    all.dedup();
-    all.len() == count && pairs.iter().all(|[first, last]| own[*first] == before[*last])
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D, AFFINE> {
