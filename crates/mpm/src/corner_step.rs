@@ -45,7 +45,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         self.move_corners();
         let outcome = self.g2p_and_to_corners(body_force, times.end);
         let outcome = self.agree(outcome);
-        // The sums at corners are of the particles that are here, wherever corners are sorted to; after a failure they are of no use.
+        // A sort may bring other particles here, and after a failure the sums are of no use.
         self.is_ahead = outcome.is_clean();
         self.resort_if(outcome)
     }

@@ -21,7 +21,7 @@ use crate::history::{Moment, Sums};
 use crate::whole_file::WholeFile;
 
 /// How every checkpoint begins.
-const MAGIC: &[u8; 24] = b"mmsmith checkpoint 4\n\0\0\0";
+const MAGIC: &[u8; 24] = b"mmsmith checkpoint 5\n\0\0\0";
 const FILE: &str = "checkpoint";
 const LOCK: &str = "lock";
 
