@@ -180,7 +180,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             let mut is_valid =
                 of_cells || measured.at(mesh, next, (of_chunk, first..first + count));
             is_valid &= F.iter().all(|F| determinant(F) > T::zero())
-                && x.iter().all(|x| c.axis_outside(x).is_none());
+                && (!of_cells || x.iter().all(|x| c.axis_outside(x).is_none()));
             let ids = successive(first);
             let ids = &ids[..count];
             let kinematics = copies.of_successive(x, F);

@@ -8,6 +8,7 @@ use crate::domain::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelog
 use crate::geometry::Constants;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::parallelograms::{GROUP, OfGroup, gather, padded, parallelograms};
+use crate::mesh::Interpolation;
 use crate::shape_function::{
     EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
 };
@@ -40,7 +41,9 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return Some(Invalid::NotFinite);
         }
-        if c.axis_outside(x).is_some() {
+        // Polygons may have axes of their own; their corners are looked at themselves.
+        let is_polygon = matches!(self, Self::Mesh(corners) if corners.mesh.interpolation == Interpolation::Triangles);
+        if !is_polygon && c.axis_outside(x).is_some() {
             return Some(Invalid::LeftGrid);
         }
         if let Some(volume) = self.volume(p) {

@@ -1,7 +1,7 @@
 //! P2G and G2P between particles and the corners that their domains share.
 //!
 //! Shares of cells are computed for eight particles at once, here and again where they are needed next: that takes less time than to
-//! read them from memory. Those of mesh, of which there are few, are stored.
+//! read them from memory. Those of polygons, of which there are few, are stored.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -265,9 +265,8 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
             return;
         }
         let (mut x, mut shares) = (no_corners(vectors), none(vectors));
-        // The sums of corners that the next cell may have as well stay in registers: it would wait for them to pass through memory.
+        // The sums of corners that the next cell has as well stay in registers: it would wait for them to pass through memory.
         let mut kept = [Lane8::zero(); MOST_CORNERS / 2];
-        let mut kept_at = [usize::MAX; MOST_CORNERS / 2];
         for group in (0..count).step_by(GROUP) {
             let of_group = GROUP.min(count - group);
             take_corners(corners, at, (first + group, of_group), &mut x);
@@ -280,14 +279,9 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
             for n in 0..of_group {
                 let given = Giving::new::<V, AFFINE>(vectors, contributions, group + n, spacing);
                 let own_sums = &sum_at[n << D..][..1 << D];
-                let goes_on = group + n > 0 && corners.goes_on[first + group + n];
-                if !goes_on {
-                    for pair in 0..1 << (D - 1) {
-                        if let Some(sum) = sums.get_mut(kept_at[pair]) {
-                            sum.values = kept[pair].0;
-                        }
-                    }
-                }
+                let k = group + n;
+                let goes_on = k > 0 && corners.goes_on[first + k];
+                let next_goes_on = k + 1 < count && corners.goes_on[first + k + 1];
                 for pair in 0..1 << (D - 1) {
                     for (place, corner) in PAIRS[pair].into_iter().enumerate() {
                         let sum = own_sums[corner] as usize;
@@ -305,18 +299,13 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
                         };
                         let affine_sum = affine_sums.get_mut(sum);
                         let new = given.add::<V, AFFINE>(vectors, share, known, affine_sum);
-                        if place == 0 {
-                            sums[sum].values = new.0;
+                        if place == 1 && next_goes_on {
+                            kept[pair] = new;
                         } else {
-                            (kept[pair], kept_at[pair]) = (new, sum);
+                            sums[sum].values = new.0;
                         }
                     }
                 }
-            }
-        }
-        for pair in 0..1 << (D - 1) {
-            if let Some(sum) = sums.get_mut(kept_at[pair]) {
-                sum.values = kept[pair].0;
             }
         }
     }

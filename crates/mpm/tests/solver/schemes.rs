@@ -608,6 +608,36 @@ fn corners_on_planes_of_symmetry_stay_there() {
 }
 
 #[test]
+fn cells_whose_corners_fall_together_move_as_in_the_plain_implementation() {
+    for settings in schemes().filter(|settings| settings.shape == Shape::Cpdi2) {
+        let grid = open_grid::<2>(8);
+        let mut body = block(&grid);
+        let mesh = body.mesh.as_mut().unwrap();
+        let mut cells_at = vec![0; mesh.X.len()];
+        mesh.corners.iter().for_each(|&corner| cells_at[corner as usize] += 1);
+        let is_inner = |corner: &u32| cells_at[*corner as usize] == 4;
+        let mut triangles = 0;
+        for (k, cell) in mesh.corners.chunks_mut(4).enumerate() {
+            if k % 3 > 0 && cell.iter().all(is_inner) {
+                cell[1 + k % 3] = cell[k % 3];
+                triangles += 1;
+            }
+        }
+        assert!(triangles > 3);
+        let mut one = Reference::new(grid.clone(), body.clone(), SOFT, settings);
+        let mut two = Simulation::new(grid, body, SOFT, settings).unwrap();
+        for _ in 0..4 {
+            one.step(&Force).unwrap();
+            two.step(&Force).unwrap();
+        }
+        let corners = (&one.body().mesh.as_ref().unwrap().x, &two.mesh().unwrap().x);
+        assert!(difference(corners.0, corners.1) < 1e-13, "{settings:?}");
+        let off = difference(&one.particles().F, &two.particles().F);
+        assert!(off < 1e-11, "{off:e} {settings:?}");
+    }
+}
+
+#[test]
 fn failures_name_the_step_the_particle_and_the_remedy() {
     let grid = open_grid::<2>(4);
     let body = || Body::lattice(&grid, 2, 2.0, |X| X.iter().all(|&x| (0.25..0.75).contains(&x)));
