@@ -18,13 +18,13 @@ use crate::health::{Invalid, Outcome, SharedOutcome};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
-use crate::mesh::{Interpolation, Mesh};
+use crate::mesh::Mesh;
 use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::shape_function::{OnAxis, ProductShape};
 use crate::shared_corners::{CHUNK, Chunk, SharedCorners};
-use crate::simd::{Lane4, Lanes};
+use crate::simd::{Lane4, Lanes, dispatch};
 use crate::support::Support;
 
 /// What says the stress on the boundary, and the time.
@@ -93,8 +93,8 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
 
     /// Makes room for these corners and their particles.
     pub(crate) fn fit(&mut self, corners: &SharedCorners<T, D>) {
-        let Mesh { loads, interpolation, .. } = &corners.mesh;
-        let has_moments = self.has_affine && *interpolation == Interpolation::Cell;
+        let Mesh { loads, .. } = &corners.mesh;
+        let has_moments = self.has_affine && corners.mesh.is_of_cells();
         let (zero, none) = (Node::zero(), SMatrix::zeros());
         self.sums.resize(corners.sums(), zero);
         if self.has_affine {
@@ -162,7 +162,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         let Self { sums, is_affine, at_nodes, .. } = self;
         let affine_sums = if *is_affine { &self.affine_sums[..] } else { &[] };
         if corners.at_corner.on_axis == OnAxis::Hat {
-            return ToGrid { c, corners, sums, affine_sums, band, first, ids }.add();
+            return dispatch(ToGrid { c, corners, sums, affine_sums, band, first, ids });
         }
         let mut copies = Copies::new();
         let mut buffers = self.buffers.take(at_nodes, *is_affine);
@@ -221,7 +221,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         let (buffers, at_nodes) = (&self.buffers, &self.at_nodes);
         each(chunks, &|Corners { first, values, moments, next }| {
             if corners.at_corner.on_axis == OnAxis::Hat {
-                FromGrid { c, corners, nodes, first, values, moments }.interpolate();
+                dispatch(FromGrid { c, corners, nodes, first, values, moments });
             } else {
                 from_grid((c, corners), (at_nodes, buffers), nodes, first, values);
             }

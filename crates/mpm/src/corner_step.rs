@@ -19,7 +19,6 @@ use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::{FromCorners, ToCorners};
-use crate::mesh::Interpolation;
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
@@ -28,7 +27,6 @@ use crate::simd::Lanes;
 use crate::state::State;
 use crate::step::StepTimes;
 use crate::support::Support;
-use crate::tensor::determinant;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Advances by a step.
@@ -156,8 +154,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
         let &Self { mass, volume, buffers: pool, is_in_doubt, .. } = self;
         let Piece { first: of_chunk, x, v, F, affine, mut measured, mut sums } = piece;
         let SharedCorners { mesh, next, .. } = corners;
-        let (is_affine, of_cells) =
-            (transfer.is_affine(), mesh.interpolation == Interpolation::Cell);
+        let (is_affine, of_cells) = (transfer.is_affine(), mesh.is_of_cells());
         sums.clear();
         let mut copies = Copies::new();
         let mut buffers = pool.take(support, is_affine);
@@ -179,8 +176,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
 
             let mut is_valid =
                 of_cells || measured.at(mesh, next, (of_chunk, first..first + count));
-            is_valid &= F.iter().all(|F| determinant(F) > T::zero())
-                && (!of_cells || x.iter().all(|x| c.axis_outside(x).is_none()));
+            is_valid &= corners.are_inside(c, x, F);
             let ids = successive(first);
             let ids = &ids[..count];
             let kinematics = copies.of_successive(x, F);

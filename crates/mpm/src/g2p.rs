@@ -19,8 +19,7 @@ use crate::kernel::any::Interpolated;
 use crate::kernel::block::Block;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
-use crate::kernel::shared::cells_are_valid_next;
-use crate::mesh::Interpolation;
+use crate::kernel::shared::have_volume_next;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
@@ -339,8 +338,11 @@ fn g2p<T: Lanes, const D: usize>(
                     outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
                 }
                 Support::Mesh(corners) => {
-                    let of_cells = corners.mesh.interpolation == Interpolation::Cell;
-                    if !of_cells || !cells_are_valid_next(&c, corners, (first, x, F)) {
+                    // Polygons are measured when all corners are at their new places.
+                    let is_valid = corners.mesh.is_of_cells()
+                        && corners.are_inside(&c, x, F)
+                        && have_volume_next(corners, (first, x.len()));
+                    if !is_valid {
                         is_in_doubt.store(true, Ordering::Relaxed);
                     }
                 }

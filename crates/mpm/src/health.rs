@@ -8,7 +8,6 @@ use crate::domain::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelog
 use crate::geometry::Constants;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::parallelograms::{GROUP, OfGroup, gather, padded, parallelograms};
-use crate::mesh::Interpolation;
 use crate::shape_function::{
     EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
 };
@@ -42,7 +41,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
             return Some(Invalid::NotFinite);
         }
         // Polygons may have axes of their own; their corners are looked at themselves.
-        let is_polygon = matches!(self, Self::Mesh(corners) if corners.mesh.interpolation == Interpolation::Triangles);
+        let is_polygon = matches!(self, Self::Mesh(corners) if !corners.mesh.is_of_cells());
         if !is_polygon && c.axis_outside(x).is_some() {
             return Some(Invalid::LeftGrid);
         }

@@ -155,7 +155,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     /// Whether indices are in range, and every corner belongs to a particle.
     pub(crate) fn check(&self, particles: usize) -> Result<(), SetupError> {
         let Self { X, x, corners, ends, of_particles, faces, loads, numbers, .. } = self;
-        let of_cells = self.interpolation == Interpolation::Cell;
+        let of_cells = self.is_of_cells();
         if D == 1 && !of_cells {
             return Err(SetupError::PolygonDimension { dimension: D });
         }
@@ -213,6 +213,11 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
         }
     }
 
+    /// Whether each particle is one cell.
+    pub(crate) fn is_of_cells(&self) -> bool {
+        self.interpolation == Interpolation::Cell
+    }
+
     /// The corners of a particle's domain.
     pub fn of_particle(&self, p: usize) -> &[u32] {
         &self.corners[self.places(p)]
@@ -221,7 +226,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     /// The places in `corners` of a particle.
     #[inline]
     pub(crate) fn places(&self, p: usize) -> std::ops::Range<usize> {
-        if self.interpolation == Interpolation::Cell {
+        if self.is_of_cells() {
             return p << D..(p + 1) << D;
         }
         let polygons = self.polygons(p);

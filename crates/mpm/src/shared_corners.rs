@@ -3,7 +3,7 @@
 use std::array;
 use std::ops::Range;
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use crate::corner_halo::CornerHalo;
 use crate::domain::{PAIRS, volume_of_cell};
@@ -14,6 +14,7 @@ use crate::node::Node;
 use crate::parallel::chunks::each;
 use crate::shape_function::ProductShape;
 use crate::simd::{Lanes, One};
+use crate::tensor::determinant;
 
 /// Corners handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 pub(crate) const CHUNK: usize = 1024;
@@ -30,11 +31,9 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     pub(crate) mesh: Mesh<T, D>,
     /// Positions at the end of a step.
     pub(crate) next: Vec<SVector<T, D>>,
-    /// Mesh: whether shares and areas are those of the positions.
+    /// Polygons: whether shares and areas are those of the positions.
     is_measured: bool,
     pub(crate) measured: Measured<T, D>,
-    /// Cells: whether each corner of a particle is the one after that of the particle before.
-    pub(crate) is_next: Vec<bool>,
     /// Cells: whether a particle begins with the corners with which the one before it ends.
     pub(crate) goes_on: Vec<bool>,
     /// Particles whose contributions are summed together.
@@ -53,7 +52,7 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     pub(crate) halo: Option<CornerHalo>,
 }
 
-/// Mesh: shares and areas. Those of cells are computed where they are used, which takes less time than to read them from memory.
+/// Polygons: shares and areas. Those of cells are computed where they are used, which takes less time than to read them from memory.
 #[derive(Debug)]
 pub(crate) struct Measured<T, const D: usize> {
     /// For each place in the list of corners.
@@ -75,7 +74,7 @@ impl<T: Lanes, const D: usize> Measured<T, D> {
 
     fn new(mesh: &Mesh<T, D>) -> Self {
         let (mut shares, mut volumes) = (Vec::new(), Vec::new());
-        if mesh.interpolation == Interpolation::Triangles {
+        if !mesh.is_of_cells() {
             let particles = mesh.of_particles.len();
             shares.resize(mesh.corners.len(), Share { w: T::zero(), g: [T::zero(); D] });
             volumes.resize(particles, T::zero());
@@ -172,17 +171,13 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         for ids in ids.chunk_by(of_one) {
             let end = first + ids.len();
             let of_chunk = &mesh.corners[mesh.places(first).start..mesh.places(end - 1).end];
+            let mut touched = of_chunk.to_vec();
+            touched.sort_unstable();
+            touched.dedup();
+            let sum_of = |corner| touched.partition_point(|known| known < corner) as u32;
+            sum_at.extend(of_chunk.iter().map(sum_of));
             let start = corners.len();
-            corners.extend(of_chunk);
-            corners[start..].sort_unstable();
-            let touched = deduplicated(&mut corners[start..]);
-            corners.truncate(start + touched);
-            let touched = &corners[start..];
-            sum_at.extend(
-                of_chunk
-                    .iter()
-                    .map(|corner| touched.partition_point(|known| known < corner) as u32),
-            );
+            corners.extend(&touched);
             chunks.push(Chunk { particles: first..end, sums: start..corners.len() });
             first = end;
         }
@@ -204,8 +199,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             next: mesh.x.clone(),
             is_measured: false,
             measured: Measured::new(&mesh),
-            is_next: of_pairs(&mesh, is_next),
-            goes_on: of_pairs(&mesh, goes_on),
+            goes_on: continuations(&mesh),
             chunks,
             sum_at,
             sums,
@@ -225,7 +219,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         &mut self.mesh.x
     }
 
-    /// Mesh: computes shares and areas at the current positions, if they are of others.
+    /// Polygons: computes shares and areas at the current positions, if they are of others.
     pub(crate) fn measure(&mut self) {
         let Self { mesh, measured, is_measured, .. } = self;
         if std::mem::replace(is_measured, true) {
@@ -254,6 +248,18 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
                 volume_of_cell::<_, D>(&x).0
             }
         }
+    }
+
+    /// Whether particles with these positions and deformation gradients are inside the grid and have a volume, whatever that of their
+    /// domains. Polygons may have axes of their own; their corners are looked at themselves.
+    pub(crate) fn are_inside(
+        &self,
+        c: &Constants<T, D>,
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) -> bool {
+        F.iter().all(|F| determinant(F) > T::zero())
+            && (!self.mesh.is_of_cells() || x.iter().all(|x| c.axis_outside(x).is_none()))
     }
 
     /// Number of corners.
@@ -324,17 +330,14 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     }
 }
 
-/// For each cell whether this holds of the corners of the one before it and of its own.
-fn of_pairs<T: Lanes, const D: usize>(
-    mesh: &Mesh<T, D>,
-    holds: fn(&[u32], &[u32]) -> bool,
-) -> Vec<bool> {
-    let cells = || mesh.corners.chunks(1 << D);
-    let of_pairs = cells().zip(cells().skip(1)).map(|(before, own)| holds(before, own));
-    match mesh.interpolation {
-        Interpolation::Triangles => Vec::new(),
-        Interpolation::Cell => std::iter::once(false).chain(of_pairs).collect(),
+/// For each cell whether it goes on with the corners of the one before it.
+fn continuations<T: Lanes, const D: usize>(mesh: &Mesh<T, D>) -> Vec<bool> {
+    if !mesh.is_of_cells() {
+        return Vec::new();
     }
+    let cells = || mesh.corners.chunks(1 << D);
+    let of_pairs = cells().zip(cells().skip(1)).map(|(before, own)| goes_on(before, own));
+    std::iter::once(false).chain(of_pairs).collect()
 }
 
 /// Whether a cell begins with the corners with which the one before it ends, and no corner is among them twice.
@@ -346,21 +349,4 @@ fn goes_on(before: &[u32], own: &[u32]) -> bool {
     all.sort_unstable();
     all.dedup();
     all.len() == count && pairs.iter().all(|[first, last]| own[*first] == before[*last])
-}
-
-/// Whether each corner of a cell is the one after that of the cell before.
-fn is_next(before: &[u32], own: &[u32]) -> bool {
-    own.iter().zip(before).all(|(corner, before)| *corner == before + 1)
-}
-
-/// Puts one of each of ascending numbers first, and tells how many these are.
-fn deduplicated(numbers: &mut [u32]) -> usize {
-    let mut count = 0;
-    for k in 0..numbers.len() {
-        if count == 0 || numbers[count - 1] != numbers[k] {
-            numbers[count] = numbers[k];
-            count += 1;
-        }
-    }
-    count
 }

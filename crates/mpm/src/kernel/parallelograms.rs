@@ -183,27 +183,11 @@ impl<T: Lanes, const D: usize> ParallelogramWeights<T, D> {
         count: usize,
     ) {
         let Self { own, of_group: weights } = self;
-        let own = &*own;
-        if own.is_affine {
-            dispatch(P2g::<_, D, true> {
-                own,
-                weights,
-                strides,
-                band,
-                first,
-                contributions,
-                count,
-            });
+        let of_block = P2gOfBlock { own, weights, strides, band, first, contributions, count };
+        if of_block.own.is_affine {
+            dispatch(P2g::<_, D, true>(of_block));
         } else {
-            dispatch(P2g::<_, D, false> {
-                own,
-                weights,
-                strides,
-                band,
-                first,
-                contributions,
-                count,
-            });
+            dispatch(P2g::<_, D, false>(of_block));
         }
     }
 
@@ -215,11 +199,11 @@ impl<T: Lanes, const D: usize> ParallelogramWeights<T, D> {
         receiver: &mut [Interpolated<T, D>],
     ) {
         let Self { own, of_group: weights } = self;
-        let own = &*own;
-        if own.is_affine {
-            dispatch(G2p::<_, D, true> { own, weights, strides, nodes, receiver });
+        let of_block = G2pOfBlock { own, weights, strides, nodes, receiver };
+        if of_block.own.is_affine {
+            dispatch(G2p::<_, D, true>(of_block));
         } else {
-            dispatch(G2p::<_, D, false> { own, weights, strides, nodes, receiver });
+            dispatch(G2p::<_, D, false>(of_block));
         }
     }
 }
@@ -420,7 +404,9 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
     }
 }
 
-struct P2g<'a, T, const D: usize, const AFFINE: bool> {
+struct P2g<'a, T, const D: usize, const AFFINE: bool>(P2gOfBlock<'a, T, D>);
+
+struct P2gOfBlock<'a, T, const D: usize> {
     own: &'a Parallelograms<T, D>,
     weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
@@ -435,7 +421,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { own, weights, strides, band, first, contributions, count } = self;
+        let P2gOfBlock { own, weights, strides, band, first, contributions, count } = self.0;
         let count = count.min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, own, group);
@@ -499,7 +485,9 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
     }
 }
 
-struct G2p<'a, T, const D: usize, const AFFINE: bool> {
+struct G2p<'a, T, const D: usize, const AFFINE: bool>(G2pOfBlock<'a, T, D>);
+
+struct G2pOfBlock<'a, T, const D: usize> {
     own: &'a Parallelograms<T, D>,
     weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
@@ -512,7 +500,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { own, weights, strides, nodes, receiver } = self;
+        let G2pOfBlock { own, weights, strides, nodes, receiver } = self.0;
         let count = receiver.len().min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, own, group);

@@ -5,50 +5,63 @@ use nalgebra::SVector;
 use crate::corner_values::AlongAxes;
 use crate::geometry::Constants;
 use crate::node::Node;
-use crate::shape_function::{index, node_below};
+use crate::shape_function::{Hat, ShapeFunction, index};
 use crate::shared_corners::SharedCorners;
-use crate::simd::{Lane8, Lanes, Loop, Vectors, dispatch};
+use crate::simd::{Lane8, Lanes, Loop, Vectors};
 
 /// The nodes around a point.
 struct Around<T, const D: usize> {
     /// Index of the first one.
     first: usize,
-    /// From it to the point, in cells.
-    r: [T; D],
+    /// The hat functions of both nodes along each axis.
+    S: [[T; 2]; D],
 }
 
 impl<T: Lanes, const D: usize> Around<T, D> {
     #[inline(always)]
     fn new(c: &Constants<T, D>, x: &SVector<T, D>) -> Self {
-        let (mut first, mut r) = (0, [T::zero(); D]);
+        let (mut first, mut S, xi) = (0, [[T::one(); 2]; D], c.in_cells(x));
         for a in 0..D {
-            let xi = (x[a] - c.lower[a]) * c.inverse_spacing;
-            let (base, node) = node_below(xi);
-            first += index(base) * c.strides[a];
-            r[a] = xi - node;
+            let axis = Hat::axis_weights(xi[a], T::zero());
+            first += index(axis.base) * c.strides[a];
+            S[a] = axis.S;
         }
-        Self { first: first.wrapping_sub(c.nodes_before as usize), r }
+        Self { first: first.wrapping_sub(c.nodes_before as usize), S }
     }
 
-    /// Whether a row of two nodes is the upper one along an axis.
+    /// The weight of a row, with 1 in place of that of one axis.
     #[inline(always)]
-    fn is_upper(row: usize, axis: usize) -> bool {
-        row >> (axis - 1) & 1 == 1
-    }
-
-    /// Where a row begins, and its weight, with 1 in place of that of one axis.
-    #[inline(always)]
-    fn row(&self, c: &Constants<T, D>, row: usize, without: usize) -> (usize, T) {
-        let (mut start, mut w) = (self.first, T::one());
+    fn of_row(&self, row: usize, without: usize) -> T {
+        let mut w = T::one();
         for a in 1..D {
-            let is_upper = Self::is_upper(row, a);
-            start += if is_upper { c.strides[a] } else { 0 };
             if a != without {
-                w *= if is_upper { self.r[a] } else { T::one() - self.r[a] };
+                w *= self.S[a][usize::from(is_upper(row, a))];
             }
         }
-        (start, w)
+        w
     }
+
+    /// From the point to the lower or the upper node along an axis, in cells.
+    #[inline(always)]
+    fn arm(&self, axis: usize, is_upper: bool) -> T {
+        if is_upper { self.S[axis][0] } else { -self.S[axis][1] }
+    }
+}
+
+/// Whether a row of two nodes is the upper one along an axis.
+#[inline(always)]
+fn is_upper(row: usize, axis: usize) -> bool {
+    row >> (axis - 1) & 1 == 1
+}
+
+/// Where a row begins of the nodes from `first` on.
+#[inline(always)]
+fn start_of_row<T: Lanes, const D: usize>(c: &Constants<T, D>, first: usize, row: usize) -> usize {
+    let mut start = first;
+    for a in 1..D {
+        start += if is_upper(row, a) { c.strides[a] } else { 0 };
+    }
+    start
 }
 
 /// P2G of the sums at corners, to the band of nodes that starts at node `first`.
@@ -63,12 +76,6 @@ pub(crate) struct ToGrid<'a, T, const D: usize> {
     pub(crate) ids: &'a [u32],
 }
 
-impl<T: Lanes, const D: usize> ToGrid<'_, T, D> {
-    pub(crate) fn add(self) {
-        dispatch(self);
-    }
-}
-
 impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
     const WIDE: bool = D > 1;
 
@@ -80,14 +87,14 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
         let mut kept = [[Lane8::zero(); 2]; MOST_ROWS];
         let mut kept_at = None;
         for &corner in ids {
-            let Around { first: of_point, r } = Around::new(c, &corners.at(corner as usize));
-            let around = Around { first: of_point.wrapping_sub(first), r };
-            if kept_at != Some(around.first) {
+            let around = Around::new(c, &corners.at(corner as usize));
+            let own_at = around.first.wrapping_sub(first);
+            if kept_at != Some(own_at) {
                 if let Some(at) = kept_at {
                     put(vectors, c, (band, at), &kept);
                 }
                 kept = [[Lane8::zero(); 2]; MOST_ROWS];
-                kept_at = Some(around.first);
+                kept_at = Some(own_at);
             }
             let [one, others @ ..] = corners.sums_of(corner as usize) else { continue };
             let mut value = vectors.load8(&sums[*one as usize].values);
@@ -99,23 +106,22 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
                 affine = affine_at(corners, affine_sums, corner as usize);
             }
             for row in 0..1 << (D - 1) {
-                let (_, w) = around.row(c, row, 0);
+                let w = around.of_row(row, 0);
                 let mut of_row = value;
                 if is_affine {
                     for a in 1..D {
-                        let arm =
-                            if Around::<T, D>::is_upper(row, a) { T::one() - r[a] } else { -r[a] };
+                        let arm = around.arm(a, is_upper(row, a));
                         of_row = vectors.mul_add8(affine[a], vectors.splat8(arm), of_row);
                     }
                 }
                 for (i, sum) in kept[row].iter_mut().enumerate() {
                     let mut of_node = of_row;
                     if is_affine {
-                        let arm = if i == 1 { T::one() - r[0] } else { -r[0] };
+                        let arm = around.arm(0, i == 1);
                         of_node = vectors.mul_add8(affine[0], vectors.splat8(arm), of_node);
                     }
-                    let S = w * if i == 1 { r[0] } else { T::one() - r[0] };
-                    *sum = vectors.mul_add8(of_node, vectors.splat8(S), *sum);
+                    let S = vectors.splat8(w * around.S[0][i]);
+                    *sum = vectors.mul_add8(of_node, S, *sum);
                 }
             }
         }
@@ -136,9 +142,8 @@ fn put<T: Lanes, V: Vectors, const D: usize>(
     (band, first): (&mut [Node<T, D>], usize),
     sums: &[[Lane8<T>; 2]; MOST_ROWS],
 ) {
-    let corner = Around { first, r: [T::zero(); D] };
     for (row, sums) in sums.iter().enumerate().take(1 << (D - 1)) {
-        let (start, _) = corner.row(c, row, 0);
+        let start = start_of_row(c, first, row);
         let nodes = band.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
         let Some(nodes) = nodes else {
             debug_assert!(false, "a corner beyond its band");
@@ -191,12 +196,6 @@ pub(crate) struct FromGrid<'a, T, const D: usize> {
     pub(crate) moments: &'a mut [AlongAxes<T, D>],
 }
 
-impl<T: Lanes, const D: usize> FromGrid<'_, T, D> {
-    pub(crate) fn interpolate(self) {
-        dispatch(self);
-    }
-}
-
 impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
     const WIDE: bool = D > 1;
 
@@ -205,11 +204,11 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
         let Self { c, corners, nodes, first, values, moments } = self;
         for (k, own) in values.iter_mut().enumerate() {
             let around = Around::new(c, &corners.at(first + k));
-            let (far, near) = (around.r[0], T::one() - around.r[0]);
+            let [near, far] = around.S[0];
             let mut value = Lane8::zero();
             let mut slopes = [Lane8::zero(); D];
             for row in 0..1 << (D - 1) {
-                let (start, w) = around.row(c, row, 0);
+                let (start, w) = (start_of_row(c, around.first, row), around.of_row(row, 0));
                 let Some([low, high]) =
                     nodes.get(start..).and_then(|nodes| nodes.first_chunk::<2>())
                 else {
@@ -225,8 +224,8 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
                     let along = vectors.sub8(high, low);
                     slopes[0] = vectors.mul_add8(along, vectors.splat8(w), slopes[0]);
                     for a in 1..D {
-                        let (_, w) = around.row(c, row, a);
-                        let w = if Around::<T, D>::is_upper(row, a) { w } else { -w };
+                        let w = around.of_row(row, a);
+                        let w = if is_upper(row, a) { w } else { -w };
                         slopes[a] = vectors.mul_add8(of_row, vectors.splat8(w), slopes[a]);
                     }
                 }
@@ -234,7 +233,7 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
             own.values = value.0;
             if let Some(moments) = moments.get_mut(k) {
                 for a in 0..D {
-                    let variance = around.r[a] * (T::one() - around.r[a]);
+                    let variance = around.S[a][1] * around.S[a][0];
                     for i in 0..D {
                         moments[a].0[i] = slopes[a].0[i] * variance;
                     }

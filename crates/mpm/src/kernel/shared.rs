@@ -11,11 +11,10 @@ use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
 use crate::kernel::parallelograms::GROUP;
-use crate::mesh::{Interpolation, Share};
+use crate::mesh::Share;
 use crate::node::Node;
 use crate::shared_corners::SharedCorners;
 use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
-use crate::tensor::determinant;
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
 type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];
@@ -29,22 +28,6 @@ fn take_corners<T: Lanes, V: Vectors, const D: usize>(
     of_group: &mut GroupCorners<T, V, D>,
 ) {
     let places = &corners.mesh.corners[first << D..(first + count) << D];
-    // In the rows of a lattice those of successive cells lie side by side in memory.
-    if count == GROUP && corners.is_next[first + 1..first + GROUP].iter().all(|is_next| *is_next) {
-        for corner in 0..1 << D {
-            let Some(x) = x.get(places[corner] as usize..).and_then(|x| x.first_chunk::<GROUP>())
-            else {
-                debug_assert!(false, "a corner that is not there");
-                return;
-            };
-            for n in 0..GROUP {
-                for a in 0..D {
-                    of_group[corner][a].lanes.0[n] = x[n][a];
-                }
-            }
-        }
-        return;
-    }
     for n in 0..GROUP {
         let own = &places[n.min(count - 1) << D..][..1 << D];
         for corner in 0..1 << D {
@@ -62,43 +45,36 @@ fn no_corners<T: Lanes, V: Vectors, const D: usize>(vectors: V) -> GroupCorners<
     [[Eight { lanes: Lane8::zero(), vectors }; D]; MOST_CORNERS]
 }
 
-/// Whether successive particles are inside the grid and have a volume at the end of a step, the cells between corners as well.
-pub(crate) fn cells_are_valid_next<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
+/// Whether so many successive cells have a volume at the end of a step.
+pub(crate) fn have_volume_next<T: Lanes, const D: usize>(
     corners: &SharedCorners<T, D>,
-    (first, x, F): (usize, &[SVector<T, D>], &[SMatrix<T, D, D>]),
+    particles: (usize, usize),
 ) -> bool {
-    let mut all_valid = true;
-    dispatch(CheckCells { corners, first, F, all_valid: &mut all_valid });
-    all_valid && x.iter().all(|x| c.axis_outside(x).is_none())
+    let mut have_volume = true;
+    dispatch(MeasureNext { corners, particles, have_volume: &mut have_volume });
+    have_volume
 }
 
-struct CheckCells<'a, 'b, T, const D: usize> {
+struct MeasureNext<'a, 'b, T, const D: usize> {
     corners: &'a SharedCorners<T, D>,
-    first: usize,
-    F: &'a [SMatrix<T, D, D>],
-    all_valid: &'b mut bool,
+    particles: (usize, usize),
+    have_volume: &'b mut bool,
 }
 
-impl<T: Lanes, const D: usize> Loop for CheckCells<'_, '_, T, D> {
+impl<T: Lanes, const D: usize> Loop for MeasureNext<'_, '_, T, D> {
     const WIDE: bool = D > 1;
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { corners, first, F, all_valid } = self;
-        let mut all = true;
+        let Self { corners, particles: (first, count), have_volume } = self;
         let mut x = no_corners(vectors);
-        for group in (0..F.len()).step_by(GROUP) {
-            let of_group = (first + group, GROUP.min(F.len() - group));
+        for group in (0..count).step_by(GROUP) {
+            let of_group = (first + group, GROUP.min(count - group));
             take_corners(corners, &corners.next, of_group, &mut x);
             for volume in volume_of_cell(&x).lanes.0 {
-                all &= volume > T::zero();
+                *have_volume &= volume > T::zero();
             }
         }
-        for F in F {
-            all &= determinant(F) > T::zero();
-        }
-        *all_valid = all;
     }
 }
 
@@ -237,7 +213,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
         let spacing = vectors.splat8(c.spacing());
         let inverse_spacing = Eight { lanes: vectors.splat8(c.inverse_spacing), vectors };
         let mesh = &corners.mesh;
-        if mesh.interpolation == Interpolation::Triangles {
+        if !mesh.is_of_cells() {
             let start = mesh.places(first).start;
             for k in 0..count {
                 let given = Giving::new::<V, AFFINE>(vectors, contributions, k, spacing);
@@ -377,7 +353,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
         let FromCorners { c, corners, shares, values, first, receiver } = self.0;
         let spacing = c.spacing();
         let mesh = &corners.mesh;
-        if mesh.interpolation == Interpolation::Triangles {
+        if !mesh.is_of_cells() {
             let start = mesh.places(first).start;
             for (k, own) in receiver.iter_mut().enumerate() {
                 let mut over = Over::zero();

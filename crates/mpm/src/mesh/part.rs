@@ -1,4 +1,4 @@
-//! Mesh of some of a body's particles, and what processes tell each other of them.
+//! The domains of some of a body's particles, and what processes tell each other of them.
 
 use std::collections::{BTreeMap, HashMap};
 
