@@ -212,11 +212,11 @@ proptest! {
         scheme in 0..schemes::schemes().count(),
         count in 1..8_usize,
         speed in -15.0..15.0_f64,
-        steps in 8..20_usize,
+        steps in 12..20_usize,
     ) {
         let settings = flying(schemes::schemes().nth(scheme).unwrap());
-        // Fast enough to be sorted once more.
-        let speed = speed + 12.0 * speed.signum();
+        // Particles have at most four rows left to the end of their band: five and more flown, they are sorted once more.
+        let speed = speed + 14.0 * speed.signum();
         agrees::<2>(settings, &[count], speed, steps);
     }
 }
