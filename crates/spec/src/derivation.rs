@@ -22,7 +22,11 @@ impl Derivation {
         let geometry = Geometry::new(&mut graph, spec.coordinates, spec.dimension);
         let time = graph.symbol("t");
         let variables = geometry.coordinates.iter().copied().chain([time]).collect();
-        Derivation { graph, geometry, derivatives: Derivatives::limited(), variables, time }
+        let mut derivatives = Derivatives::limited();
+        for known in spec.solved.iter().flat_map(|solved| &solved.slopes) {
+            derivatives.define(known.component, known.coordinate, known.slope);
+        }
+        Derivation { graph, geometry, derivatives, variables, time }
     }
 
     pub(crate) fn derivative(&mut self, expr: Expr, variable: Expr) -> Expr {

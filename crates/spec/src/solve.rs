@@ -18,7 +18,9 @@ use crate::document::{SolveTable, Text};
 use crate::law::{self, Deformation};
 use crate::scope::Scope;
 use crate::{Diagnostic, Spec};
-use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational, Term};
+use mmsmith_expr::{
+    Ast, AstKind, Derivatives, Expr, Function, Graph, Node, Program, Rational, Term,
+};
 use num_traits::{Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -36,6 +38,19 @@ pub struct Solved {
     pub unknowns: Vec<(String, Expr)>,
     /// What was made of each condition.
     pub conditions: Vec<SolvedCondition>,
+    /// Derivatives of components of the displacement in forms that keep more digits than those by the rules.
+    pub(crate) slopes: Vec<Slope>,
+}
+
+/// The derivative of a component of the displacement along the coordinate on which conditions hold at places.
+///
+/// `P_RR(Ri) = 0` makes it zero at `Ri`. In its factored form it is so by a factor `R - Ri`; by the rules it is a sum there whose terms
+/// cancel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slope {
+    pub(crate) component: Expr,
+    pub(crate) coordinate: Expr,
+    pub(crate) slope: Expr,
 }
 
 /// What was made of a condition.
@@ -126,16 +141,24 @@ impl Spec {
             found.push((name.clone(), value));
         }
         self.check_defaults(&found, scope, table)?;
+        let mut slopes = Vec::new();
         for component in &mut self.displacement {
-            *component = match solver.factored(*component, &solution) {
-                Some(factored) => transfer(&solver.graph, &mut self.graph, factored),
-                None => self.graph.replace(*component, &replacement),
+            let Some(factored) = solver.factored(*component, &solution) else {
+                *component = self.graph.replace(*component, &replacement);
+                continue;
             };
+            let slope = solver.factored_slope(*component, &solution);
+            *component = transfer(&solver.graph, &mut self.graph, factored);
+            if let Some([coordinate, slope]) = slope {
+                let [coordinate, slope] =
+                    [coordinate, slope].map(|expr| transfer(&solver.graph, &mut self.graph, expr));
+                slopes.push(Slope { component: *component, coordinate, slope });
+            }
         }
         for meaning in self.cross_checks.iter_mut().flat_map(|check| check.names.values_mut()) {
             *meaning = self.graph.replace(*meaning, &replacement);
         }
-        self.solved = Some(Solved { unknowns: found, conditions });
+        self.solved = Some(Solved { unknowns: found, conditions, slopes });
         Ok(())
     }
 
@@ -575,11 +598,25 @@ impl<'a> Solver<'a> {
     /// A component of the displacement with its unknowns put in, where the conditions hold at places along one coordinate and
     /// digits are to be kept between them.
     fn factored(&mut self, component: Expr, solution: &Solution) -> Option<Expr> {
-        let mut along = self.places.iter();
-        let (Some((&coordinate, places)), None) = (along.next(), along.next()) else { return None };
+        let (coordinate, places) = only_coordinate(&self.places)?;
         let unknowns: Vec<Expr> = self.unknowns.iter().map(|(_, symbol)| *symbol).collect();
         let along = Along { coordinate, places, variables: &self.variables };
         factored(&mut self.graph, component, &unknowns, solution, &along)
+    }
+
+    /// That coordinate, and the derivative of a component along it in such a form, where all that changes along the coordinate are distances from
+    /// places: no terms cancel then.
+    fn factored_slope(&mut self, component: Expr, solution: &Solution) -> Option<[Expr; 2]> {
+        let (coordinate, _) = only_coordinate(&self.places)?;
+        let mut derivatives = Derivatives::limited();
+        let slope = derivatives.of(&mut self.graph, component, coordinate);
+        let slope = self.factored(slope, solution)?;
+        let Node::Product(factors) = self.graph.node(slope).clone() else { return None };
+        let is_distance = |(base, _): &(Expr, Rational)| {
+            let change = derivatives.of(&mut self.graph, *base, coordinate);
+            matches!(self.graph.node(change), Node::Number(_))
+        };
+        factors.iter().all(is_distance).then_some([coordinate, slope])
     }
 
     fn shown(&self, expr: Expr) -> String {
@@ -594,6 +631,13 @@ impl Equation {
             coefficients.iter().all(Vec::is_empty) && !constant.is_empty()
         })
     }
+}
+
+/// The coordinate along which conditions hold at places, if it is one, and the places.
+fn only_coordinate(places: &BTreeMap<Expr, BTreeSet<Expr>>) -> Option<(Expr, &BTreeSet<Expr>)> {
+    let mut along = places.iter();
+    let (Some((&coordinate, places)), None) = (along.next(), along.next()) else { return None };
+    Some((coordinate, places))
 }
 
 /// The expression as text, cut where it is long.
