@@ -10,7 +10,7 @@ mod factored;
 mod given_values;
 mod polynomial;
 
-use self::factored::{Along, Solution, factored};
+use self::factored::{Along, Solution, factored, product_of_distances};
 use self::polynomial::{Fraction, Polynomial};
 use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
@@ -147,13 +147,14 @@ impl Spec {
                 *component = self.graph.replace(*component, &replacement);
                 continue;
             };
-            let slope = solver.factored_slope(*component, &solution);
-            *component = transfer(&solver.graph, &mut self.graph, factored);
-            if let Some([coordinate, slope]) = slope {
-                let [coordinate, slope] =
-                    [coordinate, slope].map(|expr| transfer(&solver.graph, &mut self.graph, expr));
-                slopes.push(Slope { component: *component, coordinate, slope });
-            }
+            let slope = solver.slope(*component, &solution);
+            let mut moved = |expr| transfer(&solver.graph, &mut self.graph, expr);
+            *component = moved(factored);
+            slopes.extend(slope.map(|Slope { coordinate, slope, .. }| Slope {
+                component: *component,
+                coordinate: moved(coordinate),
+                slope: moved(slope),
+            }));
         }
         for meaning in self.cross_checks.iter_mut().flat_map(|check| check.names.values_mut()) {
             *meaning = self.graph.replace(*meaning, &replacement);
@@ -598,25 +599,22 @@ impl<'a> Solver<'a> {
     /// A component of the displacement with its unknowns put in, where the conditions hold at places along one coordinate and
     /// digits are to be kept between them.
     fn factored(&mut self, component: Expr, solution: &Solution) -> Option<Expr> {
-        let (coordinate, places) = only_coordinate(&self.places)?;
-        let unknowns: Vec<Expr> = self.unknowns.iter().map(|(_, symbol)| *symbol).collect();
-        let along = Along { coordinate, places, variables: &self.variables };
+        let (unknowns, along) = (self.symbols(), along(&self.places, &self.variables)?);
         factored(&mut self.graph, component, &unknowns, solution, &along)
     }
 
-    /// That coordinate, and the derivative of a component along it in such a form, where all that changes along the coordinate are distances from
-    /// places: no terms cancel then.
-    fn factored_slope(&mut self, component: Expr, solution: &Solution) -> Option<[Expr; 2]> {
-        let (coordinate, _) = only_coordinate(&self.places)?;
-        let mut derivatives = Derivatives::limited();
-        let slope = derivatives.of(&mut self.graph, component, coordinate);
-        let slope = self.factored(slope, solution)?;
-        let Node::Product(factors) = self.graph.node(slope).clone() else { return None };
-        let is_distance = |(base, _): &(Expr, Rational)| {
-            let change = derivatives.of(&mut self.graph, *base, coordinate);
-            matches!(self.graph.node(change), Node::Number(_))
-        };
-        factors.iter().all(is_distance).then_some([coordinate, slope])
+    /// The derivative of a component along that coordinate, in such a form.
+    fn slope(&mut self, component: Expr, solution: &Solution) -> Option<Slope> {
+        let (unknowns, along) = (self.symbols(), along(&self.places, &self.variables)?);
+        let coordinate = along.coordinate;
+        let slope = Derivatives::limited().of(&mut self.graph, component, coordinate);
+        let slope = product_of_distances(&mut self.graph, slope, &unknowns, solution, &along)?;
+        Some(Slope { component, coordinate, slope })
+    }
+
+    /// The unknowns.
+    fn symbols(&self) -> Vec<Expr> {
+        self.unknowns.iter().map(|(_, symbol)| *symbol).collect()
     }
 
     fn shown(&self, expr: Expr) -> String {
@@ -633,11 +631,14 @@ impl Equation {
     }
 }
 
-/// The coordinate along which conditions hold at places, if it is one, and the places.
-fn only_coordinate(places: &BTreeMap<Expr, BTreeSet<Expr>>) -> Option<(Expr, &BTreeSet<Expr>)> {
-    let mut along = places.iter();
-    let (Some((&coordinate, places)), None) = (along.next(), along.next()) else { return None };
-    Some((coordinate, places))
+/// The coordinate along which conditions hold at `places`, if it is one.
+fn along<'a>(
+    places: &'a BTreeMap<Expr, BTreeSet<Expr>>,
+    variables: &'a BTreeSet<Expr>,
+) -> Option<Along<'a>> {
+    let mut all = places.iter();
+    let (Some((&coordinate, places)), None) = (all.next(), all.next()) else { return None };
+    Some(Along { coordinate, places, variables })
 }
 
 /// The expression as text, cut where it is long.

@@ -53,74 +53,125 @@ pub(super) fn factored(
     solution: &Solution,
     along: &Along<'_>,
 ) -> Option<Expr> {
-    let symbols: BTreeSet<Expr> = unknowns.iter().copied().collect();
-    if !graph.depends_on(displacement, &symbols) {
-        return None;
-    }
-    let nothing = unknowns.iter().map(|unknown| (*unknown, Graph::ZERO)).collect();
-    let mut parts = Vec::new();
-    let given = graph.replace(displacement, &nothing);
-    parts.extend(spread(graph, given, along)?.into_iter().map(|part| (part, None)));
-    for (index, unknown) in unknowns.iter().enumerate() {
-        let slope = Derivatives::limited().of(graph, displacement, *unknown);
-        if graph.depends_on(slope, &symbols) {
+    Joined::new(graph, displacement, unknowns, solution, along)?.formed()
+}
+
+/// The same of the derivative `slope` of a displacement, where all that changes along the coordinate are distances from places: no terms
+/// cancel then.
+pub(super) fn product_of_distances(
+    graph: &mut Graph,
+    slope: Expr,
+    unknowns: &[Expr],
+    solution: &Solution,
+    along: &Along<'_>,
+) -> Option<Expr> {
+    let joined = Joined::new(graph, slope, unknowns, solution, along)?;
+    joined.is_product_of_distances().then(|| joined.formed()).flatten()
+}
+
+/// A displacement over one denominator.
+struct Joined<'a> {
+    form: Form<'a>,
+    /// The power of the coordinate that is set apart.
+    least: i64,
+    /// By what changes from point to point beside the coordinate.
+    numerators: BTreeMap<Expr, Polynomial>,
+    denominator: Polynomial,
+}
+
+impl<'a> Joined<'a> {
+    fn new(
+        graph: &'a mut Graph,
+        displacement: Expr,
+        unknowns: &[Expr],
+        solution: &Solution,
+        along: &Along<'_>,
+    ) -> Option<Self> {
+        let symbols: BTreeSet<Expr> = unknowns.iter().copied().collect();
+        if !graph.depends_on(displacement, &symbols) {
             return None;
         }
-        let own = spread(graph, slope, along)?;
-        parts.extend(own.into_iter().map(|part| (part, Some(&solution.values[index]))));
-    }
-    if parts.len() > MOST_PARTS {
-        return None;
-    }
-    let mut atoms: BTreeSet<Expr> = solution.atoms.iter().copied().collect();
-    atoms.extend(parts.iter().flat_map(|(part, _)| part.fixed.iter().map(|(atom, _)| *atom)));
-    atoms.extend(graph.symbols_in(&along.places.iter().copied().collect::<Vec<_>>()));
-    atoms.insert(along.coordinate);
-    let space = Space { atoms: atoms.into_iter().collect() };
-    let coordinate = space.place(along.coordinate)?;
-
-    let least = parts.iter().map(|(part, _)| part.power).min()?.min(0);
-    let mut fractions: Vec<(Expr, Polynomial, Polynomial)> = Vec::new();
-    for (part, value) in parts {
-        let (above, below) =
-            space.fraction(&part, least, coordinate, value.map(|v| (v, solution)))?;
-        fractions.push((part.changing, above, below));
-    }
-    let mut denominator = space.constant(Rational::one());
-    for (_, _, below) in &fractions {
-        let common = denominator.gcd(below)?;
-        denominator = denominator.times(&below.divided_by(&common)?)?;
-    }
-    let mut numerators: BTreeMap<Expr, Polynomial> = BTreeMap::new();
-    for (changing, above, below) in fractions {
-        let scaled = above.times(&denominator.divided_by(&below)?)?;
-        let sum = numerators.entry(changing).or_default();
-        *sum = sum.plus(&scaled);
-    }
-
-    let places: Vec<Polynomial> =
-        along.places.iter().filter_map(|place| space.polynomial(graph, *place)).collect();
-    let mut form = Form { graph, space, coordinate, places };
-    let differences = form.differences();
-    let shifts = form.shifts()?;
-    let below = form.expression(denominator.clone(), &differences, &shifts)?;
-    let (mut terms, mut given) = (Vec::new(), Vec::new());
-    for (changing, numerator) in numerators {
-        let roots = form.roots();
-        let all: Vec<Polynomial> = roots.into_iter().chain(differences.iter().cloned()).collect();
-        let common = Common { denominator: &denominator, below, factors: &all };
-        if let Some(value) = form.through_given_values(&numerator, least, &common, &shifts) {
-            given.push(form.graph.mul(changing, value));
-            continue;
+        let nothing = unknowns.iter().map(|unknown| (*unknown, Graph::ZERO)).collect();
+        let mut parts = Vec::new();
+        let given = graph.replace(displacement, &nothing);
+        parts.extend(spread(graph, given, along)?.into_iter().map(|part| (part, None)));
+        for (index, unknown) in unknowns.iter().enumerate() {
+            let slope = Derivatives::limited().of(graph, displacement, *unknown);
+            if graph.depends_on(slope, &symbols) {
+                return None;
+            }
+            let own = spread(graph, slope, along)?;
+            parts.extend(own.into_iter().map(|part| (part, Some(&solution.values[index]))));
         }
-        let above = form.expression(numerator, &all, &shifts)?;
-        terms.push(form.graph.mul(changing, above));
+        if parts.len() > MOST_PARTS {
+            return None;
+        }
+        let mut atoms: BTreeSet<Expr> = solution.atoms.iter().copied().collect();
+        atoms.extend(parts.iter().flat_map(|(part, _)| part.fixed.iter().map(|(atom, _)| *atom)));
+        atoms.extend(graph.symbols_in(&along.places.iter().copied().collect::<Vec<_>>()));
+        atoms.insert(along.coordinate);
+        let space = Space { atoms: atoms.into_iter().collect() };
+        let coordinate = space.place(along.coordinate)?;
+
+        let least = parts.iter().map(|(part, _)| part.power).min()?.min(0);
+        let mut fractions: Vec<(Expr, Polynomial, Polynomial)> = Vec::new();
+        for (part, value) in parts {
+            let (above, below) =
+                space.fraction(&part, least, coordinate, value.map(|v| (v, solution)))?;
+            fractions.push((part.changing, above, below));
+        }
+        let mut denominator = space.constant(Rational::one());
+        for (_, _, below) in &fractions {
+            let common = denominator.gcd(below)?;
+            denominator = denominator.times(&below.divided_by(&common)?)?;
+        }
+        let mut numerators: BTreeMap<Expr, Polynomial> = BTreeMap::new();
+        for (changing, above, below) in fractions {
+            let scaled = above.times(&denominator.divided_by(&below)?)?;
+            let sum = numerators.entry(changing).or_default();
+            *sum = sum.plus(&scaled);
+        }
+
+        let places: Vec<Polynomial> =
+            along.places.iter().filter_map(|place| space.polynomial(graph, *place)).collect();
+        let form = Form { graph, space, coordinate, places };
+        Some(Self { form, least, numerators, denominator })
     }
-    let sum = graph.sum_of(terms);
-    let power = graph.powi(along.coordinate, least);
-    let scaled = graph.mul(sum, power);
-    given.push(graph.div(scaled, below));
-    Some(graph.sum_of(given))
+
+    /// Whether the coordinate occurs in its distances from places alone.
+    fn is_product_of_distances(&self) -> bool {
+        let Self { form, numerators, .. } = self;
+        let mut numerators = numerators.values();
+        let (Some(numerator), None) = (numerators.next(), numerators.next()) else { return false };
+        let without = |rest: Polynomial, root| rest.divided_out(&root).0;
+        form.roots().into_iter().fold(numerator.clone(), without).degree(form.coordinate) == 0
+    }
+
+    fn formed(self) -> Option<Expr> {
+        let Self { mut form, least, numerators, denominator } = self;
+        let differences = form.differences();
+        let shifts = form.shifts()?;
+        let below = form.expression(denominator.clone(), &differences, &shifts)?;
+        let (mut terms, mut given) = (Vec::new(), Vec::new());
+        for (changing, numerator) in numerators {
+            let roots = form.roots();
+            let all: Vec<Polynomial> =
+                roots.into_iter().chain(differences.iter().cloned()).collect();
+            let common = Common { denominator: &denominator, below, factors: &all };
+            if let Some(value) = form.through_given_values(&numerator, least, &common, &shifts) {
+                given.push(form.graph.mul(changing, value));
+                continue;
+            }
+            let above = form.expression(numerator, &all, &shifts)?;
+            terms.push(form.graph.mul(changing, above));
+        }
+        let (graph, coordinate) = (form.graph, form.space.atoms[form.coordinate]);
+        let sum = graph.sum_of(terms);
+        let power = graph.powi(coordinate, least);
+        let scaled = graph.mul(sum, power);
+        given.push(graph.div(scaled, below));
+        Some(graph.sum_of(given))
+    }
 }
 
 /// What the terms of a displacement have in common.
@@ -357,13 +408,11 @@ impl Form<'_> {
             return Some(Graph::ZERO);
         }
         for factor in factors {
-            let mut power = 0;
-            while let Some(quotient) = polynomial.divided_by(factor) {
-                polynomial = quotient;
-                power += 1;
-            }
+            let power;
+            (polynomial, power) = polynomial.divided_out(factor);
             if power > 0 {
-                product.push((self.in_differences(factor, shifts)?, Rational::from(power)));
+                product
+                    .push((self.in_differences(factor, shifts)?, Rational::from(i64::from(power))));
             }
         }
         let mut nested = Vec::new();

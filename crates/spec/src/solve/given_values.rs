@@ -62,10 +62,8 @@ impl Form<'_> {
     ) -> Option<Given> {
         let size = |polynomial: &Polynomial| polynomial.terms().count();
         let coordinate = self.space.power(self.coordinate, 1);
-        let (mut rest, mut power) = (numerator.clone(), least);
-        while let Some(quotient) = rest.divided_by(&coordinate).filter(|q| !q.is_zero()) {
-            (rest, power) = (quotient, power + 1);
-        }
+        let (mut rest, of_numerator) = numerator.clone().divided_out(&coordinate);
+        let power = least + i64::from(of_numerator);
         let mut denominator = common.denominator.clone();
         let mut nodes: Vec<Coefficient> = Vec::new();
         while !rest.is_zero() && nodes.len() <= self.places.len() {

@@ -150,6 +150,17 @@ impl Polynomial {
         Some(quotient)
     }
 
+    /// What is left when `factor` is divided out as often as it goes, and how often that is; of zero, zero.
+    pub(super) fn divided_out(mut self, factor: &Self) -> (Self, u32) {
+        let mut power = 0;
+        while !self.is_zero()
+            && let Some(quotient) = self.divided_by(factor)
+        {
+            (self, power) = (quotient, power + 1);
+        }
+        (self, power)
+    }
+
     /// The greatest common divisor of the coefficients with respect to variable `v`.
     fn content(&self, v: usize) -> Option<Self> {
         let mut content = Self::default();
