@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::body_force::BodyForce;
 use crate::corner_values::{AlongAxes, CornerValues, Seen};
+use crate::extension::Extension;
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeUpdate};
 use crate::health::{Invalid, Outcome, SharedOutcome};
@@ -46,6 +47,8 @@ pub(crate) struct Exchange<T, const D: usize> {
     reprojects: bool,
     /// The same of such velocities, where there are any.
     pub(crate) reprojected: CornerValues<T, D>,
+    /// The light nodes that a clipped body reaches.
+    extension: Option<Extension<T, D>>,
     /// The Cauchy stress at each loaded point.
     stresses: Vec<SMatrix<T, D, D>>,
     /// The weights of corners at nodes.
@@ -69,8 +72,13 @@ impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
 }
 
 impl<T: Lanes, const D: usize> Exchange<T, D> {
-    /// Reserves all memory that a support needs for it: none where particles share no corners that pass on what they give.
-    pub(crate) fn new(support: &Support<T, D>, is_affine: bool, reprojects: bool) -> Self {
+    /// For grid cells that have the mass `mass_of_cell` inside of the body. Reserves all memory that a support needs for it: none where particles share no corners that pass on what they give.
+    pub(crate) fn new(
+        support: &Support<T, D>,
+        mass_of_cell: T,
+        is_affine: bool,
+        reprojects: bool,
+    ) -> Self {
         let none = ProductShape { on_axis: OnAxis::Hat, l: SVector::zeros() };
         let mut own = Self {
             sums: Vec::new(),
@@ -80,12 +88,16 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             values: CornerValues::none(),
             reprojects,
             reprojected: CornerValues::none(),
+            extension: None,
             stresses: Vec::new(),
             at_nodes: Support::Product(none),
             buffers: BufferPool::new(),
         };
         if let Support::Mesh(corners) = support {
             own.at_nodes = Support::Product(corners.at_corner);
+            let is_extended =
+                !corners.mesh.is_of_cells() && corners.at_corner.on_axis == OnAxis::Hat;
+            own.extension = is_extended.then(|| Extension::new(mass_of_cell));
             own.fit(corners);
         }
         own
@@ -140,15 +152,21 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
 
     /// Adds the sums at corners to the grid, and updates it.
     pub(crate) fn update_grid<S: NodeUpdate<T, D>>(
-        &self,
+        &mut self,
         update: &GridUpdate<'_, T, S, D>,
-        (c, corners): (&Constants<T, D>, &SharedCorners<T, D>),
+        corners: &SharedCorners<T, D>,
         bins: &mut Bins,
         nodes: &mut [Node<T, D>],
     ) {
-        update.p2g(bins, nodes, &|band, first, ids| {
-            self.to_grid(c, corners, (band, first), ids);
-        });
+        let mut extension = self.extension.take();
+        let add = |band: &mut [_], first: usize, ids: &[u32]| {
+            self.to_grid(update.c, corners, (band, first), ids);
+        };
+        match &mut extension {
+            Some(extension) => extension.p2g(update, bins, nodes, &add),
+            None => update.p2g(bins, nodes, &add),
+        }
+        self.extension = extension;
     }
 
     /// Adds the sums at the corners `ids` to the band of nodes that starts at node `first`.

@@ -58,7 +58,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
         exchange.load(corners, Some((body_force, time)));
-        exchange.update_grid(&update, (&c, corners), bins, nodes);
+        exchange.update_grid(&update, corners, bins, nodes);
     }
 
     /// G2P of this step, and P2G of the next one, which starts at `t_next`, to the corners.

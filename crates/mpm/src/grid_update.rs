@@ -31,8 +31,13 @@ pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
         node.add(mirrored);
     }
 
-    /// Updates some nodes, of which the first has the index `first`.
-    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], first: usize);
+    /// Updates some nodes.
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]);
+
+    /// Whether masses are among the sums.
+    fn brings_mass(self) -> bool {
+        true
+    }
 
     /// Applies a wall across `axis` to a node on it.
     #[inline(always)]
@@ -89,7 +94,7 @@ pub(crate) struct VelocityAndAcceleration<T> {
 
 impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for VelocityAndAcceleration<T> {
     #[inline(always)]
-    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]) {
         for node in nodes {
             let inverse = c.inverse_mass(node);
             for a in 0..D {
@@ -107,7 +112,7 @@ pub(crate) struct Velocity;
 
 impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Velocity {
     #[inline(always)]
-    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]) {
         for node in nodes {
             let inverse = c.inverse_mass(node);
             (0..D).for_each(|a| node.values[a] *= inverse);
@@ -127,13 +132,17 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Acceleration<T> {
     /// P2G of momentum left no force.
     fn clear(self, _: &mut [Node<T, D>]) {}
 
+    fn brings_mass(self) -> bool {
+        false
+    }
+
     #[inline(always)]
     fn add(self, node: &mut Node<T, D>, mirrored: &Node<T, D>) {
         node.add_acceleration(mirrored);
     }
 
     #[inline(always)]
-    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], _: usize) {
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]) {
         for node in nodes {
             let inverse = c.inverse_mass(node) * self.scale;
             for a in 0..D {
@@ -144,18 +153,16 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Acceleration<T> {
     }
 }
 
-/// Momentum of the updated particles to their velocity, by the masses that `nodes` have.
+/// Momentum of particles to their velocity, once more in a step.
 #[derive(Clone, Copy)]
-pub(crate) struct Reprojection<'a, T, const D: usize> {
-    pub(crate) nodes: &'a [Node<T, D>],
-}
+pub(crate) struct Reprojection;
 
-impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Reprojection<'_, T, D> {
+impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Reprojection {
     #[inline(always)]
-    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>], first: usize) {
-        for (new, node) in nodes.iter_mut().zip(self.nodes.get(first..).unwrap_or_default()) {
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]) {
+        for node in nodes {
             let inverse = c.inverse_mass(node);
-            new.values.iter_mut().for_each(|value| *value *= inverse);
+            node.values.iter_mut().for_each(|value| *value *= inverse);
         }
     }
 
@@ -165,11 +172,34 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Reprojection<'_, 
     }
 }
 
+/// The sums that another update begins with, of the body and its mirror images, and no update.
+#[derive(Clone, Copy)]
+pub(crate) struct Sums<S>(S);
+
+impl<T: RealField + Copy, S: NodeUpdate<T, D>, const D: usize> NodeUpdate<T, D> for Sums<S> {
+    fn clear(self, nodes: &mut [Node<T, D>]) {
+        self.0.clear(nodes);
+    }
+
+    #[inline(always)]
+    fn add(self, node: &mut Node<T, D>, mirrored: &Node<T, D>) {
+        self.0.add(node, mirrored);
+    }
+
+    fn update(self, _: &Constants<T, D>, _: &mut [Node<T, D>]) {}
+
+    /// Half of what reaches a node on a plane of symmetry comes from the mirror image.
+    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
+        let mirrored = node.flipped(Some(axis));
+        self.0.add(node, &mirrored);
+    }
+}
+
 /// The update of a grid, row by row.
 pub(crate) struct GridUpdate<'a, T, S, const D: usize> {
-    layout: &'a Layout<D>,
-    c: &'a Constants<T, D>,
-    update: S,
+    pub(crate) layout: &'a Layout<D>,
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) update: S,
     edges: [Edge; 2],
 }
 
@@ -194,6 +224,11 @@ where
     pub(crate) fn new(layout: &'a Layout<D>, c: &'a Constants<T, D>, update: S) -> Self {
         let edges = layout.edges().map(|rows| Edge { rows, is_updated: AtomicBool::new(false) });
         Self { layout, c, update, edges }
+    }
+
+    /// Without the update: nodes have the sums, ghost nodes the mirrored ones.
+    pub(crate) fn sums(&self) -> GridUpdate<'a, T, Sums<S>, D> {
+        GridUpdate::new(self.layout, self.c, Sums(self.update))
     }
 
     /// Calls `add` for every bin, as [`Bins::for_each`], and updates the nodes.
@@ -326,9 +361,14 @@ where
     }
 
     /// Updates the rows from row `first` of the grid on, after all contributions and folds.
-    fn complete(&self, nodes: &mut [Node<T, D>], first: usize) {
+    pub(crate) fn complete(&self, nodes: &mut [Node<T, D>], first: usize) {
+        self.update.update(self.c, nodes);
+        self.on_walls(nodes, first);
+    }
+
+    /// Applies walls to the rows from row `first` of the grid on, and sets the ghost nodes in these.
+    pub(crate) fn on_walls(&self, nodes: &mut [Node<T, D>], first: usize) {
         let &Self { layout, c, update, .. } = self;
-        update.update(c, nodes, (first - layout.first_row) * layout.row());
         layout.on_walls(first, nodes, |node, axis| update.on_wall(c, node, axis));
         layout.unfold_rows(nodes, &Node::flipped);
     }
@@ -360,7 +400,7 @@ mod tests {
         let mut expected = given(layout.nodes);
         let whole = GridUpdate::new(layout, c, update);
         layout.fold(&mut expected, |image, ghost, flip| whole.fold(image, ghost, flip));
-        update.update(c, &mut expected, 0);
+        update.update(c, &mut expected);
         layout.on_walls(0, &mut expected, |node, axis| update.on_wall(c, node, axis));
         layout.unfold(&mut expected, Node::flipped);
         for rows_at_once in [1, 7, 8, 16, layout.dims[D - 1]] {
@@ -392,7 +432,7 @@ mod tests {
             check(&layout, c, VelocityAndAcceleration { scale: 0.5, vectors });
             check(&layout, c, Acceleration { scale: 0.5, vectors });
         }
-        check(&layout, c, Reprojection { nodes: &given(layout.nodes) });
+        check(&layout, c, Reprojection);
     }
 
     #[test]

@@ -76,6 +76,7 @@ mod decomposition;
 mod directory;
 mod domain;
 mod error;
+mod extension;
 #[doc(hidden)]
 pub mod fault;
 mod forcing;

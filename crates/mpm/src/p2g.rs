@@ -101,12 +101,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL: P2G of the updated momenta, and from them the reprojected velocities, by the masses that the nodes have.
     pub(crate) fn p2g_updated_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, nodes, reprojected, exchange, .. } = self;
+        let Self { particles, constants, layout, bins, reprojected, exchange, .. } = self;
         let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, .. } = &*particles;
         let c = *constants;
-        let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
+        let update = GridUpdate::new(layout, &c, Reprojection);
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
         p2g.to_grid(&update, (bins, exchange, None), reprojected, &momenta(mass, v, affine));
     }
@@ -124,7 +124,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
         let at_corners = std::mem::replace(&mut exchange.values, CornerValues::none());
         let seen = support.seen(from, &at_corners);
-        let update = GridUpdate::new(layout, &c, Reprojection { nodes: &nodes[..] });
+        let update = GridUpdate::new(layout, &c, Reprojection);
         let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
         let set = |Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
                    _: &mut Copies<T, D>,
@@ -182,7 +182,7 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         };
         self.to_corners(corners, exchange, set);
         exchange.load(corners, loading);
-        exchange.update_grid(update, (self.c, corners), bins, nodes);
+        exchange.update_grid(update, corners, bins, nodes);
     }
 
     /// Sums what `set` says of each particle at its corners, chunk by chunk.

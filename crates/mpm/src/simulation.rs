@@ -456,6 +456,13 @@ fn allocate<T: Lanes, const D: usize>(
         Some(part) => part.least(least),
         None => least.unwrap_or(T::one()),
     };
+    let densities = mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume);
+    let density = densities.reduce(|least, density| least.min(density));
+    let density = match &part {
+        Some(part) => part.least(density),
+        None => density.unwrap_or(T::one()),
+    };
+    let mass_of_cell = density * grid.spacing.powi(D as i32);
     let uniform = mass.first().copied().zip(volume.first().copied()).filter(|(m, V)| {
         mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
     });
@@ -472,7 +479,12 @@ fn allocate<T: Lanes, const D: usize>(
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
         buffers: BufferPool::new(),
-        exchange: Exchange::new(&support, transfer.is_affine(), integrator.reprojects()),
+        exchange: Exchange::new(
+            &support,
+            mass_of_cell,
+            transfer.is_affine(),
+            integrator.reprojects(),
+        ),
         of_time: Vec::new(),
         affine: Vec::new(),
         particles,

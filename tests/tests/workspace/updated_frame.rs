@@ -11,8 +11,9 @@ fn converge(call: &str) -> serde_json::Value {
     json(&words)
 }
 
-fn local_orders(study: &serde_json::Value) -> Vec<f64> {
-    let orders = study["orders"]["u"]["linf"]["local"].as_array().unwrap();
+/// Of the largest error of a field.
+fn local_orders(study: &serde_json::Value, field: &str) -> Vec<f64> {
+    let orders = study["orders"][field]["linf"]["local"].as_array().unwrap();
     orders.iter().map(|order| order.as_f64().unwrap()).collect()
 }
 
@@ -28,7 +29,7 @@ fn fitted_quadrilaterals_are_of_second_order_with_free_surfaces() {
     for (error, reference) in errors.iter().zip([8.0e-3, 1.9e-3, 4.6e-4]) {
         assert!(error / 0.1 <= 2.0 * reference, "{error:e} {reference:e}");
     }
-    for order in local_orders(&study) {
+    for order in local_orders(&study, "u") {
         assert!((order - 2.0).abs() <= 0.1, "{order}");
     }
 }
@@ -54,24 +55,44 @@ fn every_scheme_has_its_order() {
         ("ring --shape cpdi2 --layout body-fitted --extent full --cells 16,32", 2.06, 2.6e-4),
     ] {
         let study = converge(call);
-        let found = local_orders(&study)[0];
+        let found = local_orders(&study, "u")[0];
         assert!((found - order).abs() <= 0.1, "{call}: {found}");
         let error = column(&study, &["errors", "u", "linf"])[1];
         assert!((error / finest - 1.0).abs() < 0.05, "{call}: {error:e}");
     }
 }
 
-/// Without stress between rim and grid: the quarter between planes of symmetry is the whole ring.
+/// Without stress between rim and grid: the quarter between planes of symmetry is the whole ring. Light nodes of a clipped one are
+/// extended across the planes.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn a_quarter_of_the_ring_moves_as_the_whole_does() {
-    let error = |extent: &str| {
-        let call = "run ring --shape cpdi2 --layout body-fitted --cells 16 --extent";
-        let words: Vec<_> = call.split(' ').chain([extent]).collect();
-        at(&json(&words), &["result", "errors", "F", "l2"])
-    };
-    let (quarter, full) = (error("quarter"), error("full"));
-    assert!((quarter / full - 1.0).abs() < 1e-9, "{quarter:e} {full:e}");
+    for scheme in ["--shape cpdi2 --layout body-fitted", "--layout clipped"] {
+        let error = |extent: &str| {
+            let call = format!("run ring {scheme} --cells 16 --extent {extent}");
+            at(&json(&call.split(' ').collect::<Vec<_>>()), &["result", "errors", "F", "l2"])
+        };
+        let (quarter, full) = (error("quarter"), error("full"));
+        assert!((quarter / full - 1.0).abs() < 1e-9, "{scheme}: {quarter:e} {full:e}");
+    }
+}
+
+/// The largest error of F lies at the rims, where it has the order of linear functions. Where light nodes were not extended it depended on
+/// how each grid cuts a rim: these had orders from -0.44 to 2.27, from 0.34 to 0.89 and from 0.61 to 0.88.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn deformation_gradients_at_clipped_rims_are_of_first_order_wherever_the_grid_cuts() {
+    for call in [
+        "ring --layout clipped --cells 72,80,90,100,112",
+        "ring-nu --layout clipped --cells 32,64,128",
+        "ring --layout clipped --periods 10 --cells 16,32,64",
+    ] {
+        let study = converge(call);
+        let orders = local_orders(&study, "F");
+        assert!(orders.iter().all(|order| (0.8..1.2).contains(order)), "{call}: {orders:?}");
+        let fit = at(&study, &["orders", "F", "l2", "fit"]);
+        assert!(fit > 1.4, "{call}: {fit}");
+    }
 }
 
 /// Errors in units of the amplitude on the finest grid, L_inf and L2 of u; both fall with order 2, wherever the grid lies.
@@ -80,7 +101,7 @@ fn a_quarter_of_the_ring_moves_as_the_whole_does() {
 fn clipped_lattices_are_of_second_order_with_free_and_loaded_surfaces() {
     for (call, linf, l2) in [
         ("ring --layout clipped --cells 32,64,128", 1.78e-4, 1.46e-4),
-        ("ring --layout clipped --precision f32 --cells 16,32,64", 6.9e-4, 5.9e-4),
+        ("ring --layout clipped --precision f32 --cells 16,32,64", 7.1e-4, 5.9e-4),
         ("ring --layout clipped --offset 0.37 --set A=0.05 --cells 16,32,64", 6.7e-4, 5.1e-4),
         (
             "ring --layout clipped --ppc 3 --set Ri=0.53 --set Ro=0.97 --cells 16,32,64",

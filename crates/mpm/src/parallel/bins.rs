@@ -185,6 +185,12 @@ impl Bins {
         self.ranks.clone()
     }
 
+    /// Whether other processes hold rows below and above those that this one holds.
+    pub(crate) fn are_others(&self) -> [bool; 2] {
+        let segments = self.held.segments();
+        [segments.start > 0, segments.end < self.held.all]
+    }
+
     /// Bin of every particle.
     pub(crate) fn bin_of(&self) -> &[u32] {
         &self.bin_of
