@@ -3,6 +3,7 @@
 //!
 //! It takes no more than data and material laws from the solver.
 
+mod polygons;
 #[cfg(test)]
 mod tests;
 mod weights;
@@ -12,7 +13,11 @@ use mmsmith_mpm::{
 };
 use nalgebra::{SMatrix, SVector};
 
+use polygons::{corners, has_polygons};
 use weights::{Entry, List, Nodes, determinant, domain, half_size, inverse, means};
+
+/// The share of a cell's mass below which a node is light.
+const LIGHT: f64 = 0.01;
 
 /// A vector at every node.
 type Field<const D: usize> = Vec<SVector<f64, D>>;
@@ -35,6 +40,8 @@ pub(crate) struct Reference<const D: usize> {
     particles: Vec<List<D>>,
     corners: Vec<List<D>>,
     mass: Vec<f64>,
+    /// Polygons with hat functions: the nodes that next to nothing reaches, and the inner ones whose values they continue.
+    light: Vec<(usize, Vec<(usize, f64)>)>,
 }
 
 impl<const D: usize> Reference<D>
@@ -48,7 +55,7 @@ where
         material: Material<f64>,
         settings: Settings<f64>,
     ) -> Self {
-        if settings.shape != Shape::Cpdi2 {
+        if settings.shape != Shape::Cpdi2 && !has_polygons(body.mesh.as_ref()) {
             // Nothing would move it.
             body.mesh = None;
         }
@@ -63,6 +70,7 @@ where
             particles: Vec::new(),
             corners: Vec::new(),
             mass: Vec::new(),
+            light: Vec::new(),
         };
         if settings.transfer == Transfer::Apic {
             // At the start the affine parts are those of the particles' velocities on the grid.
@@ -114,6 +122,11 @@ where
         &self.body
     }
 
+    /// The number of nodes that continue others, in the last step.
+    pub(crate) fn light(&self) -> usize {
+        self.light.len()
+    }
+
     /// The particles at the current time; with centred differences their velocities lag by half a step.
     pub(crate) fn particles(&self) -> &Particles<f64, D> {
         &self.body.particles
@@ -128,8 +141,10 @@ where
     fn p2g_mass(&mut self) {
         let (shape, body, places) = (self.settings.shape, &self.body, self.nodes.places());
         self.particles = (0..body.particles.len()).map(|p| self.nodes.of(shape, body, p)).collect();
-        let corners = body.mesh.iter().flat_map(|mesh| &mesh.x);
-        self.corners = corners.map(|x| self.nodes.hats(x)).collect();
+        let corners = body.mesh.iter().flat_map(|mesh| {
+            (0..mesh.x.len()).map(|corner| self.nodes.at_corner(shape, mesh, corner))
+        });
+        self.corners = corners.collect();
         let mass = &body.particles.mass;
         self.mass = vec![0.0; places.len()];
         for (list, m) in self.particles.iter().zip(mass) {
@@ -140,6 +155,17 @@ where
         // Less than this comes about by rounding alone.
         let least = mass.iter().copied().fold(f64::INFINITY, f64::min) * f64::EPSILON.powi(2);
         self.mass.iter_mut().filter(|mass| **mass <= least).for_each(|mass| *mass = 0.0);
+        if has_polygons(body.mesh.as_ref()) && shape == Shape::Cpdi2 {
+            assert!(self.grid.walls.iter().flatten().all(|wall| !wall), "mirror images have none");
+            let densities = mass.iter().zip(&body.particles.volume).map(|(m, V)| m / V);
+            let of_cell =
+                densities.fold(f64::INFINITY, f64::min) * self.grid.spacing.powi(D as i32);
+            self.light = self.nodes.light(&self.mass, LIGHT * of_cell);
+            for (node, inner) in &self.light {
+                let mass = self.mass[*node];
+                inner.iter().for_each(|(node, share)| self.mass[*node] += mass * share);
+            }
+        }
     }
 
     /// P2G of what each particle gives to its nodes, divided by the nodes' masses.
@@ -152,8 +178,15 @@ where
                 sums[place.node] += give(p, entry).component_mul(&place.signs);
             }
         }
+        for (node, inner) in &self.light {
+            let sum = sums[*node];
+            inner.iter().for_each(|(node, share)| sums[*node] += sum * *share);
+        }
         for (sum, &mass) in sums.iter_mut().zip(&self.mass) {
             *sum = if mass > 0.0 { *sum / mass } else { SVector::zeros() };
+        }
+        for (node, inner) in &self.light {
+            sums[*node] = inner.iter().map(|(node, share)| sums[*node] * *share).sum();
         }
         self.nodes.mirrored(&sums)
     }
@@ -214,7 +247,10 @@ where
     }
 
     fn affine_parts(&self, v: &Field<D>) -> Vec<SMatrix<f64, D, D>> {
-        self.particles.iter().map(|list| affine_part(self.settings.shape, list, v)).collect()
+        // That of a polygon is its gradient.
+        let is_gradient =
+            self.settings.shape == Shape::Linear || has_polygons(self.body.mesh.as_ref());
+        self.particles.iter().map(|list| affine_part(is_gradient, list, v)).collect()
     }
 
     /// Particles and corners move with the grid.
@@ -249,6 +285,9 @@ where
         let mut volumes = vec![determinant(F)];
         if let (Shape::Cpdi2, Some(corners)) = (shape, domain(shape, &self.body, p)) {
             volumes.push(means(&corners).1);
+        }
+        if let Some(mesh) = self.body.mesh.as_ref().filter(|mesh| has_polygons(Some(mesh))) {
+            volumes.push(corners(mesh, p).1);
         }
         let (lower, upper) = (self.grid.lower, self.grid.upper());
         let limit = HALF_SIZE_LIMIT * self.grid.spacing;
@@ -290,11 +329,11 @@ fn gradient<const D: usize>(list: &List<D>, field: &Field<D>) -> SMatrix<f64, D,
 /// The affine part of a field around a particle, `B I^-1` with `B = sum S v r^T` and `I = sum S r r^T`, r from the centre to the
 /// nodes. For hat functions at a point `I` may be singular; there it is the gradient.
 fn affine_part<const D: usize>(
-    shape: Shape,
+    is_gradient: bool,
     list: &List<D>,
     field: &Field<D>,
 ) -> SMatrix<f64, D, D> {
-    if shape == Shape::Linear {
+    if is_gradient {
         return gradient(list, field);
     }
     let centre = centre(list);

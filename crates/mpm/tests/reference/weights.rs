@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::Field;
-use mmsmith_mpm::{Body, Grid, Shape};
+use super::polygons::{Corner, corners, has_polygons};
+use mmsmith_mpm::{Body, Grid, Mesh, Shape};
 
 /// Layers of nodes beyond each face: boxes and domains reach two cells out of the grid, splines and hats from there on two more.
 const PAD: isize = 5;
@@ -56,6 +57,48 @@ impl<const D: usize> Nodes<D> {
 
     pub(super) fn places(&self) -> &[Place<D>] {
         &self.places
+    }
+
+    /// The values of light nodes: for each, the nearest inner nodes that it continues, with their shares.
+    ///
+    /// `masses` are those of all nodes. Of a pair of nodes along an axis either the light node itself counts, or the two next to it on one side
+    /// count 2 and -1; blocks of pairs are as near as they can be, and all of a kind count alike.
+    pub(super) fn light(&self, masses: &[f64], least: f64) -> Vec<(usize, Vec<(usize, f64)>)> {
+        const PAIRS: [[(isize, f64); 2]; 4] = [
+            [(0, 1.0), (1, 0.0)],
+            [(0, 1.0), (-1, 0.0)],
+            [(1, 2.0), (2, -1.0)],
+            [(-1, 2.0), (-2, -1.0)],
+        ];
+        let mut light = Vec::new();
+        for node in (0..masses.len()).filter(|node| masses[*node] > 0.0 && masses[*node] < least) {
+            let mut blocks = Vec::new();
+            for number in 0..4_usize.pow(D as u32) {
+                let pair = |a: usize| number / 4_usize.pow(a as u32) % 4;
+                let far = (0..D).filter(|a| pair(*a) >= 2).count();
+                let mut block = vec![(node as isize, 1.0)];
+                for a in 0..D {
+                    let stride: usize = (0..a).map(|a| self.layers(a)).product();
+                    let longer = block.iter().flat_map(|(node, share)| {
+                        PAIRS[pair(a)].map(|(off, own)| (node + off * stride as isize, share * own))
+                    });
+                    block = longer.collect();
+                }
+                let is_inner = |(node, _): &(isize, f64)| {
+                    usize::try_from(*node)
+                        .is_ok_and(|node| masses.get(node).is_some_and(|mass| *mass >= least))
+                };
+                if far > 0 && block.iter().all(is_inner) {
+                    blocks.push((far, block));
+                }
+            }
+            let Some(nearest) = blocks.iter().map(|(far, _)| *far).min() else { continue };
+            blocks.retain(|(far, _)| *far == nearest);
+            let part = 1.0 / blocks.len() as f64;
+            let shares = blocks.into_iter().flat_map(|(_, block)| block);
+            light.push((node, shares.map(|(node, share)| (node as usize, share * part)).collect()));
+        }
+        light
     }
 
     fn layers(&self, axis: usize) -> usize {
@@ -132,8 +175,30 @@ impl<const D: usize> Nodes<D> {
         self.product(Shape::Linear, x, &SVector::zeros())
     }
 
+    /// The nodes of a corner of `mesh`, which is a point: those of its hat functions, or splines. Gradients are in the axes of the grid.
+    pub(super) fn at_corner(&self, shape: Shape, mesh: &Mesh<f64, D>, corner: usize) -> List<D> {
+        let turn = mesh.turn.unwrap_or_else(SMatrix::identity);
+        let x = turn * mesh.x[corner];
+        let list = match shape {
+            Shape::Bspline2 | Shape::Bspline3 => self.product(shape, &x, &SVector::zeros()),
+            _ => self.hats(&x),
+        };
+        list.into_iter().map(|entry| Entry { x: turn.transpose() * entry.x, ..entry }).collect()
+    }
+
     /// The nodes of a particle.
     pub(super) fn of(&self, shape: Shape, body: &Body<f64, D>, p: usize) -> List<D> {
+        if let Some(mesh) = body.mesh.as_ref().filter(|mesh| has_polygons(Some(mesh))) {
+            let of_corner = |corner: Corner<D>| {
+                let at_corner = self.at_corner(shape, mesh, corner.number).into_iter();
+                at_corner.map(move |node| Entry {
+                    S: node.S * corner.w,
+                    G: corner.g * node.S,
+                    ..node
+                })
+            };
+            return corners(mesh, p).0.into_iter().flat_map(of_corner).collect();
+        }
         let Some(corners) = domain(shape, body, p) else {
             let l = half_size(shape, body, p).map(|l| l.max(SMALLEST * self.grid.spacing));
             return self.product(shape, &body.particles.x[p], &l);
@@ -213,7 +278,7 @@ pub(super) fn domain<const D: usize>(
             };
             Some(SIGNS[..1 << D].iter().map(corner).collect())
         }
-        (Shape::Cpdi2, Some(mesh)) => {
+        (Shape::Cpdi2, Some(mesh)) if !has_polygons(Some(mesh)) => {
             Some(mesh.of_particle(p).iter().map(|&k| mesh.x[k as usize]).collect())
         }
         _ => None,

@@ -249,7 +249,7 @@ impl<const D: usize> BodyForce<f64, D> for Force {
 }
 
 /// The largest difference of two fields.
-fn difference<const R: usize, const C: usize>(
+pub(crate) fn difference<const R: usize, const C: usize>(
     one: &[SMatrix<f64, R, C>],
     two: &[SMatrix<f64, R, C>],
 ) -> f64 {
