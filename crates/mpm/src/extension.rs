@@ -8,8 +8,8 @@
 //! m_J += sum_I E_IJ m_I,  momentum and force likewise;   grid update of J;   v_I = sum_J E_IJ v_J,  a_I likewise
 //! ```
 //!
-//! The function of `J` is then `N_J + sum_I E_IJ N_I`. `sum_J E_IJ = 1` and `sum_J E_IJ x_J = x_I`, so that mass, momentum and angular
-//! momentum stay as they are, and linear fields too.
+//! The function of `J` is then `N_J + sum_I E_IJ N_I`. `sum_J E_IJ = 1` and `sum_J E_IJ x_J = x_I`: linear functions are continued as such, and
+//! mass, momentum and angular momentum stay as they are.
 //!
 //! Sources: Höllig, Reif and Wipper, SIAM J. Numer. Anal. 39 (2001) 442-462, equations (9) and (10), for the functions; Yamaguchi, Moriguchi
 //! and Terada, IJNME 122 (2021) 1576-1603, for the material point method.

@@ -1,4 +1,7 @@
+use std::collections::BTreeMap;
+
 use super::*;
+use mmsmith_mpm::{Clip, Side};
 
 const SHAPES: [Shape; 7] = [
     Shape::Linear,
@@ -216,4 +219,42 @@ fn an_error_names_the_particle() {
     scene.body.particles.v[5][0] = 1e6;
     let error = scene.step(&mmsmith_mpm::NoBodyForce).unwrap_err();
     assert!(error.starts_with("particle "), "{error}");
+}
+
+/// What light nodes of a clipped body continue is linear: shares sum to 1, and to the light node's place.
+#[test]
+fn light_nodes_continue_linear_functions() {
+    fn check<const D: usize>(radius: f64)
+    where
+        f64: Scalar<D>,
+    {
+        let (lower, walls) = (SVector::repeat(-1.5), [[false; 2]; D]);
+        let grid = Grid { lower, spacing: 0.25, cells: [12; D], walls };
+        let clip = Clip { sides: vec![Side::Outer { radius }], turn: [1.0, 0.0], offset: 0.1 };
+        let (body, _) =
+            Body::clipped(&grid, 2, 2.0, &clip).expect("a body of more than one dimension");
+        let settings = Settings {
+            shape: Shape::Cpdi2,
+            integrator: Integrator::Cd,
+            transfer: Transfer::Flip,
+            time_step: 1e-3,
+            halve_first_acceleration: false,
+        };
+        let material = Material::NeoHookean { lambda: 3.0, mu: 2.0 };
+        let mut reference = Reference::new(grid, body, material, settings);
+        reference.p2g_mass();
+        assert!(reference.light() > 3, "{}", reference.light());
+        let entries = reference.particles.iter().flatten();
+        let places: BTreeMap<usize, SVector<f64, D>> =
+            entries.map(|entry| (entry.node, entry.x)).collect();
+        for (node, inner) in &reference.light {
+            let sum: f64 = inner.iter().map(|(_, share)| share).sum();
+            let mean: SVector<f64, D> =
+                inner.iter().map(|(node, share)| places[node] * *share).sum();
+            assert!((sum - 1.0).abs() < 1e-14, "{sum}");
+            assert!((mean - places[node]).norm() < 1e-14, "{mean:?} {:?}", places[node]);
+        }
+    }
+    check::<2>(1.02);
+    check::<3>(1.03);
 }
