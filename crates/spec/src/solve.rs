@@ -10,7 +10,7 @@ mod factored;
 mod given_values;
 mod polynomial;
 
-use self::factored::{Along, Solution, factored, product_of_distances};
+use self::factored::{Along, Joined, Solution};
 use self::polynomial::{Fraction, Polynomial};
 use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
@@ -599,22 +599,22 @@ impl<'a> Solver<'a> {
     /// A component of the displacement with its unknowns put in, where the conditions hold at places along one coordinate and
     /// digits are to be kept between them.
     fn factored(&mut self, component: Expr, solution: &Solution) -> Option<Expr> {
-        let (unknowns, along) = (self.symbols(), along(&self.places, &self.variables)?);
-        factored(&mut self.graph, component, &unknowns, solution, &along)
+        self.joined(component, solution)?.formed()
     }
 
     /// The derivative of a component along that coordinate, in such a form.
     fn slope(&mut self, component: Expr, solution: &Solution) -> Option<Slope> {
-        let (unknowns, along) = (self.symbols(), along(&self.places, &self.variables)?);
-        let coordinate = along.coordinate;
+        let coordinate = along(&self.places, &self.variables)?.coordinate;
         let slope = Derivatives::limited().of(&mut self.graph, component, coordinate);
-        let slope = product_of_distances(&mut self.graph, slope, &unknowns, solution, &along)?;
+        let slope = self.joined(slope, solution)?.product_of_distances()?;
         Some(Slope { component, coordinate, slope })
     }
 
-    /// The unknowns.
-    fn symbols(&self) -> Vec<Expr> {
-        self.unknowns.iter().map(|(_, symbol)| *symbol).collect()
+    /// A component or a slope with its unknowns put in, over one denominator.
+    fn joined(&mut self, expr: Expr, solution: &Solution) -> Option<Joined<'_>> {
+        let unknowns: Vec<Expr> = self.unknowns.iter().map(|(_, symbol)| *symbol).collect();
+        let along = along(&self.places, &self.variables)?;
+        Joined::new(&mut self.graph, expr, &unknowns, solution, &along)
     }
 
     fn shown(&self, expr: Expr) -> String {

@@ -44,33 +44,8 @@ struct Part {
     changing: Expr,
 }
 
-/// `displacement` with the values of its unknowns; `None` where it is no polynomial in the coordinate and its inverse with
-/// unknowns as coefficients, or where no form is gained.
-pub(super) fn factored(
-    graph: &mut Graph,
-    displacement: Expr,
-    unknowns: &[Expr],
-    solution: &Solution,
-    along: &Along<'_>,
-) -> Option<Expr> {
-    Joined::new(graph, displacement, unknowns, solution, along)?.formed()
-}
-
-/// The same of the derivative `slope` of a displacement, where all that changes along the coordinate are distances from places: no terms
-/// cancel then.
-pub(super) fn product_of_distances(
-    graph: &mut Graph,
-    slope: Expr,
-    unknowns: &[Expr],
-    solution: &Solution,
-    along: &Along<'_>,
-) -> Option<Expr> {
-    let joined = Joined::new(graph, slope, unknowns, solution, along)?;
-    joined.is_product_of_distances().then(|| joined.formed()).flatten()
-}
-
-/// A displacement over one denominator.
-struct Joined<'a> {
+/// A displacement, or its slope, over one denominator.
+pub(super) struct Joined<'a> {
     form: Form<'a>,
     /// The power of the coordinate that is set apart.
     least: i64,
@@ -80,7 +55,9 @@ struct Joined<'a> {
 }
 
 impl<'a> Joined<'a> {
-    fn new(
+    /// `displacement` with the values of its unknowns; `None` where it is no polynomial in the coordinate and its inverse with unknowns
+    /// as coefficients.
+    pub(super) fn new(
         graph: &'a mut Graph,
         displacement: Expr,
         unknowns: &[Expr],
@@ -147,7 +124,13 @@ impl<'a> Joined<'a> {
         form.roots().into_iter().fold(numerator.clone(), without).degree(form.coordinate) == 0
     }
 
-    fn formed(self) -> Option<Expr> {
+    /// The factored form, where all that changes along the coordinate are distances from places: no terms cancel then.
+    pub(super) fn product_of_distances(self) -> Option<Expr> {
+        self.is_product_of_distances().then(|| self.formed()).flatten()
+    }
+
+    /// The factored form; `None` where nothing is gained by it.
+    pub(super) fn formed(self) -> Option<Expr> {
         let Self { mut form, least, numerators, denominator } = self;
         let differences = form.differences();
         let shifts = form.shifts()?;
