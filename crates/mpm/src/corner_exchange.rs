@@ -72,7 +72,8 @@ impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
 }
 
 impl<T: Lanes, const D: usize> Exchange<T, D> {
-    /// For grid cells that have the mass `mass_of_cell` inside of the body. Reserves all memory that a support needs for it: none where particles share no corners that pass on what they give.
+    /// For grid cells that have the mass `mass_of_cell` inside of the body. Reserves all memory that a support needs for it: none where
+    /// particles share no corners that pass on what they give.
     pub(crate) fn new(
         support: &Support<T, D>,
         mass_of_cell: T,

@@ -16,13 +16,12 @@
 
 use std::ops::Range;
 
-use bytemuck::{cast_slice, cast_slice_mut};
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
 use crate::geometry::Constants;
 use crate::grid::Layout;
-use crate::grid_update::{GridUpdate, NodeUpdate};
+use crate::grid_update::{GridUpdate, NodeUpdate, receive_nodes, send_nodes};
 use crate::node::Node;
 use crate::parallel::bins::{AddToBand, Bins};
 use crate::parallel::chunks::each_chunk;
@@ -150,29 +149,20 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
         inner.clear();
         for node in found {
             let at: [usize; D] = std::array::from_fn(|a| node / layout.strides[a] % dims[a]);
-            let start = inner.len();
-            for far in 1..=D {
-                let mut blocks = 0;
-                for block in blocks_of::<D>().filter(|block| block.far() == far) {
-                    let nodes = block.nodes((&at, &dims), &layout.strides);
-                    let Some(nodes) =
-                        nodes.filter(|nodes| nodes.clone().all(|(node, _)| is_inner(node)))
-                    else {
-                        continue;
-                    };
-                    blocks += 1;
-                    let nodes = nodes.filter(|(_, share)| *share != 0);
-                    inner.extend(
-                        nodes.map(|(node, share)| Inner { node, share: real(share.into()) }),
-                    );
-                }
-                if blocks > 0 {
-                    let part = real::<T>(1.0 / f64::from(blocks));
-                    inner[start..].iter_mut().for_each(|inner| inner.share *= part);
-                    light.push(Light { node, inner: start..inner.len() });
-                    break;
-                }
-            }
+            let blocks = |far: usize| -> Vec<_> {
+                let blocks = blocks_of::<D>().filter(|block| block.far() == far);
+                let nodes = blocks.filter_map(|block| block.nodes((&at, &dims), &layout.strides));
+                nodes.filter(|nodes| nodes.clone().all(|(node, _)| is_inner(node))).collect()
+            };
+            let Some(blocks) = (1..=D).map(blocks).find(|blocks| !blocks.is_empty()) else {
+                continue;
+            };
+            let (start, part) = (inner.len(), real::<T>(1.0 / blocks.len() as f64));
+            let nodes = blocks.into_iter().flatten().filter(|(_, share)| *share != 0);
+            inner.extend(
+                nodes.map(|(node, share)| Inner { node, share: real::<T>(share.into()) * part }),
+            );
+            light.push(Light { node, inner: start..inner.len() });
         }
     }
 }
@@ -189,33 +179,21 @@ fn pad<T: Lanes, const D: usize>(
     padded.resize(low, Node::zero());
     padded.extend_from_slice(nodes);
     padded.resize(low + nodes.len() + high, Node::zero());
-    let numbers = 2 * D + 1;
-    let send = |to: usize, nodes: &[Node<T, D>]| {
-        let sent: Vec<T> = nodes.iter().flat_map(|node| node.numbers().iter().copied()).collect();
-        ranks.send(to, cast_slice(&sent));
-    };
-    let receive = |from: usize, nodes: &mut [Node<T, D>]| {
-        let mut received = vec![T::zero(); nodes.len() * numbers];
-        ranks.receive(from, cast_slice_mut(&mut received));
-        for (node, received) in nodes.iter_mut().zip(received.chunks(numbers)) {
-            node.values[..numbers].copy_from_slice(received);
-        }
-    };
     // Neighbours have the first rows here and the last ones, too, so that what they lack comes next. A process has the rows of two bins
     // at least.
     let rank = ranks.rank();
     if below {
-        send(rank - 1, &nodes[count..2 * count]);
+        send_nodes(ranks, rank - 1, &nodes[count..2 * count]);
     }
     if above {
         let end = nodes.len() - count;
-        send(rank + 1, &nodes[end - count..end]);
+        send_nodes(ranks, rank + 1, &nodes[end - count..end]);
     }
     if below {
-        receive(rank - 1, &mut padded[..low]);
+        receive_nodes(ranks, rank - 1, &mut padded[..low]);
     }
     if above {
-        receive(rank + 1, &mut padded[low + nodes.len()..]);
+        receive_nodes(ranks, rank + 1, &mut padded[low + nodes.len()..]);
     }
 }
 

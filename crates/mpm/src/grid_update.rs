@@ -278,19 +278,8 @@ where
             true => ranks.rank() - 1,
             false => ranks.rank() + 1,
         };
-        let send = |shared, nodes: &[Node<T, D>]| {
-            let mut numbers = Vec::with_capacity(nodes.len() * (2 * D + 1));
-            nodes.iter().for_each(|node| numbers.extend_from_slice(node.numbers()));
-            ranks.send(neighbour(shared), cast_slice(&numbers));
-        };
-        let receive = |shared, nodes: &mut [Node<T, D>]| {
-            let mut numbers = vec![T::zero(); nodes.len() * (2 * D + 1)];
-            ranks.receive(neighbour(shared), cast_slice_mut(&mut numbers));
-            for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(2 * D + 1)) {
-                *node = Node::zero();
-                node.values[..=2 * D].copy_from_slice(numbers);
-            }
-        };
+        let send = |shared, nodes: &[_]| send_nodes(ranks, neighbour(shared), nodes);
+        let receive = |shared, nodes: &mut [_]| receive_nodes(ranks, neighbour(shared), nodes);
         let finish = |nodes: &mut [_]| self.finish(nodes);
         let has_arrived = |shared| ranks.has_arrived(neighbour(shared));
         // Rows of an edge are updated with all of it.
@@ -371,6 +360,31 @@ where
         let &Self { layout, c, update, .. } = self;
         layout.on_walls(first, nodes, |node, axis| update.on_wall(c, node, axis));
         layout.unfold_rows(nodes, &Node::flipped);
+    }
+}
+
+/// Sends nodes to a process.
+pub(crate) fn send_nodes<T: RealField + Pod, const D: usize>(
+    ranks: &dyn Ranks,
+    to: usize,
+    nodes: &[Node<T, D>],
+) {
+    let mut numbers = Vec::with_capacity(nodes.len() * (2 * D + 1));
+    nodes.iter().for_each(|node| numbers.extend_from_slice(node.numbers()));
+    ranks.send(to, cast_slice(&numbers));
+}
+
+/// Receives as many nodes from a process.
+pub(crate) fn receive_nodes<T: RealField + Pod, const D: usize>(
+    ranks: &dyn Ranks,
+    from: usize,
+    nodes: &mut [Node<T, D>],
+) {
+    let mut numbers = vec![T::zero(); nodes.len() * (2 * D + 1)];
+    ranks.receive(from, cast_slice_mut(&mut numbers));
+    for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(2 * D + 1)) {
+        *node = Node::zero();
+        node.values[..=2 * D].copy_from_slice(numbers);
     }
 }
 

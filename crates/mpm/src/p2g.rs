@@ -99,7 +99,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
     }
 
-    /// MUSL: P2G of the updated momenta, and from them the reprojected velocities, by the masses that the nodes have.
+    /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
     pub(crate) fn p2g_updated_momentum(&mut self) {
         let Self { particles, constants, layout, bins, reprojected, exchange, .. } = self;
         let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);

@@ -451,17 +451,15 @@ fn allocate<T: Lanes, const D: usize>(
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
     let Particles { mass, volume, .. } = &particles;
-    let least = mass.iter().copied().reduce(|least, m| least.min(m));
-    let least = match &part {
-        Some(part) => part.least(least),
-        None => least.unwrap_or(T::one()),
+    let least = |numbers: &mut dyn Iterator<Item = T>| {
+        let least = numbers.reduce(|least, number| least.min(number));
+        match &part {
+            Some(part) => part.least(least),
+            None => least.unwrap_or(T::one()),
+        }
     };
-    let densities = mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume);
-    let density = densities.reduce(|least, density| least.min(density));
-    let density = match &part {
-        Some(part) => part.least(density),
-        None => density.unwrap_or(T::one()),
-    };
+    let least_mass = least(&mut mass.iter().copied());
+    let density = least(&mut mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume));
     let mass_of_cell = density * grid.spacing.powi(D as i32);
     let uniform = mass.first().copied().zip(volume.first().copied()).filter(|(m, V)| {
         mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
@@ -471,7 +469,7 @@ fn allocate<T: Lanes, const D: usize>(
         uniform,
         part,
         keeps_F_early: early,
-        constants: Constants::new(grid, &layout, &bins, settings.time_step, least),
+        constants: Constants::new(grid, &layout, &bins, settings.time_step, least_mass),
         nodes: now,
         F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
         reprojected,

@@ -13,7 +13,7 @@ use mmsmith_mpm::{
 };
 use nalgebra::{SMatrix, SVector};
 
-use polygons::{corners, has_polygons};
+use polygons::{corners, polygons};
 use weights::{Entry, List, Nodes, determinant, domain, half_size, inverse, means};
 
 /// The share of a cell's mass below which a node is light.
@@ -55,7 +55,7 @@ where
         material: Material<f64>,
         settings: Settings<f64>,
     ) -> Self {
-        if settings.shape != Shape::Cpdi2 && !has_polygons(body.mesh.as_ref()) {
+        if settings.shape != Shape::Cpdi2 && polygons(&body).is_none() {
             // Nothing would move it.
             body.mesh = None;
         }
@@ -155,7 +155,7 @@ where
         // Less than this comes about by rounding alone.
         let least = mass.iter().copied().fold(f64::INFINITY, f64::min) * f64::EPSILON.powi(2);
         self.mass.iter_mut().filter(|mass| **mass <= least).for_each(|mass| *mass = 0.0);
-        if has_polygons(body.mesh.as_ref()) && shape == Shape::Cpdi2 {
+        if polygons(body).is_some() && shape == Shape::Cpdi2 {
             assert!(self.grid.walls.iter().flatten().all(|wall| !wall), "mirror images have none");
             let densities = mass.iter().zip(&body.particles.volume).map(|(m, V)| m / V);
             let of_cell =
@@ -248,8 +248,7 @@ where
 
     fn affine_parts(&self, v: &Field<D>) -> Vec<SMatrix<f64, D, D>> {
         // That of a polygon is its gradient.
-        let is_gradient =
-            self.settings.shape == Shape::Linear || has_polygons(self.body.mesh.as_ref());
+        let is_gradient = self.settings.shape == Shape::Linear || polygons(&self.body).is_some();
         self.particles.iter().map(|list| affine_part(is_gradient, list, v)).collect()
     }
 
@@ -286,7 +285,7 @@ where
         if let (Shape::Cpdi2, Some(corners)) = (shape, domain(shape, &self.body, p)) {
             volumes.push(means(&corners).1);
         }
-        if let Some(mesh) = self.body.mesh.as_ref().filter(|mesh| has_polygons(Some(mesh))) {
+        if let Some(mesh) = polygons(&self.body) {
             volumes.push(corners(mesh, p).1);
         }
         let (lower, upper) = (self.grid.lower, self.grid.upper());

@@ -1,6 +1,6 @@
 //! Polygons and polyhedra: what their corners' values are worth in means over them.
 
-use mmsmith_mpm::{Interpolation, Mesh};
+use mmsmith_mpm::{Body, Interpolation, Mesh};
 use nalgebra::SVector;
 
 /// A corner of a particle: its number, the weight of its value in the mean over the particle, and its gradient in the mean gradient.
@@ -10,9 +10,9 @@ pub(super) struct Corner<const D: usize> {
     pub(super) g: SVector<f64, D>,
 }
 
-/// Whether particles are polygons or polyhedra.
-pub(super) fn has_polygons<const D: usize>(mesh: Option<&Mesh<f64, D>>) -> bool {
-    mesh.is_some_and(|mesh| mesh.interpolation == Interpolation::Triangles)
+/// The polygons or polyhedra that particles are, where they are such.
+pub(super) fn polygons<const D: usize>(body: &Body<f64, D>) -> Option<&Mesh<f64, D>> {
+    body.mesh.as_ref().filter(|mesh| mesh.interpolation == Interpolation::Triangles)
 }
 
 /// A simplex between corners of a polygon or polyhedron, in which the rest of its corners are means of others.

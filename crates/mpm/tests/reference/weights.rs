@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::Field;
-use super::polygons::{Corner, corners, has_polygons};
+use super::polygons::{Corner, corners, polygons};
 use mmsmith_mpm::{Body, Grid, Mesh, Shape};
 
 /// Layers of nodes beyond each face: boxes and domains reach two cells out of the grid, splines and hats from there on two more.
@@ -188,7 +188,7 @@ impl<const D: usize> Nodes<D> {
 
     /// The nodes of a particle.
     pub(super) fn of(&self, shape: Shape, body: &Body<f64, D>, p: usize) -> List<D> {
-        if let Some(mesh) = body.mesh.as_ref().filter(|mesh| has_polygons(Some(mesh))) {
+        if let Some(mesh) = polygons(body) {
             let of_corner = |corner: Corner<D>| {
                 let at_corner = self.at_corner(shape, mesh, corner.number).into_iter();
                 at_corner.map(move |node| Entry {
@@ -278,7 +278,7 @@ pub(super) fn domain<const D: usize>(
             };
             Some(SIGNS[..1 << D].iter().map(corner).collect())
         }
-        (Shape::Cpdi2, Some(mesh)) if !has_polygons(Some(mesh)) => {
+        (Shape::Cpdi2, Some(mesh)) if polygons(body).is_none() => {
             Some(mesh.of_particle(p).iter().map(|&k| mesh.x[k as usize]).collect())
         }
         _ => None,
