@@ -6,12 +6,11 @@
 //! S_i = H_0 / 2^D,  G_i = sum_a g_a H_a,  g = E^-T / 2^D;   H_0 = sum_c N_i(x_c),  H_a = sum_c s_a N_i(x_c)
 //! ```
 //!
-//! The sums `H` are computed for eight particles at once. Most domains lie within two cells along each axis, and reach 3 nodes; the others
-//! go from corner to corner, one particle at a time.
+//! P2G computes the sums `H` for eight particles at once. Most domains lie within two cells along each axis, and reach 3 nodes; the others
+//! go from corner to corner, one particle at a time. G2P has the same sums over corners, `sum_i v_i H_a = sum_c s_a v(x_c)`, of the
+//! values `v(x_c) = sum_i v_i N_i(x_c)` there.
 
 use std::array;
-
-use nalgebra::SMatrix;
 
 use crate::domain::{
     HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, deformed, inverse, is_upper,
@@ -22,8 +21,8 @@ use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::node::Node;
 use crate::shape_function::{index, node_below};
-use crate::simd::{Eight, Lane8, Lanes, Loop, Number, Vectors, dispatch};
-use crate::tensor::{product, real};
+use crate::simd::{Eight, Lane8, Lanes, Loop, Vectors, dispatch};
+use crate::tensor::real;
 
 /// One number for every particle of a block, `[group].0[n]`; aligned with vector registers.
 type PerParticle<T> = [Lane8<T>; BLOCK / GROUP];
@@ -50,8 +49,8 @@ pub(crate) struct Parallelograms<T, const D: usize> {
     g: [[PerParticle<T>; D]; D],
     /// The centre; valid where `is_affine`.
     centre: [PerParticle<T>; D],
-    /// The inverse of the inertia `sum S arm arm` about the centre; valid where `is_affine`.
-    inverse_inertia: [[PerParticle<T>; D]; D],
+    /// The half-edges; valid where `is_affine`.
+    E: [[PerParticle<T>; D]; D],
 }
 
 impl<T: Lanes, const D: usize> Parallelograms<T, D> {
@@ -64,7 +63,7 @@ impl<T: Lanes, const D: usize> Parallelograms<T, D> {
             at: [[zero; D]; MOST_CORNERS],
             g: [[zero; D]; D],
             centre: [zero; D],
-            inverse_inertia: [[zero; D]; D],
+            E: [[zero; D]; D],
         }
     }
 
@@ -113,42 +112,13 @@ impl<T: Lanes, const D: usize> Parallelograms<T, D> {
             self.is_small[group * GROUP + n] = reach.0[n] <= real(2.0);
         }
         if self.is_affine {
-            let inverse = inverse(&inertia(E, &at));
             for a in 0..D {
-                for b in 0..D {
-                    store(&mut self.inverse_inertia[a][b], group, inverse[a][b]);
+                for edge in 0..D {
+                    store(&mut self.E[a][edge], group, E[a][edge]);
                 }
             }
         }
     }
-}
-
-/// The inertia `sum S arm arm` about the centres, in cells: of the corners its own, `E E^T`, and that of the hat functions around each.
-#[inline(always)]
-fn inertia<T: Lanes, V: Vectors, const D: usize>(
-    E: &[[Eight<T, V>; D]; D],
-    at: &[[Eight<T, V>; D]; MOST_CORNERS],
-) -> [[Eight<T, V>; D]; D] {
-    let (zero, one) = (E[0][0].constant(0.0), E[0][0].constant(1.0));
-    let share = zero.constant(1.0 / f64::from(1 << D));
-    let mut inertia = [[zero; D]; D];
-    for a in 0..D {
-        for corner in &at[..1 << D] {
-            let mut place = corner[a];
-            for n in 0..GROUP {
-                place.lanes.0[n] -= place.lanes.0[n].floor();
-            }
-            inertia[a][a] = inertia[a][a] + share * (place * (one - place));
-        }
-    }
-    for a in 0..D {
-        for b in 0..D {
-            for edge in 0..D {
-                inertia[a][b] = inertia[a][b] + E[a][edge] * E[b][edge];
-            }
-        }
-    }
-    inertia
 }
 
 /// The weights of a block of particles, and a buffer for those of a group.
@@ -198,8 +168,7 @@ impl<T: Lanes, const D: usize> ParallelogramWeights<T, D> {
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
     ) {
-        let Self { own, of_group: weights } = self;
-        let of_block = G2pOfBlock { own, weights, strides, nodes, receiver };
+        let of_block = G2pOfBlock { own: &self.own, strides, nodes, receiver };
         if of_block.own.is_affine {
             dispatch(G2p::<_, D, true>(of_block));
         } else {
@@ -298,6 +267,18 @@ struct GroupWeights<T, const D: usize> {
     hats: [[[Lane8<T>; REACHED]; D]; MOST_CORNERS],
     /// Their products over the axes from 1 on, for a row of nodes.
     of_row: [Lane8<T>; MOST_CORNERS],
+    /// The rows of nodes along axis 0 that the group reaches, and how many.
+    rows: [Row; MOST_REACHED / REACHED],
+    row_count: usize,
+}
+
+/// A row of nodes along axis 0.
+#[derive(Clone, Copy)]
+struct Row {
+    /// Where it begins, from the first node of a particle on.
+    start: usize,
+    /// Its place along each axis.
+    place: [usize; 3],
 }
 
 impl<T: Lanes, const D: usize> GroupWeights<T, D> {
@@ -310,11 +291,19 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
             reached: [REACHED; D],
             hats: [[[zero; REACHED]; D]; MOST_CORNERS],
             of_row: [zero; MOST_CORNERS],
+            rows: [Row { start: 0, place: [0; 3] }; MOST_REACHED / REACHED],
+            row_count: 0,
         }
     }
 
     #[inline(always)]
-    fn compute<V: Vectors>(&mut self, vectors: V, own: &Parallelograms<T, D>, group: usize) {
+    fn compute<V: Vectors>(
+        &mut self,
+        vectors: V,
+        own: &Parallelograms<T, D>,
+        strides: &[usize; D],
+        group: usize,
+    ) {
         let (none, one) = (vectors.splat8(T::zero()), vectors.splat8(T::one()));
         let share = vectors.splat8(real(1.0 / f64::from(1 << D)));
         let mut reach = [none; D];
@@ -334,14 +323,26 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
             }
             self.reached[a] = if is_within_one { REACHED - 1 } else { REACHED };
         }
-        for row in 0..self.rows() {
-            let place = self.place(row);
+        // Along axis 1 and along axis 2; one where there is no such axis.
+        let [rows, layers] = [1, 2].map(|a| if a < D { self.reached[a] } else { 1 });
+        self.row_count = rows * layers;
+        for layer in 0..layers {
+            for row in 0..rows {
+                let mut start = 0;
+                for (a, place) in [(1, row), (2, layer)] {
+                    start += if a < D { place * strides[a] } else { 0 };
+                }
+                self.rows[layer * rows + row] = Row { start, place: [0, row, layer] };
+            }
+        }
+        for row in 0..self.row_count {
+            let Row { place, .. } = self.rows[row];
             for corner in 0..1 << D {
                 let hats = &self.hats[corner];
                 self.of_row[corner] = match D {
                     1 => one,
                     2 => hats[1][place[1]],
-                    _ => vectors.mul8(hats[1][place[1]], hats[D - 1][place[D - 1]]),
+                    _ => vectors.mul8(hats[1][place[1]], hats[D - 1][place[2]]),
                 };
             }
             for i in 0..REACHED {
@@ -351,57 +352,30 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
                     sums[corner] = vectors.mul8(self.of_row[corner], self.hats[corner][0][i]);
                 }
                 let node = row * REACHED + i;
-                // Sums and differences of pairs along one axis, then of their sums along the next.
                 for a in 0..D {
-                    let pairs = 1 << (D - 1 - a);
-                    let mut H = none;
-                    for pair in 0..pairs {
-                        let (lower, upper) = (sums[2 * pair], sums[2 * pair + 1]);
-                        let difference = vectors.sub8(upper, lower);
-                        H = if pair == 0 { difference } else { vectors.add8(H, difference) };
-                        sums[pair] = vectors.add8(lower, upper);
-                    }
-                    self.H[a][node] = H;
+                    self.H[a][node] = fold(vectors, &mut sums, 1 << (D - 1 - a));
                 }
                 self.S[node] = vectors.mul8(sums[0], share);
             }
         }
     }
+}
 
-    /// How many rows of nodes along axis 0 the group reaches.
-    #[inline(always)]
-    fn rows(&self) -> usize {
-        let mut rows = 1;
-        for a in 1..D {
-            rows *= self.reached[a];
-        }
-        rows
+/// Makes of so many pairs of values at corners, along the first axis that is left, their sums; gives the sum of their differences.
+#[inline(always)]
+fn fold<T: Lanes, V: Vectors>(
+    vectors: V,
+    values: &mut [Lane8<T>; MOST_CORNERS],
+    pairs: usize,
+) -> Lane8<T> {
+    let mut total = Lane8::zero();
+    for pair in 0..pairs {
+        let (lower, upper) = (values[2 * pair], values[2 * pair + 1]);
+        let difference = vectors.sub8(upper, lower);
+        total = if pair == 0 { difference } else { vectors.add8(total, difference) };
+        values[pair] = vectors.add8(lower, upper);
     }
-
-    /// The place of a row along each axis from 1 on.
-    #[inline(always)]
-    fn place(&self, row: usize) -> [usize; D] {
-        let mut place = [0; D];
-        if D == 2 {
-            place[1] = row;
-        }
-        if D == 3 {
-            let is_wide = self.reached[1] == REACHED;
-            place[1] = if is_wide { row % REACHED } else { row % (REACHED - 1) };
-            place[D - 1] = if is_wide { row / REACHED } else { row / (REACHED - 1) };
-        }
-        place
-    }
-
-    /// Where the row at a place begins, after the first node.
-    #[inline(always)]
-    fn start(strides: &[usize; D], place: &[usize; D]) -> usize {
-        let mut start = 0;
-        for a in 1..D {
-            start += place[a] * strides[a];
-        }
-        start
-    }
+    total
 }
 
 struct P2g<'a, T, const D: usize, const AFFINE: bool>(P2gOfBlock<'a, T, D>);
@@ -424,7 +398,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
         let P2gOfBlock { own, weights, strides, band, first, contributions, count } = self.0;
         let count = count.min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
-            weights.compute(vectors, own, group);
+            weights.compute(vectors, own, strides, group);
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
                 if !own.is_small[k] {
@@ -433,7 +407,8 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                 }
                 let value = vectors.load8(&contributions.value[k].values);
                 let mut fluxes = [Lane8::zero(); D];
-                let mut affine = [Lane8::zero(); D];
+                // What affine velocities add at each place along each axis.
+                let mut along = [[Lane8::zero(); REACHED]; D];
                 // What goes by `G_i` along the axes goes by `H_a` here.
                 for axis in 0..D {
                     let flux = contributions.slope_lanes(k, axis, false);
@@ -442,42 +417,39 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                         fluxes[a] = vectors.mul_add8(flux, g, fluxes[a]);
                     }
                     if AFFINE {
-                        affine[axis] = contributions.affine_lanes(k, axis);
+                        let affine = contributions.affine_lanes(k, axis);
+                        for (place, added) in along[axis].iter_mut().enumerate() {
+                            let arm = vectors.splat8(own.arm(k, axis, place));
+                            *added = vectors.mul8(affine, arm);
+                        }
                     }
                 }
                 let start = own.first_node[k] - first;
-                for row in 0..weights.rows() {
-                    let place = weights.place(row);
-                    let start = start + GroupWeights::<T, D>::start(strides, &place);
-                    let nodes = band.get_mut(start..).and_then(|n| n.first_chunk_mut::<REACHED>());
-                    let Some(nodes) = nodes else {
+                for row in 0..weights.row_count {
+                    let Row { start: from_first, place } = weights.rows[row];
+                    let nodes = band.get_mut(start + from_first..);
+                    let Some(nodes) = nodes.and_then(|n| n.first_chunk_mut::<REACHED>()) else {
                         debug_assert!(false, "a domain beyond its band");
                         return;
                     };
                     let mut of_row = value;
                     if AFFINE {
                         for a in 1..D {
-                            let arm = vectors.splat8(own.arm(k, a, place[a]));
-                            of_row = vectors.mul_add8(affine[a], arm, of_row);
+                            of_row = vectors.add8(of_row, along[a][place[a]]);
                         }
                     }
                     for (i, Node { values }) in nodes.iter_mut().enumerate() {
                         let node = row * REACHED + i;
-                        let mut sum = vectors.load8(values);
+                        let of_node =
+                            if AFFINE { vectors.add8(of_row, along[0][i]) } else { of_row };
+                        // The sum is needed last: that of the particle before is on its way through memory.
+                        let S = vectors.splat8(weights.S[node].0[n]);
+                        let mut given = vectors.mul8(of_node, S);
                         for a in 0..D {
                             let H = vectors.splat8(weights.H[a][node].0[n]);
-                            sum = vectors.mul_add8(fluxes[a], H, sum);
+                            given = vectors.mul_add8(fluxes[a], H, given);
                         }
-                        let mut of_node = of_row;
-                        if AFFINE {
-                            of_node = vectors.mul_add8(
-                                affine[0],
-                                vectors.splat8(own.arm(k, 0, i)),
-                                of_row,
-                            );
-                        }
-                        let S = vectors.splat8(weights.S[node].0[n]);
-                        *values = vectors.mul_add8(of_node, S, sum).0;
+                        *values = vectors.add8(vectors.load8(values), given).0;
                     }
                 }
             }
@@ -489,7 +461,6 @@ struct G2p<'a, T, const D: usize, const AFFINE: bool>(G2pOfBlock<'a, T, D>);
 
 struct G2pOfBlock<'a, T, const D: usize> {
     own: &'a Parallelograms<T, D>,
-    weights: &'a mut GroupWeights<T, D>,
     strides: &'a [usize; D],
     nodes: &'a [Node<T, D>],
     receiver: &'a mut [Interpolated<T, D>],
@@ -500,52 +471,192 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let G2pOfBlock { own, weights, strides, nodes, receiver } = self.0;
+        let G2pOfBlock { own, strides, nodes, receiver } = self.0;
         let count = receiver.len().min(BLOCK);
+        let mut cells = CellsOfCorners::zero();
         for group in 0..count.div_ceil(GROUP) {
-            weights.compute(vectors, own, group);
+            cells.take(vectors, own, strides, group);
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
-                if !own.is_small[k] {
-                    let sums = g2p_from_corners::<T, D, AFFINE>(own, strides, nodes, k);
-                    receiver[k] = sums.interpolated::<AFFINE>(own, k);
-                    continue;
-                }
-                let Sums { mut value, mut slopes, mut moments } = Sums::zero();
-                for row in 0..weights.rows() {
-                    let place = weights.place(row);
-                    let start = own.first_node[k] + GroupWeights::<T, D>::start(strides, &place);
-                    let nodes = nodes.get(start..).and_then(|n| n.first_chunk::<REACHED>());
-                    let Some(nodes) = nodes else {
+                let mut at_corners = [Lane8::zero(); MOST_CORNERS];
+                let mut moments = [Lane8::zero(); D];
+                for corner in 0..1 << D {
+                    let start = own.first_node[k] + cells.start[corner][n];
+                    let Some(values) = corners_of_cell(vectors, strides, nodes, start) else {
                         debug_assert!(false, "a domain beyond the grid");
                         return;
                     };
-                    let mut of_row = Lane8::zero();
-                    for (i, Node { values }) in nodes.iter().enumerate() {
-                        let node = row * REACHED + i;
-                        let nodal = vectors.load8(values);
-                        let weighted = vectors.mul8(nodal, vectors.splat8(weights.S[node].0[n]));
-                        of_row = if i == 0 { weighted } else { vectors.add8(of_row, weighted) };
-                        for a in 0..D {
-                            let H = vectors.splat8(weights.H[a][node].0[n]);
-                            slopes[a] = vectors.mul_add8(nodal, H, slopes[a]);
-                        }
-                        if AFFINE {
-                            let arm = vectors.splat8(own.arm(k, 0, i));
-                            moments[0] = vectors.mul_add8(weighted, arm, moments[0]);
-                        }
+                    let mut r = [Lane8::zero(); D];
+                    for a in 0..D {
+                        r[a] = vectors.splat8(cells.r[corner][a].0[n]);
                     }
-                    value = if row == 0 { of_row } else { vectors.add8(value, of_row) };
+                    let Linear { value, slopes } = Linear::new::<V, AFFINE>(vectors, values, &r);
+                    at_corners[corner] = value;
                     if AFFINE {
-                        for a in 1..D {
-                            let arm = vectors.splat8(own.arm(k, a, place[a]));
-                            moments[a] = vectors.mul_add8(of_row, arm, moments[a]);
+                        for a in 0..D {
+                            let variance = vectors.splat8(cells.variance[corner][a].0[n]);
+                            moments[a] = vectors.mul_add8(slopes[a], variance, moments[a]);
                         }
                     }
                 }
-                receiver[k] = Sums { value, slopes, moments }.interpolated::<AFFINE>(own, k);
+                let mut slopes = [Lane8::zero(); D];
+                for a in 0..D {
+                    slopes[a] = fold(vectors, &mut at_corners, 1 << (D - 1 - a));
+                }
+                if AFFINE {
+                    // The arms of corners are sums of half-edges.
+                    for a in 0..D {
+                        for edge in 0..D {
+                            let E = vectors.splat8(own.E[a][edge][group].0[n]);
+                            moments[a] = vectors.mul_add8(slopes[edge], E, moments[a]);
+                        }
+                    }
+                }
+                let sums = Sums { value: at_corners[0], slopes, moments };
+                receiver[k] = sums.interpolated::<V, AFFINE>(vectors, own, &cells, k);
             }
         }
+    }
+}
+
+/// The cells of the grid in which the corners of a group of parallelograms are; `.0[n]` is of the group's particle `n`.
+struct CellsOfCorners<T, const D: usize> {
+    /// The lowest node of the cell, from the particle's first node on.
+    start: [[usize; GROUP]; MOST_CORNERS],
+    /// Where in the cell the corner is.
+    r: [[Lane8<T>; D]; MOST_CORNERS],
+    /// `sum N_i arm^2` of the hat functions along each axis.
+    variance: [[Lane8<T>; D]; MOST_CORNERS],
+    /// The inverse of the inertia `sum S arm arm` about the centre; valid where there are affine velocities.
+    inverse_inertia: [[Lane8<T>; D]; D],
+}
+
+impl<T: Lanes, const D: usize> CellsOfCorners<T, D> {
+    #[inline(always)]
+    fn zero() -> Self {
+        let zero = [[Lane8::zero(); D]; MOST_CORNERS];
+        let inverse_inertia = [[Lane8::zero(); D]; D];
+        Self { start: [[0; GROUP]; MOST_CORNERS], r: zero, variance: zero, inverse_inertia }
+    }
+
+    #[inline(always)]
+    fn take<V: Vectors>(
+        &mut self,
+        vectors: V,
+        own: &Parallelograms<T, D>,
+        strides: &[usize; D],
+        group: usize,
+    ) {
+        let [none, half, one] = [0.0, 0.5, 1.0].map(|number| vectors.splat8(real(number)));
+        // What is added to it is rounded to a whole number.
+        let whole = vectors.splat8(real::<T>(1.5) / T::default_epsilon());
+        for corner in 0..1 << D {
+            let mut start = [0.0; GROUP];
+            for a in 0..D {
+                // The least corner may be below its node by rounding.
+                let at = vectors.max8(own.at[corner][a][group], none);
+                let below = vectors.sub8(vectors.add8(vectors.sub8(at, half), whole), whole);
+                let r = vectors.sub8(at, below);
+                self.r[corner][a] = r;
+                self.variance[corner][a] = vectors.mul8(r, vectors.sub8(one, r));
+                for n in 0..GROUP {
+                    let below = nalgebra::convert_unchecked::<T, f64>(below.0[n]);
+                    start[n] += below * strides[a] as f64;
+                }
+            }
+            for n in 0..GROUP {
+                self.start[corner][n] = index(start[n]);
+            }
+        }
+        if own.is_affine {
+            let inverse = inverse(&self.inertia(vectors, own, group));
+            for a in 0..D {
+                for b in 0..D {
+                    self.inverse_inertia[a][b] = inverse[a][b].lanes;
+                }
+            }
+        }
+    }
+
+    /// The inertia `sum S arm arm` about the centres, in cells: of the corners its own, `E E^T`, and that of the hat functions around
+    /// each.
+    #[inline(always)]
+    fn inertia<V: Vectors>(
+        &self,
+        vectors: V,
+        own: &Parallelograms<T, D>,
+        group: usize,
+    ) -> [[Eight<T, V>; D]; D] {
+        let share = vectors.splat8(real(1.0 / f64::from(1 << D)));
+        let mut inertia = [[Eight { lanes: Lane8::zero(), vectors }; D]; D];
+        for a in 0..D {
+            for corner in 0..1 << D {
+                let of_hats = &mut inertia[a][a].lanes;
+                *of_hats = vectors.mul_add8(share, self.variance[corner][a], *of_hats);
+            }
+            for b in 0..D {
+                for edge in 0..D {
+                    let (E_a, E_b) = (own.E[a][edge][group], own.E[b][edge][group]);
+                    inertia[a][b].lanes = vectors.mul_add8(E_a, E_b, inertia[a][b].lanes);
+                }
+            }
+        }
+        inertia
+    }
+}
+
+/// The values at the nodes of a cell, axis 0 fastest; `None` beyond the grid.
+#[inline(always)]
+fn corners_of_cell<T: Lanes, V: Vectors, const D: usize>(
+    vectors: V,
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+    start: usize,
+) -> Option<[Lane8<T>; MOST_CORNERS]> {
+    let mut values = [Lane8::zero(); MOST_CORNERS];
+    for row in 0..1 << (D - 1) {
+        let mut of_row = start;
+        for a in 1..D {
+            of_row += if row >> (a - 1) & 1 == 1 { strides[a] } else { 0 };
+        }
+        let [lower, upper] = nodes.get(of_row..)?.first_chunk::<2>()?;
+        values[2 * row] = vectors.load8(&lower.values);
+        values[2 * row + 1] = vectors.load8(&upper.values);
+    }
+    Some(values)
+}
+
+/// A value that is linear along each axis of a cell, and its slopes; those only where they are asked for.
+struct Linear<T, const D: usize> {
+    value: Lane8<T>,
+    slopes: [Lane8<T>; D],
+}
+
+impl<T: Lanes, const D: usize> Linear<T, D> {
+    /// At the place `r` in a cell with these values at its nodes.
+    #[inline(always)]
+    fn new<V: Vectors, const SLOPES: bool>(
+        vectors: V,
+        mut values: [Lane8<T>; MOST_CORNERS],
+        r: &[Lane8<T>; D],
+    ) -> Self {
+        let mut slopes = [[Lane8::zero(); MOST_CORNERS / 2]; D];
+        for a in 0..D {
+            for pair in 0..1 << (D - 1 - a) {
+                let (lower, upper) = (values[2 * pair], values[2 * pair + 1]);
+                let along = vectors.sub8(upper, lower);
+                values[pair] = vectors.mul_add8(along, r[a], lower);
+                if SLOPES {
+                    slopes[a][pair] = along;
+                    for b in 0..a {
+                        let (lower, upper) = (slopes[b][2 * pair], slopes[b][2 * pair + 1]);
+                        let along = vectors.sub8(upper, lower);
+                        slopes[b][pair] = vectors.mul_add8(along, r[a], lower);
+                    }
+                }
+            }
+        }
+        Self { value: values[0], slopes: slopes.map(|of_axis| of_axis[0]) }
     }
 }
 
@@ -597,7 +708,7 @@ impl<T: Lanes, const D: usize> Parallelograms<T, D> {
     }
 }
 
-/// The sums of G2P over nodes, with all numbers of a node.
+/// The sums of G2P over corners, with all numbers of a node.
 struct Sums<T, const D: usize> {
     value: Lane8<T>,
     /// By `H_a`.
@@ -607,40 +718,38 @@ struct Sums<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Sums<T, D> {
-    #[inline(always)]
-    fn zero() -> Self {
-        let zero = Lane8::zero();
-        Self { value: zero, slopes: [zero; D], moments: [zero; D] }
-    }
-
     /// The result for particle `k`.
     #[inline(always)]
-    fn interpolated<const AFFINE: bool>(
+    fn interpolated<V: Vectors, const AFFINE: bool>(
         &self,
+        vectors: V,
         own: &Parallelograms<T, D>,
+        cells: &CellsOfCorners<T, D>,
         k: usize,
     ) -> Interpolated<T, D> {
         let (group, n) = (k / GROUP, k % GROUP);
+        let share = real(1.0 / f64::from(1 << D));
+        let value = vectors.mul8(self.value, vectors.splat8(share));
         let mut result = Interpolated::zero();
         for i in 0..D {
-            (result.velocity[i], result.second[i]) = (self.value.0[i], self.value.0[D + i]);
-            for j in 0..D {
-                let mut slope = self.slopes[0].0[i] * own.g[j][0][group].0[n];
-                for a in 1..D {
-                    slope += self.slopes[a].0[i] * own.g[j][a][group].0[n];
-                }
-                result.velocity_gradient[(i, j)] = slope;
-            }
+            (result.velocity[i], result.second[i]) = (value.0[i], value.0[D + i]);
         }
-        if AFFINE {
-            let (mut moments, mut inverse) = (SMatrix::zeros(), SMatrix::zeros());
-            for i in 0..D {
-                for j in 0..D {
-                    moments[(i, j)] = self.moments[j].0[D + i];
-                    inverse[(i, j)] = own.inverse_inertia[i][j][group].0[n];
+        for j in 0..D {
+            let (mut slope, mut affine) = (Lane8::zero(), Lane8::zero());
+            for a in 0..D {
+                let g = vectors.splat8(own.g[j][a][group].0[n]);
+                slope = vectors.mul_add8(self.slopes[a], g, slope);
+                if AFFINE {
+                    let inverse = vectors.splat8(cells.inverse_inertia[a][j].0[n] * share);
+                    affine = vectors.mul_add8(self.moments[a], inverse, affine);
                 }
             }
-            result.affine = product(&moments, &inverse);
+            for i in 0..D {
+                result.velocity_gradient[(i, j)] = slope.0[i];
+                if AFFINE {
+                    result.affine[(i, j)] = affine.0[D + i];
+                }
+            }
         }
         result
     }
@@ -676,34 +785,4 @@ fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
             *sum += given * w;
         }
     });
-}
-
-/// G2P of particle `k`, whose domain need not be small.
-#[inline(never)]
-fn g2p_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
-    own: &Parallelograms<T, D>,
-    strides: &[usize; D],
-    nodes: &[Node<T, D>],
-    k: usize,
-) -> Sums<T, D> {
-    let start = own.first_node[k];
-    let Sums { mut value, mut slopes, mut moments } = Sums::zero();
-    own.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
-        let Some(Node { values }) = nodes.get(start + node) else {
-            debug_assert!(false, "a corner beyond the grid");
-            return;
-        };
-        let w = hat * real(1.0 / f64::from(1 << D));
-        for (q, nodal) in values.iter().enumerate() {
-            value.0[q] += *nodal * w;
-            for a in 0..D {
-                let signed = if is_upper(corner, a) { hat } else { -hat };
-                slopes[a].0[q] += *nodal * signed;
-                if AFFINE {
-                    moments[a].0[q] += *nodal * w * arm[a];
-                }
-            }
-        }
-    });
-    Sums { value, slopes, moments }
 }
