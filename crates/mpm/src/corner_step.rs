@@ -65,6 +65,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn g2p_and_to_corners(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, affine, constants, bins, of_time, exchange, support, .. } = self;
         let (law, transfer, buffers, c) = (&*self.law, self.transfer, &self.buffers, *constants);
+        let uniform = self.uniform;
         let Support::Mesh(corners) = support else { return Outcome::default() };
         let mut measured = std::mem::replace(&mut corners.measured, Measured::none());
         let values = std::mem::replace(&mut exchange.values, CornerValues::none());
@@ -81,6 +82,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 forcing: Forcing::new(body_force, X, t_next, &c, of_time),
                 mass,
                 volume,
+                uniform,
                 buffers,
                 is_in_doubt: &is_in_doubt,
             };
@@ -142,6 +144,7 @@ struct Pass<'a, T, const D: usize> {
     forcing: Forcing<'a, T, D>,
     mass: &'a [T],
     volume: &'a [T],
+    uniform: Option<(T, T)>,
     buffers: &'a BufferPool<T, D>,
     /// Whether a particle may be invalid.
     is_in_doubt: &'a AtomicBool,
@@ -151,7 +154,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
     /// Advances the particles of a chunk, then sums their contributions to the next step at corners.
     fn advance(&self, piece: Piece<'_, T, D>) {
         let &Self { c, support, corners, values, law, transfer, ref forcing, .. } = self;
-        let &Self { mass, volume, buffers: pool, is_in_doubt, .. } = self;
+        let &Self { mass, volume, uniform, buffers: pool, is_in_doubt, .. } = self;
         let Piece { first: of_chunk, x, v, F, affine, mut measured, mut sums } = piece;
         let SharedCorners { mesh, next, .. } = corners;
         let (is_affine, of_cells) = (transfer.is_affine(), mesh.is_of_cells());
@@ -159,6 +162,9 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
         let mut copies = Copies::new();
         let mut buffers = pool.take(support, is_affine);
         let Buffers { contributions, interpolated, .. } = &mut *buffers;
+        if let Some((mass, volume)) = uniform {
+            contributions.set_uniform(mass, volume);
+        }
         let (mut of_affine, mut start) = (affine.chunks_mut(BLOCK), 0);
         let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(F.chunks_mut(BLOCK));
         for ((x, v), F) in blocks {
@@ -181,7 +187,9 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             let ids = &ids[..count];
             let kinematics = copies.of_successive(x, F);
             forcing.evaluate(ids, kinematics.x, &mut contributions.b);
-            contributions.take(ids, mass, volume);
+            if uniform.is_none() {
+                contributions.take(ids, mass, volume);
+            }
             for (k, v) in v.iter().enumerate() {
                 contributions.set_value(c, k, v);
             }

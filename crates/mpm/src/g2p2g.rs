@@ -12,6 +12,7 @@ use crate::body_force::BodyForce;
 use crate::corner_values::Seen;
 use crate::fault::Fault;
 use crate::forcing::Forcing;
+use crate::g2p::{stretch, take_velocity};
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
@@ -20,34 +21,37 @@ use crate::kernel::block::{Block, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, Kinematics};
 use crate::node::Node;
-use crate::parallel::disjoint::PartElements;
+use crate::parallel::disjoint::{Contiguous, PartElements};
 use crate::particles::Particles;
 use crate::prefetch::prefetch;
+use crate::scheme::Transfer;
 use crate::simd::{Lane4, Lanes, Vectors};
 use crate::state::State;
 use crate::support::Support;
 use crate::weights::Weights;
 
-/// Position, velocity and deformation gradient of a bin's particles.
-type Elements<'a, T, const D: usize> =
-    PartElements<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>>;
+/// Position, velocity, deformation gradient and affine velocity of a bin's particles.
+type OfBin<'a, T, const D: usize> =
+    PartElements<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>>;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
             self;
+        let (affine, transfer) = (&mut self.affine, self.transfer);
         let buffers = &self.buffers;
         let (support, law) = (&self.support, &*self.law);
         let Particles { X, x, v, F, mass, volume, .. } = particles;
         let forcing = Forcing::new(body_force, X, t_next, c, of_time);
         let uniform = *uniform;
-        let step = G2p2g { c, support, law, nodes, mass, volume, uniform, forcing, buffers };
+        let step =
+            G2p2g { c, support, law, transfer, nodes, mass, volume, uniform, forcing, buffers };
         let found = SharedOutcome::default();
-        let vectors = NodeVectors::VelocityAndAcceleration;
+        let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one(), vectors });
-        update.g2p2g(bins, next, (x, v, F), &|band, first, bin, elements| {
+        update.g2p2g(bins, next, (x, v, F, affine), &|band, first, bin, elements| {
             found.add(step.advance_bin(band, first, bin, elements));
         });
         std::mem::swap(nodes, next);
@@ -60,6 +64,7 @@ struct G2p2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     support: &'a Support<T, D>,
     law: &'a dyn BlockLaw<T, D>,
+    transfer: Transfer,
     /// The grid of this step, updated.
     nodes: &'a [Node<T, D>],
     mass: &'a [T],
@@ -78,10 +83,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         band: &mut [Node<T, D>],
         first: usize,
         bin: u32,
-        mut elements: Elements<'_, T, D>,
+        mut elements: OfBin<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        let mut buffers = self.buffers.take(self.support, false);
+        let mut buffers = self.buffers.take(self.support, self.transfer.is_affine());
         if let Some((mass, volume)) = self.uniform {
             buffers.contributions.set_uniform(mass, volume);
         }
@@ -91,22 +96,28 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             if self.uniform.is_none() {
                 buffers.contributions.take(ids, self.mass, self.volume);
             }
-            if let Some((x, v, F)) = elements.contiguous::<BLOCK>(place) {
-                let found = self.advance_block(&mut buffers, band, (first, bin), ids, (x, v, F));
+            if let Some(block) = elements.contiguous::<BLOCK>(place) {
+                let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
                 outcome = outcome.merge(found);
                 continue;
             }
-            let copies = copies.get_or_insert_with(Copies::new);
+            let (copies, of_affine) =
+                copies.get_or_insert_with(|| (Copies::new(), [SMatrix::zeros(); BLOCK]));
             for k in 0..ids.len() {
-                let (x, v, F) = elements.get(place + k);
+                let (x, v, F, affine) = elements.get(place + k);
                 (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
+                of_affine[k] = affine.map_or_else(SMatrix::zeros, |affine| *affine);
             }
             let Copies { x, v, F } = copies;
-            let found = self.advance_block(&mut buffers, band, (first, bin), ids, (x, v, F));
+            let block = (x, v, F, self.transfer.is_affine().then_some(&mut *of_affine));
+            let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
             outcome = outcome.merge(found);
             for k in 0..ids.len() {
-                let (x, v, F) = elements.get(place + k);
+                let (x, v, F, affine) = elements.get(place + k);
                 (*x, *v, *F) = (copies.x[k], copies.v[k], copies.F[k]);
+                if let Some(affine) = affine {
+                    *affine = of_affine[k];
+                }
             }
         }
         self.buffers.give_back(buffers);
@@ -120,9 +131,9 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],
-        (x, v, F): ContiguousBlock<'_, T, D>,
+        (x, v, F, affine): ContiguousBlock<'_, T, D>,
     ) -> Outcome {
-        let &Self { c, support, law, nodes, ref forcing, .. } = self;
+        let &Self { c, support, law, transfer, nodes, ref forcing, .. } = self;
         if c.planted.is(Fault::WeightsOfNewPosition) {
             let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
             block.compute_weights(c, support, ids, Kinematics { x: &ahead, F });
@@ -130,22 +141,36 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             block.compute_weights(c, support, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
-        let mut advance = AdvanceParticles {
-            c,
-            time_step: c.time_step,
-            per_cell: c.time_step * c.inverse_spacing,
-            x,
-            v,
-            F,
-            contributions,
-        };
-        if let Block::Product(weights) = block {
-            weights.g2p_with(&c.strides, nodes, ids.len(), advance);
-        } else {
-            let interpolated = &mut interpolated[..ids.len()];
+        let interpolated = &mut interpolated[..ids.len()];
+        if transfer != Transfer::Flip {
             block.g2p((c, support), Seen::Nodes(nodes), interpolated);
+            let affine = affine.map_or(&mut [][..], |affine| &mut affine[..ids.len()]);
+            take_velocity(c, transfer, interpolated, &mut v[..ids.len()], affine);
             for (k, interpolated) in interpolated.iter().enumerate() {
-                advance.receive(k, interpolated);
+                x[k] += interpolated.velocity * c.time_step;
+                contributions.set_value(c, k, &v[k]);
+            }
+            for (k, affine) in affine.iter().enumerate() {
+                contributions.affine[k] = affine * contributions.mass[k];
+            }
+            stretch(c, c.time_step, None, interpolated, &mut F[..ids.len()]);
+        } else {
+            let mut advance = AdvanceParticles {
+                c,
+                time_step: c.time_step,
+                per_cell: c.time_step * c.inverse_spacing,
+                x,
+                v,
+                F,
+                contributions,
+            };
+            if let Block::Product(weights) = block {
+                weights.g2p_with(&c.strides, nodes, ids.len(), advance);
+            } else {
+                block.g2p((c, support), Seen::Nodes(nodes), interpolated);
+                for (k, interpolated) in interpolated.iter().enumerate() {
+                    advance.receive(k, interpolated);
+                }
             }
         }
         block.compute_weights(c, support, ids, Kinematics { x, F });
@@ -168,14 +193,11 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     }
 }
 
-/// Positions, velocities and deformation gradients of the particles of a block, contiguous in memory.
-type ContiguousBlock<'a, T, const D: usize> = (
-    &'a mut [SVector<T, D>; BLOCK],
-    &'a mut [SVector<T, D>; BLOCK],
-    &'a mut [SMatrix<T, D, D>; BLOCK],
-);
+/// Positions, velocities, deformation gradients and affine velocities of the particles of a block, contiguous in memory.
+type ContiguousBlock<'a, T, const D: usize> =
+    Contiguous<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>, BLOCK>;
 
-/// Receiver of G2P: advances velocity, position and F, and sets mass, momentum and body force of the next P2G.
+/// Receiver of G2P by FLIP: advances velocity, position and F, and sets mass, momentum and body force of the next P2G.
 struct AdvanceParticles<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     time_step: T,

@@ -16,6 +16,7 @@ use crate::grid::Layout;
 use crate::node::Node;
 use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::parallel::coloring::Shared;
+use crate::parallel::disjoint::Arrays;
 use crate::scheme::{Taken, Transfer};
 
 /// How the grid is updated after P2G.
@@ -245,12 +246,12 @@ where
     }
 
     /// Calls `add` for every bin, as [`Bins::for_each_mut`], and updates the nodes.
-    pub(crate) fn g2p2g<A: Send, B: Send, C: Send>(
+    pub(crate) fn g2p2g<A: Send, B: Send, C: Send, E: Send>(
         &self,
         bins: &mut Bins,
         nodes: &mut [Node<T, D>],
-        arrays: (&mut [A], &mut [B], &mut [C]),
-        add: &UpdateAndAdd<'_, Node<T, D>, A, B, C>,
+        arrays: Arrays<'_, A, B, C, E>,
+        add: &UpdateAndAdd<'_, Node<T, D>, A, B, C, E>,
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {

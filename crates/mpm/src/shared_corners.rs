@@ -258,8 +258,19 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) -> bool {
-        F.iter().all(|F| determinant(F) > T::zero())
-            && (!self.mesh.is_of_cells() || x.iter().all(|x| c.axis_outside(x).is_none()))
+        // No particle is the last one to be looked at, so that several are at once.
+        let mut inside = true;
+        for F in F {
+            inside &= determinant(F) > T::zero();
+        }
+        if self.mesh.is_of_cells() {
+            for x in x {
+                for a in 0..D {
+                    inside &= (x[a] >= c.lower[a]) & (x[a] <= c.upper[a]);
+                }
+            }
+        }
+        inside
     }
 
     /// Number of corners.
@@ -309,15 +320,17 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         next: &mut [SVector<T, D>],
     ) {
         let Mesh { x, turn, .. } = &self.mesh;
-        for ((next, x), velocity) in next.iter_mut().zip(&x[first..]).zip(velocities) {
-            *next = *x;
-            if !c.planted.is(Fault::CornersStay) {
-                for a in 0..D {
-                    // What rounding leaves of the velocity across a wall would take a corner off the grid.
-                    if turn.is_some() || !c.is_on_wall(x, a) {
-                        next[a] += velocity.values[a] * c.time_step;
-                    }
-                }
+        let x = &x[first..][..next.len()];
+        if c.planted.is(Fault::CornersStay) {
+            next.copy_from_slice(x);
+            return;
+        }
+        let is_turned = turn.is_some();
+        for ((next, x), velocity) in next.iter_mut().zip(x).zip(velocities) {
+            for a in 0..D {
+                let moved = x[a] + velocity.values[a] * c.time_step;
+                // What rounding leaves of the velocity across a wall would take a corner off the grid.
+                next[a] = if is_turned || !c.is_on_wall(x, a) { moved } else { x[a] };
             }
         }
     }

@@ -417,7 +417,7 @@ fn allocate<T: Lanes, const D: usize>(
         body.half_edges = vec![SMatrix::from_diagonal(&body.particles.half_size); count];
     }
     let (support, particles) = Support::new(shape, body, grid.spacing);
-    let fused = is_fused(integrator, transfer, &support);
+    let fused = is_fused(integrator, transfer);
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
     // Sums for the next step are on a grid of their own, unless they are at corners.

@@ -23,17 +23,10 @@ pub(crate) struct StepTimes<T> {
 /// Whether steps are single passes, G2P of one fused with P2G of the next.
 ///
 /// They are where F follows the grid last, and all that P2G needs is known of a particle right after G2P.
-pub(crate) fn is_fused<T, const D: usize>(
-    integrator: Integrator,
-    transfer: Transfer,
-    support: &Support<T, D>,
-) -> bool {
-    let stress_last = integrator.early() == 0.0 && !integrator.reprojects();
-    stress_last
-        && match support {
-            Support::Product(_) | Support::Cpdi { .. } => transfer == Transfer::Flip,
-            Support::Mesh(_) => !matches!(transfer.taken(), Taken::Filtered(_)),
-        }
+pub(crate) fn is_fused(integrator: Integrator, transfer: Transfer) -> bool {
+    integrator.early() == 0.0
+        && !integrator.reprojects()
+        && !matches!(transfer.taken(), Taken::Filtered(_))
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -47,7 +40,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Support::Mesh(corners) = &mut self.support {
             corners.measure();
         }
-        if is_fused(integrator, self.transfer, &self.support) {
+        if is_fused(integrator, self.transfer) {
             return match self.support {
                 Support::Mesh(_) => self.step_at_corners(body_force, times),
                 Support::Product(_) | Support::Cpdi { .. } => self.fused_step(body_force, times),

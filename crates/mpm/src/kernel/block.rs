@@ -43,9 +43,9 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
 /// they overlap.
 pub(crate) enum Block<T, const D: usize> {
     /// Products over the axes.
-    Product(ProductWeights<T, D>),
+    Product(Box<ProductWeights<T, D>>),
     /// Means over parallelograms, for CPDI.
-    Parallelograms(ParallelogramWeights<T, D>),
+    Parallelograms(Box<ParallelogramWeights<T, D>>),
     /// Means over domains between shared corners, of particles from this one on.
     Shared {
         /// Whether there are affine velocities (APIC).
@@ -58,8 +58,12 @@ pub(crate) enum Block<T, const D: usize> {
 impl<T: Lanes, const D: usize> Block<T, D> {
     pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
         match support {
-            Support::Product(shape) => Self::Product(ProductWeights::new(shape, is_affine)),
-            Support::Cpdi { .. } => Self::Parallelograms(ParallelogramWeights::new(is_affine)),
+            Support::Product(shape) => {
+                Self::Product(Box::new(ProductWeights::new(shape, is_affine)))
+            }
+            Support::Cpdi { .. } => {
+                Self::Parallelograms(Box::new(ParallelogramWeights::new(is_affine)))
+            }
             Support::Mesh(_) => Self::Shared { is_affine, first: 0 },
         }
     }

@@ -219,7 +219,8 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
                 // Rounded before they are added: those of a node and of its mirror image cancel.
                 let of_low = vectors.mul8(low, vectors.splat8(near));
                 let of_row = vectors.add8(of_low, vectors.mul8(high, vectors.splat8(far)));
-                value = vectors.add8(value, vectors.mul8(of_row, vectors.splat8(w)));
+                let weighted = vectors.mul8(of_row, vectors.splat8(w));
+                value = if row == 0 { weighted } else { vectors.add8(value, weighted) };
                 if !moments.is_empty() {
                     let along = vectors.sub8(high, low);
                     slopes[0] = vectors.mul_add8(along, vectors.splat8(w), slopes[0]);

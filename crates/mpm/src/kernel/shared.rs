@@ -379,8 +379,9 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
             take_corners(corners, &mesh.x, particles, &mut x);
             shares_of_cell(&x, &mut shares);
             let of_affine = if AFFINE { Some(OfAffine::new(c, &x, &shares)) } else { None };
+            let corners = &mesh.corners[particles.0 << D..][..particles.1 << D];
             for (n, own) in receiver.iter_mut().enumerate() {
-                let own_corners = mesh.of_particle(particles.0 + n);
+                let own_corners = &corners[n << D..][..1 << D];
                 let mut over = Over::zero();
                 for corner in 0..1 << D {
                     let node = &values.nodes[own_corners[corner] as usize];

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
 use crate::parallel::chunks::on_all_threads;
 use crate::parallel::coloring::{ColoredBands, Held, Schedule, Shared, count};
-use crate::parallel::disjoint::{PartElements, Partition};
+use crate::parallel::disjoint::{Arrays, PartElements, Partition};
 
 /// Rows in a bin, in two and three dimensions.
 const BIN_HEIGHT: usize = 8;
@@ -114,9 +114,9 @@ pub(crate) struct Bins {
 pub(crate) type AddToBand<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
 
 /// As [`AddToBand`] for kernels that change particles: `add(band, first, bin, elements)`, with the bin's number and its
-/// particles' elements of three arrays.
-pub(crate) type UpdateAndAdd<'a, N, A, B, C> =
-    dyn Fn(&mut [N], usize, u32, PartElements<'_, A, B, C>) + Sync + 'a;
+/// particles' elements of four arrays.
+pub(crate) type UpdateAndAdd<'a, N, A, B, C, E> =
+    dyn Fn(&mut [N], usize, u32, PartElements<'_, A, B, C, E>) + Sync + 'a;
 
 /// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
 #[derive(Clone, Copy)]
@@ -276,20 +276,21 @@ impl Bins {
         });
     }
 
-    /// As [`for_each`](Self::for_each) for kernels that change the bin's elements of three arrays. Does nothing where the
+    /// As [`for_each`](Self::for_each) for kernels that change the bin's elements of four arrays. Does nothing where the
     /// particles have not been sorted.
-    pub(crate) fn for_each_mut<N, A, B, C, const D: usize>(
+    pub(crate) fn for_each_mut<N, A, B, C, E, const D: usize>(
         &mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
         hooks: NodeHooks<'_, N>,
-        arrays: (&mut [A], &mut [B], &mut [C]),
-        add: &UpdateAndAdd<'_, N, A, B, C>,
+        arrays: Arrays<'_, A, B, C, E>,
+        add: &UpdateAndAdd<'_, N, A, B, C, E>,
     ) where
         N: Send,
         A: Send,
         B: Send,
         C: Send,
+        E: Send,
     {
         let Self { rows, held, order, schedule, .. } = self;
         let start = held.bands.start;
@@ -493,9 +494,10 @@ mod tests {
                 assert_eq!(sum, if lowest { 101 } else { 102 }, "{node}");
             }
             let mut seen = vec![0; layout.nodes];
-            let empty = (&mut [0_u8; 0][..], &mut [0_u8; 0][..], &mut [0_u8; 0][..]);
+            let [mut a, mut b, mut c, mut e] = [[0_u8; 0]; 4];
+            let empty = (&mut a[..], &mut b[..], &mut c[..], &mut e[..]);
             let add =
-                |band: &mut [i32], first: usize, bin: u32, _: PartElements<'_, u8, u8, u8>| {
+                |band: &mut [i32], first: usize, bin: u32, _: PartElements<'_, u8, u8, u8, u8>| {
                     assert_eq!(first, bin as usize * height * row);
                     assert!((bin as usize) < count);
                     band.iter_mut().for_each(|node| *node += 1);

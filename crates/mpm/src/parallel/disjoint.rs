@@ -73,64 +73,80 @@ impl Partition {
         ascending && whole && !twice
     }
 
-    /// Mutable access to three arrays, part by part; `None` where an index is in no part or in two, or where the arrays have
-    /// another length than the partition.
-    pub(crate) fn elements<'a, A, B, C>(
+    /// Mutable access to four arrays, part by part; `None` where an index is in no part or in two, or where the arrays have
+    /// another length than the partition. The fourth one may be empty.
+    pub(crate) fn elements<'a, A, B, C, E>(
         &'a mut self,
-        arrays: (&'a mut [A], &'a mut [B], &'a mut [C]),
-    ) -> Option<DisjointElements<'a, A, B, C>> {
-        let lengths = [arrays.0.len(), arrays.1.len(), arrays.2.len()];
-        if !self.is_whole() || lengths.iter().any(|&length| length != self.order.len()) {
+        (a, b, c, e): Arrays<'a, A, B, C, E>,
+    ) -> Option<DisjointElements<'a, A, B, C, E>> {
+        let count = self.order.len();
+        let lengths = [a.len(), b.len(), c.len()];
+        let fits = lengths == [count; 3] && (e.is_empty() || e.len() == count);
+        if !self.is_whole() || !fits {
             return None;
         }
         self.taken.iter_mut().for_each(|taken| *taken.get_mut() = false);
-        let firsts = (arrays.0.as_mut_ptr(), arrays.1.as_mut_ptr(), arrays.2.as_mut_ptr());
+        let fourth = (!e.is_empty()).then_some(e.as_mut_ptr());
+        let firsts = (a.as_mut_ptr(), b.as_mut_ptr(), c.as_mut_ptr(), fourth);
         Some(DisjointElements { partition: self, firsts, borrowed: PhantomData })
     }
 }
 
-/// The three arrays, borrowed until all parts are done.
-type Borrowed<'a, A, B, C> = PhantomData<(&'a mut [A], &'a mut [B], &'a mut [C])>;
+/// Four arrays of one length; the last one may be empty.
+pub(crate) type Arrays<'a, A, B, C, E> = (&'a mut [A], &'a mut [B], &'a mut [C], &'a mut [E]);
 
-/// Three arrays whose elements belong to the parts of a partition.
-pub(crate) struct DisjointElements<'a, A, B, C> {
+/// Where they begin.
+type Firsts<A, B, C, E> = (*mut A, *mut B, *mut C, Option<*mut E>);
+
+/// The arrays, borrowed until all parts are done.
+type Borrowed<'a, A, B, C, E> = PhantomData<Arrays<'a, A, B, C, E>>;
+
+/// Four arrays whose elements belong to the parts of a partition.
+pub(crate) struct DisjointElements<'a, A, B, C, E> {
     partition: &'a Partition,
-    firsts: (*mut A, *mut B, *mut C),
-    borrowed: Borrowed<'a, A, B, C>,
+    firsts: Firsts<A, B, C, E>,
+    borrowed: Borrowed<'a, A, B, C, E>,
 }
 
 // SAFETY: threads reach parts through a shared reference, and each part is taken by one of them; parts give exclusive
 // references to elements, for which `Send` is the requirement.
-unsafe impl<A: Send, B: Send, C: Send> Sync for DisjointElements<'_, A, B, C> {}
+unsafe impl<A: Send, B: Send, C: Send, E: Send> Sync for DisjointElements<'_, A, B, C, E> {}
 
-impl<'a, A, B, C> DisjointElements<'a, A, B, C> {
+impl<'a, A, B, C, E> DisjointElements<'a, A, B, C, E> {
     /// The elements of a part: once, then `None`, as for a part that does not exist.
-    pub(crate) fn take(&self, part: usize) -> Option<PartElements<'_, A, B, C>> {
+    pub(crate) fn take(&self, part: usize) -> Option<PartElements<'_, A, B, C, E>> {
         let indices = self.partition.part(part)?;
         let first = !self.partition.taken.get(part)?.swap(true, Ordering::Relaxed);
         first.then_some(PartElements { indices, firsts: self.firsts, borrowed: PhantomData })
     }
 }
 
-/// The elements of one part in three arrays.
-pub(crate) struct PartElements<'a, A, B, C> {
+/// The elements of one part in four arrays.
+pub(crate) struct PartElements<'a, A, B, C, E> {
     indices: &'a [u32],
-    firsts: (*mut A, *mut B, *mut C),
-    borrowed: Borrowed<'a, A, B, C>,
+    firsts: Firsts<A, B, C, E>,
+    borrowed: Borrowed<'a, A, B, C, E>,
 }
 
-impl<'a, A, B, C> PartElements<'a, A, B, C> {
+/// An element of each array, or several that lie side by side; none of an array that is empty.
+pub(crate) type Elements<'a, A, B, C, E> = (&'a mut A, &'a mut B, &'a mut C, Option<&'a mut E>);
+
+/// As [`Elements`], `N` of each array.
+pub(crate) type Contiguous<'a, A, B, C, E, const N: usize> =
+    Elements<'a, [A; N], [B; N], [C; N], [E; N]>;
+
+impl<'a, A, B, C, E> PartElements<'a, A, B, C, E> {
     /// The indices of its elements.
     pub(crate) fn indices(&self) -> &'a [u32] {
         self.indices
     }
 
-    /// The `N` elements from `place` on in all three arrays, if their indices are contiguous.
+    /// The `N` elements from `place` on in all arrays, if their indices are contiguous.
     #[inline(always)]
     pub(crate) fn contiguous<const N: usize>(
         &mut self,
         place: usize,
-    ) -> Option<(&mut [A; N], &mut [B; N], &mut [C; N])> {
+    ) -> Option<Contiguous<'_, A, B, C, E, N>> {
         let indices = self.indices.get(place..)?.first_chunk::<N>()?;
         let first = *indices.first()?;
         let mut apart = 0;
@@ -140,7 +156,7 @@ impl<'a, A, B, C> PartElements<'a, A, B, C> {
         if apart != 0 {
             return None;
         }
-        let (a, b, c) = self.firsts;
+        let (a, b, c, e) = self.firsts;
         let first = first as usize;
         // SAFETY: the elements are those of `N` indices of this part, for each of which the argument in `get` holds, and
         // lie one after the other.
@@ -149,24 +165,28 @@ impl<'a, A, B, C> PartElements<'a, A, B, C> {
                 &mut *a.add(first).cast::<[A; N]>(),
                 &mut *b.add(first).cast::<[B; N]>(),
                 &mut *c.add(first).cast::<[C; N]>(),
+                e.map(|e| &mut *e.add(first).cast::<[E; N]>()),
             ))
         }
     }
 
-    /// Element `place` of the part in all three arrays.
+    /// Element `place` of the part in all arrays.
     ///
     /// # Panics
     ///
     /// Panics where the part has no such element.
     #[inline(always)]
-    pub(crate) fn get(&mut self, place: usize) -> (&mut A, &mut B, &mut C) {
+    pub(crate) fn get(&mut self, place: usize) -> Elements<'_, A, B, C, E> {
         let index = self.indices[place] as usize;
-        let (a, b, c) = self.firsts;
-        // SAFETY: `Partition::elements` saw that every index is below the length of the three arrays, which stay
-        // borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so that nothing of this
-        // changes. `take` hands a part out once, so that this value alone reaches its elements, and `&mut self` lets
+        let (a, b, c, e) = self.firsts;
+        // SAFETY: `Partition::elements` saw that every index is below the length of all arrays that have a first element here,
+        // which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so that nothing of
+        // this changes. `take` hands a part out once, so that this value alone reaches its elements, and `&mut self` lets
         // one of them at a time be reached.
-        unsafe { (&mut *a.add(index), &mut *b.add(index), &mut *c.add(index)) }
+        unsafe {
+            let e = e.map(|e| &mut *e.add(index));
+            (&mut *a.add(index), &mut *b.add(index), &mut *c.add(index), e)
+        }
     }
 }
 
@@ -187,8 +207,11 @@ mod tests {
     fn parts_change_their_own_elements_side_by_side() {
         let mut partition = partition(&[4, 0, 2, 5, 1, 3], &[0, 2, 2, 6]);
         let (mut a, mut b, mut c) = (vec![0_u32; 6], vec![0.0_f64; 6], vec![String::new(); 6]);
+        let mut e = [false; 6];
         for round in 1..=2 {
-            let elements = partition.elements((&mut a, &mut b, &mut c)).unwrap();
+            // The fourth array is there in the second round only.
+            let of_round = if round == 1 { &mut [][..] } else { &mut e[..] };
+            let elements = partition.elements((&mut a, &mut b, &mut c, of_round)).unwrap();
             std::thread::scope(|scope| {
                 for number in 0..3 {
                     let elements = &elements;
@@ -196,7 +219,9 @@ mod tests {
                         let mut part = elements.take(number).unwrap();
                         for place in 0..part.indices().len() {
                             let index = part.indices()[place];
-                            let (a, b, c) = part.get(place);
+                            let (a, b, c, e) = part.get(place);
+                            assert_eq!(e.is_some(), round == 2);
+                            e.into_iter().for_each(|e| *e = !*e);
                             *a += 10 * number as u32 + index;
                             *b += f64::from(index);
                             c.push_str(&index.to_string());
@@ -209,6 +234,7 @@ mod tests {
             assert_eq!(a, [0, 21, 22, 23, 4, 25].map(|value| value * round));
         }
         assert_eq!(c[3], "33");
+        assert_eq!(e, [true; 6]);
     }
 
     /// Run under Miri too.
@@ -216,10 +242,12 @@ mod tests {
     fn contiguous_indices_lie_side_by_side() {
         let mut partition = partition(&[3, 4, 5, 0, 1, 2, 6], &[0, 4, 7]);
         let (mut a, mut b, mut c) = ([0; 7], [0.0; 7], [false; 7]);
-        let elements = partition.elements((&mut a, &mut b, &mut c)).unwrap();
+        let mut e = [0_u8; 7];
+        let elements = partition.elements((&mut a, &mut b, &mut c, &mut e)).unwrap();
         let (mut first, mut second) = (elements.take(0).unwrap(), elements.take(1).unwrap());
-        let (x, y, z) = first.contiguous::<3>(0).unwrap();
+        let (x, y, z, w) = first.contiguous::<3>(0).unwrap();
         (*x, *y, *z) = ([1, 2, 3], [0.5, 1.5, 2.5], [true; 3]);
+        *w.unwrap() = [7, 8, 9];
         let (x, ..) = second.contiguous::<2>(0).unwrap();
         *x = [4, 5];
         // 5 and 0, 2 and 6 are apart; the last run would leave the part.
@@ -228,11 +256,12 @@ mod tests {
         assert_eq!(a, [0, 4, 5, 1, 2, 3, 0]);
         assert_eq!(b[3..6], [0.5, 1.5, 2.5]);
         assert_eq!(c, [false, false, false, true, true, true, false]);
+        assert_eq!(e, [0, 0, 0, 7, 8, 9, 0]);
     }
 
     #[test]
     fn an_invalid_partition_gives_no_access() {
-        let (mut a, mut b, mut c) = ([0; 3], [0; 3], [0; 3]);
+        let (mut a, mut b, mut c, mut e) = ([0; 3], [0; 3], [0; 3], [0; 3]);
         for (order, starts) in [
             (&[0, 1, 1], &[0, 2, 3][..]),
             (&[0, 1, 3], &[0, 2, 3]),
@@ -242,10 +271,13 @@ mod tests {
             (&[0, 1, 2], &[0, 3, 2, 3]),
         ] {
             let mut partition = partition(order, starts);
-            assert!(partition.elements((&mut a, &mut b, &mut c)).is_none(), "{order:?} {starts:?}");
+            let elements = partition.elements((&mut a, &mut b, &mut c, &mut e));
+            assert!(elements.is_none(), "{order:?} {starts:?}");
         }
         let mut partition = partition(&[2, 0, 1], &[0, 1, 3]);
-        assert!(partition.elements((&mut a, &mut b, &mut c)).is_some());
-        assert!(partition.elements((&mut a[..2], &mut b, &mut c)).is_none());
+        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e)).is_some());
+        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e[..0])).is_some());
+        assert!(partition.elements((&mut a[..2], &mut b, &mut c, &mut e)).is_none());
+        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e[..2])).is_none());
     }
 }

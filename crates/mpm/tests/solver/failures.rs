@@ -499,8 +499,9 @@ fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
             // Particles add to the grid of the next step.
             (Shape::Gimp, Integrator::Usl, Transfer::Flip, 2),
             (Shape::Bspline3, Integrator::Cd, Transfer::Flip, 2),
-            (Shape::Gimp, Integrator::Cd, Transfer::Pic, 1),
+            (Shape::Gimp, Integrator::Cd, Transfer::Pic, 2),
             (Shape::Gimp, Integrator::Usl, Transfer::Xpic(1), 1),
+            (Shape::Cpdi, Integrator::Cd, Transfer::Apic, 2),
             (Shape::Cpdi, Integrator::Usl, Transfer::Flip, 2),
             // Those that share corners add to these.
             (Shape::Cpdi2, Integrator::Usl, Transfer::Flip, 1),

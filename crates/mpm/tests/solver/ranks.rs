@@ -354,7 +354,11 @@ fn passes(settings: &Settings<f64>, is_first: bool) -> u64 {
         // Velocities are projected from the updated particles.
         Integrator::Musl => 2 + of_filter,
         // One pass in all, but for the first of its kind.
-        Integrator::Usl | Integrator::Cd if settings.transfer == Transfer::Flip && is_first => 2,
+        Integrator::Usl | Integrator::Cd
+            if is_first && !matches!(settings.transfer, Transfer::Xpic(_)) =>
+        {
+            2
+        }
         Integrator::Usl | Integrator::Cd => 1 + of_filter,
     }
 }
