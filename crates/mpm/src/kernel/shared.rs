@@ -20,6 +20,9 @@ use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];
 
 /// Takes the corners of eight successive cells, or of fewer and the last of them again, from their places `x`.
+///
+/// Kernels take those of the next group before they work on one: numbers that are stored one by one can be loaded eight at a time only when all
+/// of them have passed through memory.
 #[inline(always)]
 fn take_corners<T: Lanes, V: Vectors, const D: usize>(
     corners: &SharedCorners<T, D>,
@@ -27,6 +30,9 @@ fn take_corners<T: Lanes, V: Vectors, const D: usize>(
     (first, count): (usize, usize),
     of_group: &mut GroupCorners<T, V, D>,
 ) {
+    if count == 0 {
+        return;
+    }
     let places = &corners.mesh.corners[first << D..(first + count) << D];
     for n in 0..GROUP {
         let own = &places[n.min(count - 1) << D..][..1 << D];
@@ -240,12 +246,18 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
             }
             return;
         }
-        let (mut x, mut shares) = (no_corners(vectors), none(vectors));
+        let mut shares = none(vectors);
         // The sums of corners that the next cell has as well stay in registers: it would wait for them to pass through memory.
         let mut kept = [Lane8::zero(); MOST_CORNERS / 2];
+        let of_group = |group: usize| (first + group, GROUP.min(count - group));
+        let mut ahead = no_corners(vectors);
+        take_corners(corners, at, of_group(0), &mut ahead);
         for group in (0..count).step_by(GROUP) {
-            let of_group = GROUP.min(count - group);
-            take_corners(corners, at, (first + group, of_group), &mut x);
+            let x = ahead;
+            if group + GROUP < count {
+                take_corners(corners, at, of_group(group + GROUP), &mut ahead);
+            }
+            let (_, of_group) = of_group(group);
             let volume = shares_of_cell(&x, &mut shares);
             for volume in volume.lanes.0 {
                 *self.have_volume &= volume > T::zero();
@@ -373,10 +385,16 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
             }
             return;
         }
-        let (mut x, mut shares) = (no_corners(vectors), none(vectors));
+        let count = receiver.len();
+        let of_group = |group: usize| (first + group, GROUP.min(count - group));
+        let (mut ahead, mut shares) = (no_corners(vectors), none(vectors));
+        take_corners(corners, &mesh.x, of_group(0), &mut ahead);
         for (group, receiver) in receiver.chunks_mut(GROUP).enumerate() {
-            let particles = (first + group * GROUP, receiver.len());
-            take_corners(corners, &mesh.x, particles, &mut x);
+            let (x, next) = (ahead, (group + 1) * GROUP);
+            if next < count {
+                take_corners(corners, &mesh.x, of_group(next), &mut ahead);
+            }
+            let particles = of_group(group * GROUP);
             shares_of_cell(&x, &mut shares);
             let of_affine = if AFFINE { Some(OfAffine::new(c, &x, &shares)) } else { None };
             let corners = &mesh.corners[particles.0 << D..][..particles.1 << D];
