@@ -11,7 +11,7 @@ use crate::body_force::BodyForce;
 use crate::corner_exchange::ChunkSums;
 use crate::corner_values::CornerValues;
 use crate::forcing::Forcing;
-use crate::g2p::{check_all, stretch, take_velocity};
+use crate::g2p::{OfBlock, advance, check_all};
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::Outcome;
@@ -174,11 +174,9 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             let shares = measured.from(mesh, (of_chunk, first));
             FromCorners { c, corners, shares, values, first, receiver: interpolated }
                 .interpolate(is_affine);
-            take_velocity(c, transfer, interpolated, v, affine);
-            for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
-                *x += interpolated.velocity * c.time_step;
-            }
-            stretch(c, c.time_step, None, interpolated, F);
+            let mut of_block = OfBlock { x, v, F, affine };
+            advance(c, transfer, (c.time_step, None), interpolated, &mut of_block);
+            let OfBlock { x, v, F, affine } = of_block;
 
             let mut is_valid =
                 of_cells || measured.at(mesh, next, (of_chunk, first..first + count));
@@ -190,12 +188,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             if uniform.is_none() {
                 contributions.take(ids, mass, volume);
             }
-            for (k, v) in v.iter().enumerate() {
-                contributions.set_value(c, k, v);
-            }
-            for (k, affine) in affine.iter().enumerate() {
-                contributions.affine[k] = affine * contributions.mass[k];
-            }
+            contributions.set_values(c, v, affine);
             law.stress(c, kinematics.F, contributions);
             is_valid &= ToCorners {
                 c,

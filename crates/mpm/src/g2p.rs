@@ -83,13 +83,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             buffers,
             transfer,
             |(block, support), interpolated, first, of_block| {
-                let OfBlock { x, v, F, affine } = of_block;
                 block.g2p((&c, support), nodes, interpolated);
-                take_velocity(&c, transfer, interpolated, v, affine);
-                for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
-                    *x += interpolated.velocity * c.time_step;
-                }
-                stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
+                let F_early = F_early.get(first..first + interpolated.len());
+                advance(&c, transfer, (late, F_early), interpolated, of_block);
             },
         )
     }
@@ -223,8 +219,24 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     }
 }
 
+/// Velocities by the transfer, positions by the grid's velocity, and F for the rest of the step, a time `late`, from that after its early
+/// part, where it has one.
+pub(crate) fn advance<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    transfer: Transfer,
+    (late, F_early): (T, Option<&[SMatrix<T, D, D>]>),
+    interpolated: &[Interpolated<T, D>],
+    OfBlock { x, v, F, affine }: &mut OfBlock<'_, T, D>,
+) {
+    take_velocity(c, transfer, interpolated, v, affine);
+    for (x, interpolated) in x.iter_mut().zip(interpolated) {
+        *x += interpolated.velocity * c.time_step;
+    }
+    stretch(c, late, F_early, interpolated, F);
+}
+
 /// Velocities, and affine ones, by the transfer.
-pub(crate) fn take_velocity<T: Lanes, const D: usize>(
+fn take_velocity<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     transfer: Transfer,
     interpolated: &[Interpolated<T, D>],
@@ -251,7 +263,7 @@ pub(crate) fn take_velocity<T: Lanes, const D: usize>(
 }
 
 /// F at the end of the step: that after its early part, where it has one, stretched for a time `late`.
-pub(crate) fn stretch<T: Lanes, const D: usize>(
+fn stretch<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     late: T,
     F_early: Option<&[SMatrix<T, D, D>]>,
@@ -269,12 +281,12 @@ pub(crate) fn stretch<T: Lanes, const D: usize>(
 }
 
 /// What belongs to the particles of a block.
-struct OfBlock<'a, T, const D: usize> {
-    x: &'a mut [SVector<T, D>],
-    v: &'a mut [SVector<T, D>],
-    F: &'a mut [SMatrix<T, D, D>],
+pub(crate) struct OfBlock<'a, T, const D: usize> {
+    pub(crate) x: &'a mut [SVector<T, D>],
+    pub(crate) v: &'a mut [SVector<T, D>],
+    pub(crate) F: &'a mut [SMatrix<T, D, D>],
     /// Empty without affine velocities.
-    affine: &'a mut [SMatrix<T, D, D>],
+    pub(crate) affine: &'a mut [SMatrix<T, D, D>],
 }
 
 type Chunk<'a, T, const D: usize> =

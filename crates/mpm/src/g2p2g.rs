@@ -12,7 +12,7 @@ use crate::body_force::BodyForce;
 use crate::corner_values::Seen;
 use crate::fault::Fault;
 use crate::forcing::Forcing;
-use crate::g2p::{stretch, take_velocity};
+use crate::g2p::{OfBlock, advance};
 use crate::geometry::Constants;
 use crate::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::health::{Outcome, SharedOutcome};
@@ -106,7 +106,9 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             for k in 0..ids.len() {
                 let (x, v, F, affine) = elements.get(place + k);
                 (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
-                of_affine[k] = affine.map_or_else(SMatrix::zeros, |affine| *affine);
+                if let Some(affine) = affine {
+                    of_affine[k] = *affine;
+                }
             }
             let Copies { x, v, F } = copies;
             let block = (x, v, F, self.transfer.is_affine().then_some(&mut *of_affine));
@@ -144,18 +146,16 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         let interpolated = &mut interpolated[..ids.len()];
         if transfer != Transfer::Flip {
             block.g2p((c, support), Seen::Nodes(nodes), interpolated);
-            let affine = affine.map_or(&mut [][..], |affine| &mut affine[..ids.len()]);
-            take_velocity(c, transfer, interpolated, &mut v[..ids.len()], affine);
-            for (k, interpolated) in interpolated.iter().enumerate() {
-                x[k] += interpolated.velocity * c.time_step;
-                contributions.set_value(c, k, &v[k]);
-            }
-            for (k, affine) in affine.iter().enumerate() {
-                contributions.affine[k] = affine * contributions.mass[k];
-            }
-            stretch(c, c.time_step, None, interpolated, &mut F[..ids.len()]);
+            let mut of_block = OfBlock {
+                x: &mut x[..ids.len()],
+                v: &mut v[..ids.len()],
+                F: &mut F[..ids.len()],
+                affine: affine.map_or(&mut [][..], |affine| &mut affine[..ids.len()]),
+            };
+            advance(c, transfer, (c.time_step, None), interpolated, &mut of_block);
+            contributions.set_values(c, of_block.v, of_block.affine);
         } else {
-            let mut advance = AdvanceParticles {
+            let mut receiver = AdvanceParticles {
                 c,
                 time_step: c.time_step,
                 per_cell: c.time_step * c.inverse_spacing,
@@ -165,11 +165,11 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 contributions,
             };
             if let Block::Product(weights) = block {
-                weights.g2p_with(&c.strides, nodes, ids.len(), advance);
+                weights.g2p_with(&c.strides, nodes, ids.len(), receiver);
             } else {
                 block.g2p((c, support), Seen::Nodes(nodes), interpolated);
                 for (k, interpolated) in interpolated.iter().enumerate() {
-                    advance.receive(k, interpolated);
+                    receiver.receive(k, interpolated);
                 }
             }
         }

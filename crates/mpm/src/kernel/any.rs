@@ -154,6 +154,21 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
         }
     }
 
+    /// Sets momenta, affine ones too where there are affine velocities, body forces and masses of the first particles.
+    pub(crate) fn set_values(
+        &mut self,
+        c: &Constants<T, D>,
+        v: &[SVector<T, D>],
+        affine: &[SMatrix<T, D, D>],
+    ) {
+        for (k, v) in v.iter().enumerate() {
+            self.set_value(c, k, v);
+        }
+        for (k, affine) in affine.iter().enumerate() {
+            self.affine[k] = affine * self.mass[k];
+        }
+    }
+
     /// Sets momentum, body force and mass of a particle.
     #[inline(always)]
     pub(crate) fn set_value(&mut self, c: &Constants<T, D>, k: usize, v: &SVector<T, D>) {

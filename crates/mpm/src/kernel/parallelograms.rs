@@ -19,6 +19,7 @@ use crate::domain::{
 use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
+use crate::kernel::points::start_of_row;
 use crate::node::Node;
 use crate::shape_function::{index, node_below};
 use crate::simd::{Eight, Lane8, Lanes, Loop, Vectors, dispatch};
@@ -615,11 +616,8 @@ fn corners_of_cell<T: Lanes, V: Vectors, const D: usize>(
 ) -> Option<[Lane8<T>; MOST_CORNERS]> {
     let mut values = [Lane8::zero(); MOST_CORNERS];
     for row in 0..1 << (D - 1) {
-        let mut of_row = start;
-        for a in 1..D {
-            of_row += if row >> (a - 1) & 1 == 1 { strides[a] } else { 0 };
-        }
-        let [lower, upper] = nodes.get(of_row..)?.first_chunk::<2>()?;
+        let start = start_of_row(strides, start, row);
+        let [lower, upper] = nodes.get(start..)?.first_chunk::<2>()?;
         values[2 * row] = vectors.load8(&lower.values);
         values[2 * row + 1] = vectors.load8(&upper.values);
     }

@@ -56,10 +56,14 @@ fn is_upper(row: usize, axis: usize) -> bool {
 
 /// Where a row begins of the nodes from `first` on.
 #[inline(always)]
-fn start_of_row<T: Lanes, const D: usize>(c: &Constants<T, D>, first: usize, row: usize) -> usize {
+pub(crate) fn start_of_row<const D: usize>(
+    strides: &[usize; D],
+    first: usize,
+    row: usize,
+) -> usize {
     let mut start = first;
     for a in 1..D {
-        start += if is_upper(row, a) { c.strides[a] } else { 0 };
+        start += if is_upper(row, a) { strides[a] } else { 0 };
     }
     start
 }
@@ -143,7 +147,7 @@ fn put<T: Lanes, V: Vectors, const D: usize>(
     sums: &[[Lane8<T>; 2]; MOST_ROWS],
 ) {
     for (row, sums) in sums.iter().enumerate().take(1 << (D - 1)) {
-        let start = start_of_row(c, first, row);
+        let start = start_of_row(&c.strides, first, row);
         let nodes = band.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
         let Some(nodes) = nodes else {
             debug_assert!(false, "a corner beyond its band");
@@ -208,7 +212,8 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
             let mut value = Lane8::zero();
             let mut slopes = [Lane8::zero(); D];
             for row in 0..1 << (D - 1) {
-                let (start, w) = (start_of_row(c, around.first, row), around.of_row(row, 0));
+                let (start, w) =
+                    (start_of_row(&c.strides, around.first, row), around.of_row(row, 0));
                 let Some([low, high]) =
                     nodes.get(start..).and_then(|nodes| nodes.first_chunk::<2>())
                 else {
