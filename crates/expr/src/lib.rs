@@ -6,7 +6,7 @@
 //! 2. [`Graph::build`] turns the tree into an [`Expr`] of a hash-consed [`Graph`]: equal expressions are one
 //!    node, numbers are exact rationals, and sums and products have a canonical form.
 //! 3. [`Derivatives::of`] differentiates.
-//! 4. [`arrange`] rewrites expressions that are evaluated at the same points at many times, where asked to.
+//! 4. [`reuse`] computes products within products once.
 //! 5. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
 //!    subexpression is computed once. [`Program::evaluate`] runs it; code generators translate it.
 //! 6. [`Program::with_gathered_factors`] leaves less of it to do for each point at each time, and
@@ -40,7 +40,7 @@ pub use graph::{
     Replacement, RustCall, nearest_f64,
 };
 pub use program::{
-    Dependence, Drafts, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program,
-    Scalar, Section, Slot,
+    Dependence, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program, Scalar,
+    Section, Slot,
 };
-pub use rewrite::{CosineAndSine, Term, arrange, reuse};
+pub use rewrite::{CosineAndSine, Term, reuse};

@@ -396,32 +396,6 @@ fn part(operations: &[Operation], dependence: &[Dependence], outputs: &[Slot]) -
     program
 }
 
-/// Programs of expressions that are tried and compared, of one graph with one set of inputs and definitions: what they have in
-/// common is lowered once.
-#[derive(Debug, Default)]
-pub struct Drafts {
-    builder: Builder,
-    lowered: NumberMap<Expr, Slot>,
-}
-
-impl Drafts {
-    /// As [`Program::lower`], but for the order of the operations.
-    pub(crate) fn lower(
-        &mut self,
-        graph: &mut Graph,
-        inputs: &[(Expr, Dependence)],
-        definitions: &[(Expr, Expr)],
-        outputs: &[Expr],
-    ) -> Program {
-        let Drafts { builder, lowered } = std::mem::take(self);
-        let mut lowering = Lowering { graph, builder, lowered, inputs, definitions };
-        let slots: Vec<Slot> = outputs.iter().map(|&output| lowering.lower(output)).collect();
-        let Lowering { builder, lowered, .. } = lowering;
-        *self = Drafts { builder, lowered };
-        self.builder.part(&slots).with_shared_reciprocals()
-    }
-}
-
 struct Lowering<'a> {
     graph: &'a mut Graph,
     builder: Builder,

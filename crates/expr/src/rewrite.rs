@@ -1,7 +1,6 @@
 //! Expressions of the same value in other forms: shorter ones, such that keep digits, and such that leave less to compute.
 
 pub(crate) mod accuracy;
-mod arrange;
 mod cancel;
 pub(crate) mod constant;
 mod exponential;
@@ -13,7 +12,6 @@ mod residue;
 mod reuse;
 mod vanishing;
 
-pub use arrange::arrange;
 pub use cancel::Term;
 pub use multiples::CosineAndSine;
 pub use reuse::reuse;

@@ -4,8 +4,7 @@ use crate::block::{Block, Stage, is_computed, needed, numbered};
 use crate::field::{Field, FieldName};
 use crate::outputs::{Group, Outputs, Single};
 use mmsmith_expr::{
-    Dependence, Drafts, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
-    arrange, reuse,
+    Dependence, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot, reuse,
 };
 use mmsmith_spec::{Domain, Fields, Spec, Surface};
 use mmsmith_vocabulary::Law;
@@ -143,16 +142,14 @@ impl Staged {
         let dimension = spec.dimension;
         // Solvers sample the body force at the same points in every step; a single call does all the work each time.
         let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
-        let drafts = &mut Drafts::default();
-        let single = reuse(&mut fields.graph, inputs, definitions, drafts, b);
-        let staged = arrange(&mut fields.graph, inputs, definitions, drafts, b);
+        let single = reuse(&mut fields.graph, inputs, definitions, b);
 
         let mut outputs = Outputs::default();
         let parts = FieldName::ALL.map(|name| match name {
             FieldName::BodyForce => (name, outputs.add(single.iter().copied())),
             _ => (name, outputs.add(name.derived(&fields))),
         });
-        let staged = outputs.add(staged);
+        let staged = outputs.add(b.iter().copied());
         let constants = ConstantOutputs::new(spec, &mut outputs);
         let energy = fields.W.map(|energy| outputs.add_one(energy));
         let requirements: Vec<(Single, Single)> = spec

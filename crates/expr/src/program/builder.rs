@@ -80,11 +80,6 @@ impl Builder {
     pub(crate) fn program(self, outputs: Vec<Slot>) -> Program {
         Program::from_parts(self.operations, self.dependence, outputs)
     }
-
-    /// The program of `outputs`, and what they need of what there is so far.
-    pub(crate) fn part(&self, outputs: &[Slot]) -> Program {
-        super::part(&self.operations, &self.dependence, outputs)
-    }
 }
 
 /// `base ^ exponent` by squaring, where `times` multiplies; the base itself for exponents below two.

@@ -274,29 +274,6 @@ impl Graph {
         self.exponent(term)
     }
 
-    /// Whether a function that may overflow stands alone in a denominator: there the quotient is zero, and with a common
-    /// denominator it is no number.
-    pub(crate) fn divides_by_exponentials(&mut self, expr: Expr) -> bool {
-        if !self.has_exponentials {
-            return false;
-        }
-        self.reachable(&[expr]).into_iter().any(|part| {
-            let Node::Product(factors) = self.node(part) else { return false };
-            let divisors: Vec<Expr> = factors
-                .iter()
-                .filter(|(_, power)| power.is_negative())
-                .map(|(base, _)| *base)
-                .collect();
-            divisors.into_iter().any(|base| match self.node(base) {
-                Node::Call(function, _) => matches!(
-                    function,
-                    Function::Exp | Function::Expm1 | Function::Sinh | Function::Cosh
-                ),
-                _ => self.logistic(base).is_some(),
-            })
-        })
-    }
-
     /// `(1 + exp(argument))^power`.
     fn logistic_power(&mut self, argument: Expr, power: Rational) -> Expr {
         let exponential = self.call(Function::Exp, &[argument]);

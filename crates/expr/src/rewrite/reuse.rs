@@ -6,7 +6,7 @@
 //! number of operations of a single evaluation. (It mixes rates of change, so it is not for evaluation in stages.)
 
 use crate::rewrite::accuracy::Samples;
-use crate::{Dependence, Drafts, Expr, Graph, Node, Rational};
+use crate::{Dependence, Expr, Graph, Node, Program, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,14 +15,12 @@ const MOST_PRODUCTS: usize = 400;
 
 /// `outputs` in forms of the same value that cost less in all, where there are such.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`](crate::Program::lower), which the result is meant for; `drafts` may have served
-/// with the same ones before.
+/// `inputs` and `definitions` are those of [`Program::lower`](crate::Program::lower), which the result is meant for.
 #[must_use]
 pub fn reuse(
     graph: &mut Graph,
     inputs: &[(Expr, Dependence)],
     definitions: &[(Expr, Expr)],
-    drafts: &mut Drafts,
     outputs: &[Expr],
 ) -> Vec<Expr> {
     let mut variables: BTreeSet<Expr> =
@@ -35,8 +33,8 @@ pub fn reuse(
     if candidate == outputs {
         return candidate;
     }
-    let before = drafts.lower(graph, inputs, definitions, outputs);
-    let after = drafts.lower(graph, inputs, definitions, &candidate);
+    let before = Program::lower(graph, inputs, definitions, outputs);
+    let after = Program::lower(graph, inputs, definitions, &candidate);
     if after.cost() < before.cost() && Samples::of(&before, inputs.len()).admit(&before, &after) {
         candidate
     } else {
@@ -180,7 +178,7 @@ mod tests {
             })
             .collect();
         let plain = Program::lower(graph, &inputs, &[], &outputs).evaluate(&AT);
-        let outputs = reuse(graph, &inputs, &[], &mut Drafts::default(), &outputs);
+        let outputs = reuse(graph, &inputs, &[], &outputs);
         (Program::lower(graph, &inputs, &[], &outputs), plain, outputs)
     }
 

@@ -205,7 +205,7 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 enum {
     axis_aligned_dimension = 2,
     axis_aligned_parameter_count = 4,
-    axis_aligned_time_count = 10,
+    axis_aligned_time_count = 8,
     axis_aligned_point_count = 4
 };
 
@@ -219,12 +219,12 @@ typedef struct axis_aligned_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_solution {
     axis_aligned_parameters par;
-    double fixed[16];
+    double fixed[15];
 } axis_aligned_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_time_values {
-    double values[10];
+    double values[8];
 } axis_aligned_time_values;
 
 typedef struct axis_aligned_field_values {
@@ -294,20 +294,10 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     const double t132 = t131 * p->E;
     const double t133 = t132 * t83;
     const double t134 = t133 / t87;
-    const double t135 = p->A * p->A;
-    const double t136 = t135 * p->A;
-    const double t137 = t35 * t35;
-    const double t138 = t136 * t137;
-    const double t139 = t138 * t93;
-    const double t140 = t139 / p->rho0;
-    const double t141 = t35 * 3.141592653589793;
-    const double t142 = 2.0 * t135;
-    const double t143 = t142 * t141;
-    const double t144 = t143 * t93;
-    const double t145 = t144 / p->rho0;
-    const double t146 = t37 * p->nu;
-    const double t147 = t146 / t87;
-    const double t150 = 2.0 / t6;
+    const double t139 = t12 * t93;
+    const double t144 = 2.0 / t6;
+    const double t201 = t111 * t139;
+    const double t208 = t70 * t111;
     s->par = *p;
     s->fixed[0] = t6;
     s->fixed[1] = t12;
@@ -321,10 +311,9 @@ MMSMITH_FN const char *axis_aligned_prepare(axis_aligned_solution *s, const axis
     s->fixed[9] = t93;
     s->fixed[10] = t111;
     s->fixed[11] = t134;
-    s->fixed[12] = t140;
-    s->fixed[13] = t145;
-    s->fixed[14] = t147;
-    s->fixed[15] = t150;
+    s->fixed[12] = t144;
+    s->fixed[13] = t201;
+    s->fixed[14] = t208;
     return 0;
 }
 
@@ -548,21 +537,21 @@ MMSMITH_FN void axis_aligned_X_lower_traction(const axis_aligned_solution *s, co
     const double t18 = t17 * t16;
     const double t21 = t18 + 1.0;
     const double t60 = t10 * t16;
-    const double t151 = t14 + 1.0;
-    const double t152 = 1.0 / t151;
-    const double t153 = t152 + 1.0;
-    const double t154 = t8 * t21;
-    const double t155 = t154 + t60;
-    const double t156 = s->fixed[1] * t155;
-    const double t157 = t151 * t21;
-    const double t158 = mmsmith_ln_of_both(t156, t157);
-    const double t159 = t8 * t153;
-    const double t160 = s->fixed[6] * t159;
-    const double t161 = s->fixed[7] * t152;
-    const double t162 = t161 * t158;
-    const double t163 = t160 + t162;
-    const double t164 = -t163;
-    traction[0] = t164;
+    const double t145 = t14 + 1.0;
+    const double t146 = 1.0 / t145;
+    const double t147 = t146 + 1.0;
+    const double t148 = t8 * t21;
+    const double t149 = t148 + t60;
+    const double t150 = s->fixed[1] * t149;
+    const double t151 = t145 * t21;
+    const double t152 = mmsmith_ln_of_both(t150, t151);
+    const double t153 = t8 * t147;
+    const double t154 = s->fixed[6] * t153;
+    const double t155 = s->fixed[7] * t146;
+    const double t156 = t155 * t152;
+    const double t157 = t154 + t156;
+    const double t158 = -t157;
+    traction[0] = t158;
     traction[1] = 0.0;
 }
 
@@ -579,22 +568,22 @@ MMSMITH_FN void axis_aligned_X_upper_traction(const axis_aligned_solution *s, co
     const double t18 = t17 * t16;
     const double t21 = t18 + 1.0;
     const double t60 = t10 * t16;
-    const double t154 = t8 * t21;
-    const double t165 = 1.0 - t14;
-    const double t166 = 1.0 / t165;
-    const double t167 = t166 + 1.0;
-    const double t168 = t154 - t60;
-    const double t169 = s->fixed[1] * t168;
-    const double t170 = -t169;
-    const double t171 = t165 * t21;
-    const double t172 = mmsmith_ln_of_both(t170, t171);
-    const double t173 = t8 * t167;
-    const double t174 = s->fixed[6] * t173;
-    const double t175 = s->fixed[7] * t166;
-    const double t176 = t175 * t172;
-    const double t177 = t174 - t176;
-    const double t178 = -t177;
-    traction[0] = t178;
+    const double t148 = t8 * t21;
+    const double t159 = 1.0 - t14;
+    const double t160 = 1.0 / t159;
+    const double t161 = t160 + 1.0;
+    const double t162 = t148 - t60;
+    const double t163 = s->fixed[1] * t162;
+    const double t164 = -t163;
+    const double t165 = t159 * t21;
+    const double t166 = mmsmith_ln_of_both(t164, t165);
+    const double t167 = t8 * t161;
+    const double t168 = s->fixed[6] * t167;
+    const double t169 = s->fixed[7] * t160;
+    const double t170 = t169 * t166;
+    const double t171 = t168 - t170;
+    const double t172 = -t171;
+    traction[0] = t172;
     traction[1] = 0.0;
 }
 
@@ -611,22 +600,22 @@ MMSMITH_FN void axis_aligned_Y_lower_traction(const axis_aligned_solution *s, co
     const double t17 = s->fixed[1] * t10;
     const double t20 = t15 + 1.0;
     const double t90 = t8 * t13;
-    const double t179 = t17 + 1.0;
-    const double t180 = 1.0 / t179;
-    const double t181 = t180 + 1.0;
-    const double t182 = t10 * t20;
-    const double t183 = t182 + t90;
-    const double t184 = s->fixed[1] * t183;
-    const double t185 = t179 * t20;
-    const double t186 = mmsmith_ln_of_both(t184, t185);
-    const double t187 = t10 * t181;
-    const double t188 = s->fixed[6] * t187;
-    const double t189 = s->fixed[7] * t180;
-    const double t190 = t189 * t186;
-    const double t191 = t188 + t190;
-    const double t192 = -t191;
+    const double t173 = t17 + 1.0;
+    const double t174 = 1.0 / t173;
+    const double t175 = t174 + 1.0;
+    const double t176 = t10 * t20;
+    const double t177 = t176 + t90;
+    const double t178 = s->fixed[1] * t177;
+    const double t179 = t173 * t20;
+    const double t180 = mmsmith_ln_of_both(t178, t179);
+    const double t181 = t10 * t175;
+    const double t182 = s->fixed[6] * t181;
+    const double t183 = s->fixed[7] * t174;
+    const double t184 = t183 * t180;
+    const double t185 = t182 + t184;
+    const double t186 = -t185;
     traction[0] = 0.0;
-    traction[1] = t192;
+    traction[1] = t186;
 }
 
 /* traction on the surface Y-upper, force per reference area */
@@ -642,23 +631,23 @@ MMSMITH_FN void axis_aligned_Y_upper_traction(const axis_aligned_solution *s, co
     const double t17 = s->fixed[1] * t10;
     const double t20 = t15 + 1.0;
     const double t90 = t8 * t13;
-    const double t182 = t10 * t20;
-    const double t193 = 1.0 - t17;
-    const double t194 = 1.0 / t193;
-    const double t195 = t194 + 1.0;
-    const double t196 = t182 - t90;
-    const double t197 = s->fixed[1] * t196;
-    const double t198 = -t197;
-    const double t199 = t193 * t20;
-    const double t200 = mmsmith_ln_of_both(t198, t199);
-    const double t201 = t10 * t195;
-    const double t202 = s->fixed[6] * t201;
-    const double t203 = s->fixed[7] * t194;
-    const double t204 = t203 * t200;
-    const double t205 = t202 - t204;
-    const double t206 = -t205;
+    const double t176 = t10 * t20;
+    const double t187 = 1.0 - t17;
+    const double t188 = 1.0 / t187;
+    const double t189 = t188 + 1.0;
+    const double t190 = t176 - t90;
+    const double t191 = s->fixed[1] * t190;
+    const double t192 = -t191;
+    const double t193 = t187 * t20;
+    const double t194 = mmsmith_ln_of_both(t192, t193);
+    const double t195 = t10 * t189;
+    const double t196 = s->fixed[6] * t195;
+    const double t197 = s->fixed[7] * t188;
+    const double t198 = t197 * t194;
+    const double t199 = t196 - t198;
+    const double t200 = -t199;
     traction[0] = 0.0;
-    traction[1] = t206;
+    traction[1] = t200;
 }
 
 /* all fields */
@@ -789,28 +778,20 @@ MMSMITH_FN axis_aligned_time_values axis_aligned_at_time(const axis_aligned_solu
     const double t10 = mmsmith_sin_pi(t7);
     const double t14 = s->fixed[1] * t8;
     const double t17 = s->fixed[1] * t10;
-    const double t207 = s->fixed[11] * t8;
-    const double t208 = t8 * t8;
-    const double t209 = t208 * t8;
-    const double t210 = s->fixed[12] * t209;
-    const double t212 = s->fixed[13] * t208;
-    const double t218 = s->fixed[14] * t8;
-    const double t224 = s->fixed[11] * t10;
-    const double t225 = t10 * t10;
-    const double t226 = t225 * t10;
-    const double t227 = s->fixed[12] * t226;
-    const double t229 = s->fixed[13] * t225;
-    const double t232 = s->fixed[14] * t10;
+    const double t81 = s->fixed[3] * t8;
+    const double t115 = s->fixed[3] * t10;
+    const double t135 = s->fixed[11] * t8;
+    const double t140 = s->fixed[11] * t10;
+    const double t202 = s->fixed[13] * t8;
+    const double t214 = s->fixed[13] * t10;
     time.values[0] = t14;
     time.values[1] = t17;
-    time.values[2] = t207;
-    time.values[3] = t210;
-    time.values[4] = t212;
-    time.values[5] = t218;
-    time.values[6] = t224;
-    time.values[7] = t227;
-    time.values[8] = t229;
-    time.values[9] = t232;
+    time.values[2] = t81;
+    time.values[3] = t115;
+    time.values[4] = t135;
+    time.values[5] = t140;
+    time.values[6] = t202;
+    time.values[7] = t214;
     return time;
 }
 
@@ -833,7 +814,6 @@ MMSMITH_FN void axis_aligned_at_point(const axis_aligned_solution *s, const doub
 MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis_aligned_time_values *time,
     const double *__restrict point, size_t stride, double *__restrict b)
 {
-    (void)s;
     const double t15 = time->values[0] * point[0];
     const double t18 = time->values[1] * point[stride];
     const double t20 = t15 + 1.0;
@@ -842,29 +822,32 @@ MMSMITH_FN void axis_aligned_b_staged(const axis_aligned_solution *s, const axis
     const double t51 = 1.0 / t22;
     const double t52 = t21 * t51;
     const double t53 = t20 * t51;
-    const double t148 = t52 * t52;
-    const double t149 = t53 * t53;
-    const double t211 = time->values[3] * point[0];
-    const double t213 = t211 + time->values[4];
-    const double t214 = point[0] * t213;
-    const double t215 = t15 * t21;
-    const double t216 = t215 + t18;
-    const double t217 = mmsmith_ln_of_both(t216, t22);
-    const double t219 = time->values[5] * t217;
-    const double t220 = t214 + t219;
-    const double t221 = t148 * t220;
-    const double t222 = time->values[2] - t221;
-    const double t223 = point[2 * stride] * t222;
-    const double t228 = time->values[7] * point[stride];
-    const double t230 = t228 + time->values[8];
-    const double t231 = point[stride] * t230;
-    const double t233 = time->values[9] * t217;
-    const double t234 = t231 + t233;
-    const double t235 = t149 * t234;
-    const double t236 = time->values[6] - t235;
-    const double t237 = point[3 * stride] * t236;
-    b[0] = t223;
-    b[1] = t237;
+    const double t82 = time->values[2] * point[2 * stride];
+    const double t116 = time->values[3] * point[3 * stride];
+    const double t136 = time->values[4] * point[2 * stride];
+    const double t137 = t82 * t52;
+    const double t138 = t82 + t137;
+    const double t141 = time->values[5] * point[3 * stride];
+    const double t142 = t116 * t53;
+    const double t143 = t116 + t142;
+    const double t203 = time->values[6] * point[0];
+    const double t204 = t203 * t138;
+    const double t205 = t15 * t21;
+    const double t206 = t205 + t18;
+    const double t207 = mmsmith_ln_of_both(t206, t22);
+    const double t209 = s->fixed[14] * t207;
+    const double t210 = t209 * t137;
+    const double t211 = t204 + t210;
+    const double t212 = t52 * t211;
+    const double t213 = t136 - t212;
+    const double t215 = time->values[7] * point[stride];
+    const double t216 = t215 * t143;
+    const double t217 = t209 * t142;
+    const double t218 = t216 + t217;
+    const double t219 = t53 * t218;
+    const double t220 = t141 - t219;
+    b[0] = t213;
+    b[1] = t220;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -917,7 +900,7 @@ MMSMITH_FN double axis_aligned_wave_speed(const axis_aligned_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double axis_aligned_period(const axis_aligned_solution *s)
 {
-    return s->fixed[15];
+    return s->fixed[12];
 }
 
 /* first Lame constant */

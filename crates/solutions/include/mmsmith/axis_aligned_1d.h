@@ -201,7 +201,7 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 enum {
     axis_aligned_1d_dimension = 1,
     axis_aligned_1d_parameter_count = 4,
-    axis_aligned_1d_time_count = 5,
+    axis_aligned_1d_time_count = 4,
     axis_aligned_1d_point_count = 2
 };
 
@@ -215,12 +215,12 @@ typedef struct axis_aligned_1d_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct axis_aligned_1d_solution {
     axis_aligned_1d_parameters par;
-    double fixed[16];
+    double fixed[15];
 } axis_aligned_1d_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct axis_aligned_1d_time_values {
-    double values[5];
+    double values[4];
 } axis_aligned_1d_time_values;
 
 typedef struct axis_aligned_1d_field_values {
@@ -290,20 +290,10 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     const double t76 = t75 * p->E;
     const double t77 = t76 * t54;
     const double t78 = t77 / t58;
-    const double t79 = p->A * p->A;
-    const double t80 = t79 * p->A;
-    const double t81 = t19 * t19;
-    const double t82 = t80 * t81;
-    const double t83 = t82 * t61;
-    const double t84 = t83 / p->rho0;
-    const double t85 = t19 * 3.141592653589793;
-    const double t86 = 2.0 * t79;
-    const double t87 = t86 * t85;
-    const double t88 = t87 * t61;
-    const double t89 = t88 / p->rho0;
-    const double t90 = t21 * p->nu;
-    const double t91 = t90 / t58;
-    const double t93 = 2.0 / t7;
+    const double t81 = t14 * t61;
+    const double t82 = 2.0 / t7;
+    const double t105 = t70 * t81;
+    const double t109 = t48 * t70;
     s->par = *p;
     s->fixed[0] = t7;
     s->fixed[1] = t14;
@@ -317,10 +307,9 @@ MMSMITH_FN const char *axis_aligned_1d_prepare(axis_aligned_1d_solution *s, cons
     s->fixed[9] = t61;
     s->fixed[10] = t70;
     s->fixed[11] = t78;
-    s->fixed[12] = t84;
-    s->fixed[13] = t89;
-    s->fixed[14] = t91;
-    s->fixed[15] = t93;
+    s->fixed[12] = t82;
+    s->fixed[13] = t105;
+    s->fixed[14] = t109;
     return 0;
 }
 
@@ -452,17 +441,17 @@ MMSMITH_FN void axis_aligned_1d_X_lower_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t95 = t27 + 1.0;
-    const double t96 = 1.0 / t95;
-    const double t97 = t96 + 1.0;
-    const double t98 = mmsmith_log_1p(t27);
-    const double t99 = t9 * t97;
-    const double t100 = s->fixed[6] * t99;
-    const double t101 = t98 * t96;
-    const double t102 = s->fixed[7] * t101;
-    const double t103 = t100 + t102;
-    const double t104 = -t103;
-    traction[0] = t104;
+    const double t84 = t27 + 1.0;
+    const double t85 = 1.0 / t84;
+    const double t86 = t85 + 1.0;
+    const double t87 = mmsmith_log_1p(t27);
+    const double t88 = t9 * t86;
+    const double t89 = s->fixed[6] * t88;
+    const double t90 = t87 * t85;
+    const double t91 = s->fixed[7] * t90;
+    const double t92 = t89 + t91;
+    const double t93 = -t92;
+    traction[0] = t93;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -473,18 +462,18 @@ MMSMITH_FN void axis_aligned_1d_X_upper_traction(const axis_aligned_1d_solution 
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t105 = 1.0 - t27;
-    const double t106 = 1.0 / t105;
-    const double t107 = t106 + 1.0;
-    const double t108 = -t27;
-    const double t109 = mmsmith_log_1p(t108);
-    const double t110 = t9 * t107;
-    const double t111 = s->fixed[6] * t110;
-    const double t112 = t109 * t106;
-    const double t113 = s->fixed[7] * t112;
-    const double t114 = t111 - t113;
-    const double t115 = -t114;
-    traction[0] = t115;
+    const double t94 = 1.0 - t27;
+    const double t95 = 1.0 / t94;
+    const double t96 = t95 + 1.0;
+    const double t97 = -t27;
+    const double t98 = mmsmith_log_1p(t97);
+    const double t99 = t9 * t96;
+    const double t100 = s->fixed[6] * t99;
+    const double t101 = t98 * t95;
+    const double t102 = s->fixed[7] * t101;
+    const double t103 = t100 - t102;
+    const double t104 = -t103;
+    traction[0] = t104;
 }
 
 /* all fields */
@@ -546,17 +535,13 @@ MMSMITH_FN axis_aligned_1d_time_values axis_aligned_1d_at_time(const axis_aligne
     const double t8 = s->fixed[0] * t;
     const double t9 = mmsmith_cos_pi(t8);
     const double t27 = s->fixed[1] * t9;
-    const double t116 = s->fixed[11] * t9;
-    const double t117 = t9 * t9;
-    const double t118 = t117 * t9;
-    const double t119 = s->fixed[12] * t118;
-    const double t121 = s->fixed[13] * t117;
-    const double t124 = s->fixed[14] * t9;
+    const double t52 = s->fixed[3] * t9;
+    const double t79 = s->fixed[11] * t9;
+    const double t106 = s->fixed[13] * t9;
     time.values[0] = t27;
-    time.values[1] = t116;
-    time.values[2] = t119;
-    time.values[3] = t121;
-    time.values[4] = t124;
+    time.values[1] = t52;
+    time.values[2] = t79;
+    time.values[3] = t106;
     return time;
 }
 
@@ -575,21 +560,22 @@ MMSMITH_FN void axis_aligned_1d_at_point(const axis_aligned_1d_solution *s, cons
 MMSMITH_FN void axis_aligned_1d_b_staged(const axis_aligned_1d_solution *s, const axis_aligned_1d_time_values *time,
     const double *__restrict point, size_t stride, double *__restrict b)
 {
-    (void)s;
     const double t28 = time->values[0] * point[stride];
     const double t30 = t28 + 1.0;
     const double t36 = 1.0 / t30;
     const double t41 = mmsmith_log_1p(t28);
-    const double t92 = t36 * t36;
-    const double t120 = time->values[2] * point[stride];
-    const double t122 = t120 + time->values[3];
-    const double t123 = point[stride] * t122;
-    const double t125 = time->values[4] * t41;
-    const double t126 = t123 + t125;
-    const double t127 = t92 * t126;
-    const double t128 = time->values[1] - t127;
-    const double t129 = point[0] * t128;
-    b[0] = t129;
+    const double t53 = time->values[1] * point[0];
+    const double t62 = t53 * t36;
+    const double t64 = t53 + t62;
+    const double t80 = time->values[2] * point[0];
+    const double t107 = time->values[3] * point[stride];
+    const double t108 = t107 * t64;
+    const double t110 = s->fixed[14] * t41;
+    const double t111 = t110 * t62;
+    const double t112 = t108 + t111;
+    const double t113 = t36 * t112;
+    const double t114 = t80 - t113;
+    b[0] = t114;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -642,7 +628,7 @@ MMSMITH_FN double axis_aligned_1d_wave_speed(const axis_aligned_1d_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double axis_aligned_1d_period(const axis_aligned_1d_solution *s)
 {
-    return s->fixed[15];
+    return s->fixed[12];
 }
 
 /* first Lame constant */

@@ -198,7 +198,7 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 enum {
     bar_dimension = 1,
     bar_parameter_count = 5,
-    bar_time_count = 6,
+    bar_time_count = 5,
     bar_point_count = 2
 };
 
@@ -213,12 +213,12 @@ typedef struct bar_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct bar_solution {
     bar_parameters par;
-    double fixed[18];
+    double fixed[17];
 } bar_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct bar_time_values {
-    double values[6];
+    double values[5];
 } bar_time_values;
 
 typedef struct bar_field_values {
@@ -291,38 +291,19 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     const double t63 = t62 / t25;
     const double t67 = t56 + t46;
     const double t74 = 1.0 / p->rho0;
-    const double t80 = p->A * p->A;
-    const double t81 = t80 * p->A;
-    const double t82 = t25 * t25;
-    const double t83 = t26 * t26;
-    const double t84 = 16.0 * t81;
-    const double t85 = t84 * t83;
-    const double t86 = t85 * t46;
-    const double t87 = p->rho0 * t82;
-    const double t88 = t86 / t87;
-    const double t89 = t25 * p->L;
-    const double t90 = t26 * 3.141592653589793;
-    const double t91 = 16.0 * t80;
-    const double t92 = t91 * t90;
-    const double t93 = t92 * t46;
-    const double t94 = p->rho0 * t89;
-    const double t95 = t93 / t94;
-    const double t96 = t61 * p->E;
-    const double t97 = t96 * p->nu;
-    const double t98 = t97 * t26;
-    const double t99 = t29 * t43;
-    const double t100 = t99 * t50;
-    const double t101 = t98 / t100;
-    const double t102 = t46 + t67;
-    const double t103 = t62 * t102;
-    const double t104 = t103 / t29;
-    const double t105 = 2.0 * p->L;
-    const double t106 = t105 / t11;
-    const double t108 = -t36;
+    const double t79 = 2.0 * p->L;
+    const double t80 = t79 / t11;
+    const double t82 = -t36;
+    const double t94 = t46 * t63;
+    const double t95 = t94 * t74;
+    const double t98 = t56 * t63;
+    const double t99 = t98 * t74;
+    const double t103 = t63 * t67;
+    const double t104 = t103 * t74;
     if (!(t36 < p->L)) {
         return "the parameters of bar must satisfy 2*Pi*A < L";
     }
-    if (!(t108 < p->L)) {
+    if (!(t82 < p->L)) {
         return "the parameters of bar must satisfy -2*Pi*A < L";
     }
     s->par = *p;
@@ -338,12 +319,11 @@ MMSMITH_FN const char *bar_prepare(bar_solution *s, const bar_parameters *p)
     s->fixed[9] = t63;
     s->fixed[10] = t67;
     s->fixed[11] = t74;
-    s->fixed[12] = t88;
-    s->fixed[13] = t95;
-    s->fixed[14] = t101;
-    s->fixed[15] = t104;
-    s->fixed[16] = t106;
-    s->fixed[17] = t108;
+    s->fixed[12] = t80;
+    s->fixed[13] = t82;
+    s->fixed[14] = t95;
+    s->fixed[15] = t99;
+    s->fixed[16] = t104;
     return 0;
 }
 
@@ -483,17 +463,17 @@ MMSMITH_FN void bar_X_lower_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t109 = t38 + 1.0;
-    const double t110 = 1.0 / t109;
-    const double t111 = t110 + 1.0;
-    const double t112 = mmsmith_log_1p(t38);
-    const double t113 = t38 * t111;
-    const double t114 = s->fixed[7] * t113;
-    const double t115 = t112 * t110;
-    const double t116 = s->fixed[8] * t115;
-    const double t117 = t114 + t116;
-    const double t118 = -t117;
-    traction[0] = t118;
+    const double t83 = t38 + 1.0;
+    const double t84 = 1.0 / t83;
+    const double t85 = t84 + 1.0;
+    const double t86 = mmsmith_log_1p(t38);
+    const double t87 = t38 * t85;
+    const double t88 = s->fixed[7] * t87;
+    const double t89 = t86 * t84;
+    const double t90 = s->fixed[8] * t89;
+    const double t91 = t88 + t90;
+    const double t92 = -t91;
+    traction[0] = t92;
 }
 
 /* traction on the surface X-upper, force per reference area */
@@ -504,16 +484,16 @@ MMSMITH_FN void bar_X_upper_traction(const bar_solution *s, const double X[1], d
     const double t13 = s->fixed[2] * t;
     const double t14 = mmsmith_cos_pi(t13);
     const double t38 = s->fixed[6] * t14;
-    const double t109 = t38 + 1.0;
-    const double t110 = 1.0 / t109;
-    const double t111 = t110 + 1.0;
-    const double t112 = mmsmith_log_1p(t38);
-    const double t113 = t38 * t111;
-    const double t114 = s->fixed[7] * t113;
-    const double t115 = t112 * t110;
-    const double t116 = s->fixed[8] * t115;
-    const double t117 = t114 + t116;
-    traction[0] = t117;
+    const double t83 = t38 + 1.0;
+    const double t84 = 1.0 / t83;
+    const double t85 = t84 + 1.0;
+    const double t86 = mmsmith_log_1p(t38);
+    const double t87 = t38 * t85;
+    const double t88 = s->fixed[7] * t87;
+    const double t89 = t86 * t84;
+    const double t90 = s->fixed[8] * t89;
+    const double t91 = t88 + t90;
+    traction[0] = t91;
 }
 
 /* all fields */
@@ -575,18 +555,18 @@ MMSMITH_FN bar_time_values bar_at_time(const bar_solution *s, double t)
     const double t14 = mmsmith_cos_pi(t13);
     const double t31 = s->fixed[4] * t14;
     const double t38 = s->fixed[6] * t14;
-    const double t119 = s->fixed[15] * t14;
-    const double t120 = t14 * t14;
-    const double t121 = s->fixed[13] * t120;
-    const double t122 = t120 * t14;
-    const double t123 = s->fixed[12] * t122;
-    const double t127 = s->fixed[14] * t14;
-    time.values[0] = t31;
-    time.values[1] = t38;
-    time.values[2] = t119;
-    time.values[3] = t121;
-    time.values[4] = t123;
-    time.values[5] = t127;
+    const double t93 = -t31;
+    const double t96 = s->fixed[14] * t14;
+    const double t97 = -t96;
+    const double t100 = s->fixed[15] * t14;
+    const double t101 = -t100;
+    const double t105 = s->fixed[16] * t14;
+    const double t106 = -t105;
+    time.values[0] = t38;
+    time.values[1] = t93;
+    time.values[2] = t97;
+    time.values[3] = t101;
+    time.values[4] = t106;
     return time;
 }
 
@@ -606,21 +586,18 @@ MMSMITH_FN void bar_b_staged(const bar_solution *s, const bar_time_values *time,
     const double *__restrict point, size_t stride, double *__restrict b)
 {
     (void)s;
-    const double t39 = time->values[1] * point[stride];
+    const double t39 = time->values[0] * point[stride];
     const double t41 = t39 + 1.0;
     const double t47 = 1.0 / t41;
     const double t51 = mmsmith_log_1p(t39);
     const double t71 = t47 * t47;
-    const double t124 = time->values[4] * point[stride];
-    const double t125 = time->values[3] + t124;
-    const double t126 = point[stride] * t125;
-    const double t128 = time->values[5] * t51;
-    const double t129 = t126 - t128;
-    const double t130 = time->values[2] + t129;
-    const double t131 = t71 * t130;
-    const double t132 = t131 - time->values[0];
-    const double t133 = point[0] * t132;
-    b[0] = t133;
+    const double t102 = time->values[3] * t51;
+    const double t107 = t102 - time->values[4];
+    const double t108 = t71 * t107;
+    const double t109 = time->values[2] - t108;
+    const double t110 = time->values[1] - t109;
+    const double t111 = point[0] * t110;
+    b[0] = t111;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -672,7 +649,7 @@ MMSMITH_FN double bar_wave_speed(const bar_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double bar_period(const bar_solution *s)
 {
-    return s->fixed[16];
+    return s->fixed[12];
 }
 
 /* first Lame constant */

@@ -206,8 +206,8 @@ MMSMITH_FN double mmsmith_sin_pi(double x)
 enum {
     sphere_shell_dimension = 3,
     sphere_shell_parameter_count = 6,
-    sphere_shell_time_count = 5,
-    sphere_shell_point_count = 12
+    sphere_shell_time_count = 6,
+    sphere_shell_point_count = 6
 };
 
 typedef struct sphere_shell_parameters {
@@ -222,12 +222,12 @@ typedef struct sphere_shell_parameters {
 /* The parameters, and the values that depend on them only. */
 typedef struct sphere_shell_solution {
     sphere_shell_parameters par;
-    double fixed[33];
+    double fixed[23];
 } sphere_shell_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct sphere_shell_time_values {
-    double values[5];
+    double values[6];
 } sphere_shell_time_values;
 
 typedef struct sphere_shell_field_values {
@@ -309,66 +309,31 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     const double t190 = t189 / p->rho0;
     const double t201 = t141 + t136;
     const double t224 = 1.0 / p->rho0;
-    const double t236 = 5.0 / p->Ro;
-    const double t241 = t127 * t127;
-    const double t242 = t128 * t128;
-    const double t244 = 144.0 * t241;
-    const double t245 = t244 * t136;
-    const double t246 = p->rho0 * t242;
-    const double t247 = t245 / t246;
-    const double t255 = t127 * p->A;
-    const double t256 = t11 * p->Ro;
-    const double t257 = t256 * t256;
-    const double t258 = 48.0 * t255;
-    const double t259 = t258 * t136;
-    const double t260 = p->rho0 * t257;
-    const double t261 = t259 / t260;
-    const double t272 = 6.0 * t127;
-    const double t273 = t272 * p->E;
-    const double t274 = t273 * p->nu;
-    const double t275 = p->rho0 * t128;
-    const double t276 = t275 * t114;
-    const double t277 = t276 * t116;
-    const double t278 = t274 / t277;
-    const double t282 = 14.0 / p->Ro;
-    const double t286 = 3.0 * t201;
-    const double t288 = 2.0 * t136;
-    const double t292 = 2.0 * t127;
-    const double t293 = t292 / t275;
-    const double t297 = 4.0 * p->A;
-    const double t298 = t297 * p->E;
-    const double t299 = t298 * p->nu;
-    const double t300 = t48 * t114;
-    const double t301 = t300 * t116;
-    const double t302 = t299 / t301;
-    const double t304 = t136 + t201;
-    const double t305 = t297 * t304;
-    const double t306 = t305 / t48;
-    const double t310 = 2.0 / t16;
-    const double t312 = p->Ri / p->Ro;
-    const double t313 = 1.0 - t312;
-    const double t314 = t103 * p->Ri;
-    const double t315 = t314 * t313;
-    const double t316 = t315 / t11;
-    const double t321 = 2.0 * p->Ri;
-    const double t322 = t321 / p->Ro;
-    const double t323 = 3.0 - t322;
-    const double t325 = t119 * p->Ri;
-    const double t326 = t325 * t323;
-    const double t327 = t326 / t11;
-    const double t330 = p->Ri * p->Ri;
-    const double t331 = t323 * t323;
-    const double t332 = t127 * t330;
-    const double t333 = t332 * t331;
-    const double t334 = t333 / t128;
-    const double t338 = p->A * p->Ri;
-    const double t339 = t338 * t323;
-    const double t340 = t339 / t11;
-    const double t351 = 1.0 / p->Ri;
-    const double t359 = p->A / p->Ro;
-    const double t367 = p->Ro * t114;
-    const double t368 = t367 * t116;
-    const double t369 = t139 / t368;
+    const double t250 = 2.0 / t16;
+    const double t252 = p->Ri / p->Ro;
+    const double t253 = 1.0 - t252;
+    const double t254 = t103 * p->Ri;
+    const double t255 = t254 * t253;
+    const double t256 = t255 / t11;
+    const double t261 = 2.0 * p->Ri;
+    const double t262 = t261 / p->Ro;
+    const double t263 = 3.0 - t262;
+    const double t265 = t119 * p->Ri;
+    const double t266 = t265 * t263;
+    const double t267 = t266 / t11;
+    const double t270 = p->Ri * p->Ri;
+    const double t271 = t263 * t263;
+    const double t272 = t127 * t270;
+    const double t273 = t272 * t271;
+    const double t274 = t273 / t128;
+    const double t278 = p->A * p->Ri;
+    const double t279 = t278 * t263;
+    const double t280 = t279 / t11;
+    const double t291 = 1.0 / p->Ri;
+    const double t299 = p->A / p->Ro;
+    const double t307 = p->Ro * t114;
+    const double t308 = t307 * t116;
+    const double t309 = t139 / t308;
     if (!(p->Ri < p->Ro)) {
         return "the parameters of sphere-shell must satisfy Ri < Ro";
     }
@@ -388,24 +353,14 @@ MMSMITH_FN const char *sphere_shell_prepare(sphere_shell_solution *s, const sphe
     s->fixed[12] = t190;
     s->fixed[13] = t201;
     s->fixed[14] = t224;
-    s->fixed[15] = t236;
-    s->fixed[16] = t247;
-    s->fixed[17] = t261;
-    s->fixed[18] = t278;
-    s->fixed[19] = t282;
-    s->fixed[20] = t286;
-    s->fixed[21] = t288;
-    s->fixed[22] = t293;
-    s->fixed[23] = t302;
-    s->fixed[24] = t306;
-    s->fixed[25] = t310;
-    s->fixed[26] = t316;
-    s->fixed[27] = t327;
-    s->fixed[28] = t334;
-    s->fixed[29] = t340;
-    s->fixed[30] = t351;
-    s->fixed[31] = t359;
-    s->fixed[32] = t369;
+    s->fixed[15] = t250;
+    s->fixed[16] = t256;
+    s->fixed[17] = t267;
+    s->fixed[18] = t274;
+    s->fixed[19] = t280;
+    s->fixed[20] = t291;
+    s->fixed[21] = t299;
+    s->fixed[22] = t309;
     return 0;
 }
 
@@ -836,36 +791,36 @@ MMSMITH_FN void sphere_shell_inner_traction(const sphere_shell_solution *s, cons
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
     const double t122 = t18 * t18;
-    const double t317 = s->fixed[26] * t18;
-    const double t318 = t317 + 1.0;
-    const double t319 = 1.0 / t318;
-    const double t320 = t319 + 1.0;
-    const double t324 = t18 * t318;
-    const double t328 = s->fixed[27] * t324;
-    const double t329 = t122 * t318;
-    const double t335 = s->fixed[28] * t329;
-    const double t336 = t328 + t335;
-    const double t337 = t336 + t317;
-    const double t341 = s->fixed[29] * t18;
-    const double t342 = t341 + 1.0;
-    const double t343 = t342 * t342;
-    const double t344 = t318 * t343;
-    const double t345 = mmsmith_ln_of_both(t337, t344);
-    const double t346 = t317 * t320;
-    const double t347 = s->fixed[10] * t346;
-    const double t348 = t345 * t319;
-    const double t349 = s->fixed[11] * t348;
-    const double t350 = t347 + t349;
-    const double t352 = s->fixed[30] * t350;
-    const double t353 = t352 * X[0];
-    const double t354 = -t353;
-    const double t355 = t352 * X[1];
-    const double t356 = -t355;
-    const double t357 = t352 * X[2];
-    const double t358 = -t357;
-    traction[0] = t354;
-    traction[1] = t356;
-    traction[2] = t358;
+    const double t257 = s->fixed[16] * t18;
+    const double t258 = t257 + 1.0;
+    const double t259 = 1.0 / t258;
+    const double t260 = t259 + 1.0;
+    const double t264 = t18 * t258;
+    const double t268 = s->fixed[17] * t264;
+    const double t269 = t122 * t258;
+    const double t275 = s->fixed[18] * t269;
+    const double t276 = t268 + t275;
+    const double t277 = t276 + t257;
+    const double t281 = s->fixed[19] * t18;
+    const double t282 = t281 + 1.0;
+    const double t283 = t282 * t282;
+    const double t284 = t258 * t283;
+    const double t285 = mmsmith_ln_of_both(t277, t284);
+    const double t286 = t257 * t260;
+    const double t287 = s->fixed[10] * t286;
+    const double t288 = t285 * t259;
+    const double t289 = s->fixed[11] * t288;
+    const double t290 = t287 + t289;
+    const double t292 = s->fixed[20] * t290;
+    const double t293 = t292 * X[0];
+    const double t294 = -t293;
+    const double t295 = t292 * X[1];
+    const double t296 = -t295;
+    const double t297 = t292 * X[2];
+    const double t298 = -t297;
+    traction[0] = t294;
+    traction[1] = t296;
+    traction[2] = t298;
 }
 
 /* traction on the surface outer, force per reference area */
@@ -874,20 +829,20 @@ MMSMITH_FN void sphere_shell_outer_traction(const sphere_shell_solution *s, cons
 {
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
-    const double t360 = s->fixed[31] * t18;
-    const double t361 = t360 + 2.0;
-    const double t362 = t18 * t361;
-    const double t363 = s->fixed[31] * t362;
-    const double t364 = t360 + 1.0;
-    const double t365 = t364 * t364;
-    const double t366 = mmsmith_ln_of_both(t363, t365);
-    const double t370 = s->fixed[32] * t366;
-    const double t371 = t370 * X[0];
-    const double t372 = t370 * X[1];
-    const double t373 = t370 * X[2];
-    traction[0] = t371;
-    traction[1] = t372;
-    traction[2] = t373;
+    const double t300 = s->fixed[21] * t18;
+    const double t301 = t300 + 2.0;
+    const double t302 = t18 * t301;
+    const double t303 = s->fixed[21] * t302;
+    const double t304 = t300 + 1.0;
+    const double t305 = t304 * t304;
+    const double t306 = mmsmith_ln_of_both(t303, t305);
+    const double t310 = s->fixed[22] * t306;
+    const double t311 = t310 * X[0];
+    const double t312 = t310 * X[1];
+    const double t313 = t310 * X[2];
+    traction[0] = t311;
+    traction[1] = t312;
+    traction[2] = t313;
 }
 
 /* traction on the surface X-lower, force per reference area */
@@ -938,12 +893,12 @@ MMSMITH_FN void sphere_shell_X_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[10] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[11] * t133;
-    const double t374 = t64 * t67;
-    const double t375 = t25 * t374;
-    const double t376 = t375 * t151;
-    const double t377 = t158 - t376;
-    const double t378 = -t377;
-    traction[0] = t378;
+    const double t314 = t64 * t67;
+    const double t315 = t25 * t314;
+    const double t316 = t315 * t151;
+    const double t317 = t158 - t316;
+    const double t318 = -t317;
+    traction[0] = t318;
     traction[1] = 0.0;
     traction[2] = 0.0;
 }
@@ -997,13 +952,13 @@ MMSMITH_FN void sphere_shell_Y_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[10] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[11] * t133;
-    const double t380 = t85 * t67;
-    const double t381 = t25 * t380;
-    const double t382 = t381 * t151;
-    const double t383 = t158 - t382;
-    const double t384 = -t383;
+    const double t320 = t85 * t67;
+    const double t321 = t25 * t320;
+    const double t322 = t321 * t151;
+    const double t323 = t158 - t322;
+    const double t324 = -t323;
     traction[0] = 0.0;
-    traction[1] = t384;
+    traction[1] = t324;
     traction[2] = 0.0;
 }
 
@@ -1056,14 +1011,14 @@ MMSMITH_FN void sphere_shell_Z_lower_traction(const sphere_shell_solution *s, co
     const double t150 = s->fixed[10] * t147;
     const double t151 = t149 - t150;
     const double t158 = s->fixed[11] * t133;
-    const double t385 = t96 * t67;
-    const double t386 = t25 * t385;
-    const double t387 = t386 * t151;
-    const double t388 = t158 - t387;
-    const double t389 = -t388;
+    const double t325 = t96 * t67;
+    const double t326 = t25 * t325;
+    const double t327 = t326 * t151;
+    const double t328 = t158 - t327;
+    const double t329 = -t328;
     traction[0] = 0.0;
     traction[1] = 0.0;
-    traction[2] = t389;
+    traction[2] = t329;
 }
 
 /* all fields */
@@ -1300,85 +1255,41 @@ MMSMITH_FN sphere_shell_time_values sphere_shell_at_time(const sphere_shell_solu
     const double t17 = s->fixed[0] * t;
     const double t18 = mmsmith_cos_pi(t17);
     const double t25 = s->fixed[2] * t18;
+    const double t50 = s->fixed[4] * t18;
     const double t105 = s->fixed[7] * t18;
     const double t122 = t18 * t18;
     const double t195 = s->fixed[8] * t18;
-    const double t391 = s->fixed[9] * t122;
     time.values[0] = t18;
     time.values[1] = t25;
-    time.values[2] = t105;
-    time.values[3] = t195;
-    time.values[4] = t391;
+    time.values[2] = t50;
+    time.values[3] = t105;
+    time.values[4] = t122;
+    time.values[5] = t195;
     return time;
 }
 
 /* What the body force needs of the position alone. */
-MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const double X[3], double point[12])
+MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const double X[3], double point[6])
 {
+    (void)s;
     const double t3 = X[1] * X[1];
     const double t4 = X[2] * X[2];
     const double t5 = X[0] * X[0];
     const double t6 = t3 + t4;
     const double t7 = t6 + t5;
     const double t8 = sqrt(t7);
-    const double t21 = s->fixed[1] * t8;
-    const double t23 = 3.0 - t21;
-    const double t26 = t8 * t23;
-    const double t59 = s->fixed[5] * t8;
-    const double t60 = 1.0 - t59;
     const double t66 = 1.0 / t7;
     const double t67 = t8 * t66;
-    const double t72 = s->fixed[6] * t8;
-    const double t73 = 3.0 - t72;
-    const double t106 = t8 * t60;
-    const double t123 = t23 * t23;
-    const double t124 = t7 * t123;
-    const double t193 = 1.0 - t21;
-    const double t232 = X[0] * t67;
-    const double t233 = t7 * t23;
-    const double t234 = s->fixed[4] * t233;
-    const double t237 = s->fixed[15] * t8;
-    const double t238 = 3.0 - t237;
-    const double t240 = t7 * t8;
-    const double t243 = t60 * t60;
-    const double t248 = t240 * t23;
-    const double t249 = t248 * t243;
-    const double t250 = t249 * t238;
-    const double t251 = s->fixed[16] * t250;
-    const double t252 = -t251;
-    const double t253 = 6.0 - t237;
-    const double t262 = t7 * t60;
-    const double t263 = t262 * t253;
-    const double t264 = t263 * t238;
-    const double t265 = s->fixed[17] * t264;
-    const double t268 = t23 * t193;
-    const double t269 = t60 * t73;
-    const double t270 = 2.0 * t269;
-    const double t271 = t268 + t270;
-    const double t279 = t8 * t271;
-    const double t280 = s->fixed[18] * t279;
-    const double t283 = s->fixed[19] * t8;
-    const double t285 = 15.0 - t283;
-    const double t287 = s->fixed[20] * t271;
-    const double t289 = t238 * t285;
-    const double t290 = s->fixed[21] * t289;
-    const double t291 = t287 + t290;
-    const double t294 = t8 * t291;
-    const double t295 = s->fixed[22] * t294;
-    const double t308 = X[1] * t67;
-    const double t309 = X[2] * t67;
-    point[0] = t26;
-    point[1] = t106;
-    point[2] = t124;
-    point[3] = t232;
-    point[4] = t234;
-    point[5] = t238;
-    point[6] = t252;
-    point[7] = t265;
-    point[8] = t280;
-    point[9] = t295;
-    point[10] = t308;
-    point[11] = t309;
+    const double t197 = 2.0 * t67;
+    const double t244 = X[0] * t67;
+    const double t246 = X[1] * t67;
+    const double t248 = X[2] * t67;
+    point[0] = t7;
+    point[1] = t8;
+    point[2] = t197;
+    point[3] = t244;
+    point[4] = t246;
+    point[5] = t248;
 }
 
 /* The body force from the values of one time and of one point. Value m of the point is point[m*stride]: stride 1 after
@@ -1386,40 +1297,61 @@ MMSMITH_FN void sphere_shell_at_point(const sphere_shell_solution *s, const doub
 MMSMITH_FN void sphere_shell_b_staged(const sphere_shell_solution *s, const sphere_shell_time_values *time,
     const double *__restrict point, size_t stride, double *__restrict b)
 {
-    const double t107 = time->values[2] * point[stride];
+    const double t21 = s->fixed[1] * point[stride];
+    const double t23 = 3.0 - t21;
+    const double t26 = point[stride] * t23;
+    const double t59 = s->fixed[5] * point[stride];
+    const double t60 = 1.0 - t59;
+    const double t72 = s->fixed[6] * point[stride];
+    const double t73 = 3.0 - t72;
+    const double t106 = point[stride] * t60;
+    const double t107 = time->values[3] * t106;
     const double t108 = t107 + 1.0;
-    const double t109 = time->values[1] * point[0];
+    const double t109 = time->values[1] * t26;
     const double t110 = t109 + 1.0;
-    const double t266 = time->values[0] * point[6 * stride];
-    const double t267 = t266 - point[7 * stride];
-    const double t296 = time->values[0] * t267;
-    const double t303 = s->fixed[23] * point[5 * stride];
-    const double t307 = s->fixed[24] * point[5 * stride];
-    const double t390 = time->values[3] * point[0];
-    const double t392 = time->values[4] * point[2 * stride];
-    const double t393 = t390 + t392;
-    const double t394 = t108 * t393;
-    const double t395 = t394 + t107;
-    const double t396 = t108 * t110;
-    const double t397 = t110 * t396;
-    const double t398 = mmsmith_ln_of_both(t395, t397);
-    const double t399 = point[8 * stride] * t398;
-    const double t400 = t296 + t399;
-    const double t401 = t400 - point[9 * stride];
-    const double t402 = time->values[0] * t401;
-    const double t403 = t303 * t398;
-    const double t404 = t402 + t403;
-    const double t405 = t404 - t307;
-    const double t406 = t108 * t396;
-    const double t407 = t405 / t406;
-    const double t408 = t407 - point[4 * stride];
-    const double t409 = time->values[0] * t408;
-    const double t410 = point[3 * stride] * t409;
-    const double t411 = point[10 * stride] * t409;
-    const double t412 = point[11 * stride] * t409;
-    b[0] = t410;
-    b[1] = t411;
-    b[2] = t412;
+    const double t111 = t110 * t110;
+    const double t112 = t108 * t111;
+    const double t117 = time->values[0] * t26;
+    const double t118 = t117 * t108;
+    const double t121 = s->fixed[8] * t118;
+    const double t123 = t23 * t23;
+    const double t124 = point[0] * t123;
+    const double t125 = time->values[4] * t124;
+    const double t126 = t125 * t108;
+    const double t130 = s->fixed[9] * t126;
+    const double t131 = t121 + t130;
+    const double t132 = t131 + t107;
+    const double t133 = mmsmith_ln_of_both(t132, t112);
+    const double t137 = 1.0 / t108;
+    const double t146 = 1.0 / t110;
+    const double t158 = s->fixed[11] * t133;
+    const double t193 = 1.0 - t21;
+    const double t194 = time->values[3] * t193;
+    const double t196 = time->values[5] * t23;
+    const double t198 = point[2 * stride] * t107;
+    const double t199 = t194 - t196;
+    const double t200 = t199 + t198;
+    const double t216 = t194 * t137;
+    const double t217 = time->values[5] * t73;
+    const double t220 = s->fixed[10] * t200;
+    const double t232 = point[0] * t23;
+    const double t233 = time->values[2] * t232;
+    const double t234 = t158 - s->fixed[13];
+    const double t235 = -t234;
+    const double t236 = t217 * t146;
+    const double t237 = t216 + t236;
+    const double t238 = t235 * t237;
+    const double t239 = t238 * t137;
+    const double t240 = t220 + t239;
+    const double t241 = s->fixed[14] * t240;
+    const double t242 = t233 + t241;
+    const double t243 = -t242;
+    const double t245 = point[3 * stride] * t243;
+    const double t247 = point[4 * stride] * t243;
+    const double t249 = point[5 * stride] * t243;
+    b[0] = t245;
+    b[1] = t247;
+    b[2] = t249;
 }
 
 /* What the body force needs of n positions alone: X[p*dimension + i] is component i of point p, and value m of
@@ -1429,7 +1361,7 @@ MMSMITH_FN void sphere_shell_point_array(const sphere_shell_solution *s, size_t 
 {
     size_t p, m;
     for (p = 0; p < n; ++p) {
-        double values[12];
+        double values[6];
         sphere_shell_at_point(s, X + p * 3, values);
         for (m = 0; m != sphere_shell_point_count; ++m) {
             point[m * n + p] = values[m];
@@ -1472,7 +1404,7 @@ MMSMITH_FN double sphere_shell_wave_speed(const sphere_shell_solution *s)
 /* the time in which the motion repeats */
 MMSMITH_FN double sphere_shell_period(const sphere_shell_solution *s)
 {
-    return s->fixed[25];
+    return s->fixed[15];
 }
 
 /* first Lame constant */

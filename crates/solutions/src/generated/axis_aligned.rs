@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 16],
+    fixed: [T; 15],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -143,20 +143,10 @@ impl<T: crate::Real> AxisAligned<T> {
         let t132 = t131 * parameters.E;
         let t133 = t132 * t83;
         let t134 = t133 / t87;
-        let t135 = parameters.A * parameters.A;
-        let t136 = t135 * parameters.A;
-        let t137 = t35 * t35;
-        let t138 = t136 * t137;
-        let t139 = t138 * t93;
-        let t140 = t139 / parameters.rho0;
-        let t141 = t35 * T::pi();
-        let t142 = T::nearest(2.0) * t135;
-        let t143 = t142 * t141;
-        let t144 = t143 * t93;
-        let t145 = t144 / parameters.rho0;
-        let t146 = t37 * parameters.nu;
-        let t147 = t146 / t87;
-        let t150 = T::nearest(2.0) / t6;
+        let t139 = t12 * t93;
+        let t144 = T::nearest(2.0) / t6;
+        let t201 = t111 * t139;
+        let t208 = t70 * t111;
         Ok(AxisAligned {
             parameters,
             fixed: [
@@ -172,10 +162,9 @@ impl<T: crate::Real> AxisAligned<T> {
                 t93,
                 t111,
                 t134,
-                t140,
-                t145,
-                t147,
-                t150,
+                t144,
+                t201,
+                t208,
             ],
         })
     }
@@ -537,21 +526,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t151 = t14 + T::one();
-                let t152 = T::one() / t151;
-                let t153 = t152 + T::one();
-                let t154 = t8 * t21;
-                let t155 = t154 + t60;
-                let t156 = self.fixed[1] * t155;
-                let t157 = t151 * t21;
-                let t158 = t156.ln_of_both(t157);
-                let t159 = t8 * t153;
-                let t160 = self.fixed[6] * t159;
-                let t161 = self.fixed[7] * t152;
-                let t162 = t161 * t158;
-                let t163 = t160 + t162;
-                let t164 = -t163;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t164, T::zero()))
+                let t145 = t14 + T::one();
+                let t146 = T::one() / t145;
+                let t147 = t146 + T::one();
+                let t148 = t8 * t21;
+                let t149 = t148 + t60;
+                let t150 = self.fixed[1] * t149;
+                let t151 = t145 * t21;
+                let t152 = t150.ln_of_both(t151);
+                let t153 = t8 * t147;
+                let t154 = self.fixed[6] * t153;
+                let t155 = self.fixed[7] * t146;
+                let t156 = t155 * t152;
+                let t157 = t154 + t156;
+                let t158 = -t157;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t158, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -563,22 +552,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t154 = t8 * t21;
-                let t165 = T::one() - t14;
-                let t166 = T::one() / t165;
-                let t167 = t166 + T::one();
-                let t168 = t154 - t60;
-                let t169 = self.fixed[1] * t168;
-                let t170 = -t169;
-                let t171 = t165 * t21;
-                let t172 = t170.ln_of_both(t171);
-                let t173 = t8 * t167;
-                let t174 = self.fixed[6] * t173;
-                let t175 = self.fixed[7] * t166;
-                let t176 = t175 * t172;
-                let t177 = t174 - t176;
-                let t178 = -t177;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t178, T::zero()))
+                let t148 = t8 * t21;
+                let t159 = T::one() - t14;
+                let t160 = T::one() / t159;
+                let t161 = t160 + T::one();
+                let t162 = t148 - t60;
+                let t163 = self.fixed[1] * t162;
+                let t164 = -t163;
+                let t165 = t159 * t21;
+                let t166 = t164.ln_of_both(t165);
+                let t167 = t8 * t161;
+                let t168 = self.fixed[6] * t167;
+                let t169 = self.fixed[7] * t160;
+                let t170 = t169 * t166;
+                let t171 = t168 - t170;
+                let t172 = -t171;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t172, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -590,21 +579,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
                 let t90 = t8 * t13;
-                let t179 = t17 + T::one();
-                let t180 = T::one() / t179;
-                let t181 = t180 + T::one();
-                let t182 = t10 * t20;
-                let t183 = t182 + t90;
-                let t184 = self.fixed[1] * t183;
-                let t185 = t179 * t20;
-                let t186 = t184.ln_of_both(t185);
-                let t187 = t10 * t181;
-                let t188 = self.fixed[6] * t187;
-                let t189 = self.fixed[7] * t180;
-                let t190 = t189 * t186;
-                let t191 = t188 + t190;
-                let t192 = -t191;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t192))
+                let t173 = t17 + T::one();
+                let t174 = T::one() / t173;
+                let t175 = t174 + T::one();
+                let t176 = t10 * t20;
+                let t177 = t176 + t90;
+                let t178 = self.fixed[1] * t177;
+                let t179 = t173 * t20;
+                let t180 = t178.ln_of_both(t179);
+                let t181 = t10 * t175;
+                let t182 = self.fixed[6] * t181;
+                let t183 = self.fixed[7] * t174;
+                let t184 = t183 * t180;
+                let t185 = t182 + t184;
+                let t186 = -t185;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t186))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -616,22 +605,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
                 let t90 = t8 * t13;
-                let t182 = t10 * t20;
-                let t193 = T::one() - t17;
-                let t194 = T::one() / t193;
-                let t195 = t194 + T::one();
-                let t196 = t182 - t90;
-                let t197 = self.fixed[1] * t196;
-                let t198 = -t197;
-                let t199 = t193 * t20;
-                let t200 = t198.ln_of_both(t199);
-                let t201 = t10 * t195;
-                let t202 = self.fixed[6] * t201;
-                let t203 = self.fixed[7] * t194;
-                let t204 = t203 * t200;
-                let t205 = t202 - t204;
-                let t206 = -t205;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t206))
+                let t176 = t10 * t20;
+                let t187 = T::one() - t17;
+                let t188 = T::one() / t187;
+                let t189 = t188 + T::one();
+                let t190 = t176 - t90;
+                let t191 = self.fixed[1] * t190;
+                let t192 = -t191;
+                let t193 = t187 * t20;
+                let t194 = t192.ln_of_both(t193);
+                let t195 = t10 * t189;
+                let t196 = self.fixed[6] * t195;
+                let t197 = self.fixed[7] * t188;
+                let t198 = t197 * t194;
+                let t199 = t196 - t198;
+                let t200 = -t199;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t200))
             }
             _ => None,
         }
@@ -678,7 +667,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[15]
+        self.fixed[12]
     }
     fn has_form_on_lattice(&self) -> bool {
         true
@@ -693,7 +682,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 crate::LatticePoints::<Self, T, 2, 10, 2, 3>::new(*self, lattice),
             );
         }
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 10, 4>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 8, 4>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -703,27 +692,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for AxisAligned<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 10] {
+    fn body_force_time(&self, t: T) -> [T; 8] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.cos_pi();
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t207 = self.fixed[11] * t8;
-        let t208 = t8 * t8;
-        let t209 = t208 * t8;
-        let t210 = self.fixed[12] * t209;
-        let t212 = self.fixed[13] * t208;
-        let t218 = self.fixed[14] * t8;
-        let t224 = self.fixed[11] * t10;
-        let t225 = t10 * t10;
-        let t226 = t225 * t10;
-        let t227 = self.fixed[12] * t226;
-        let t229 = self.fixed[13] * t225;
-        let t232 = self.fixed[14] * t10;
-        [t14, t17, t207, t210, t212, t218, t224, t227, t229, t232]
+        let t81 = self.fixed[3] * t8;
+        let t115 = self.fixed[3] * t10;
+        let t135 = self.fixed[11] * t8;
+        let t140 = self.fixed[11] * t10;
+        let t202 = self.fixed[13] * t8;
+        let t214 = self.fixed[13] * t10;
+        [t14, t17, t81, t115, t135, t140, t202, t214]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -736,7 +719,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 10],
+        time: &[T; 8],
         point: &[T; 4],
     ) -> crate::nalgebra::SVector<T, 2> {
         let t15 = time[0] * point[0];
@@ -747,28 +730,31 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 10, 4> for AxisAligned<T> {
         let t51 = T::one() / t22;
         let t52 = t21 * t51;
         let t53 = t20 * t51;
-        let t148 = t52 * t52;
-        let t149 = t53 * t53;
-        let t211 = time[3] * point[0];
-        let t213 = t211 + time[4];
-        let t214 = point[0] * t213;
-        let t215 = t15 * t21;
-        let t216 = t215 + t18;
-        let t217 = t216.ln_of_both_if::<NEAR>(t22);
-        let t219 = time[5] * t217;
-        let t220 = t214 + t219;
-        let t221 = t148 * t220;
-        let t222 = time[2] - t221;
-        let t223 = point[2] * t222;
-        let t228 = time[7] * point[1];
-        let t230 = t228 + time[8];
-        let t231 = point[1] * t230;
-        let t233 = time[9] * t217;
-        let t234 = t231 + t233;
-        let t235 = t149 * t234;
-        let t236 = time[6] - t235;
-        let t237 = point[3] * t236;
-        crate::nalgebra::SVector::<T, 2>::new(t223, t237)
+        let t82 = time[2] * point[2];
+        let t116 = time[3] * point[3];
+        let t136 = time[4] * point[2];
+        let t137 = t82 * t52;
+        let t138 = t82 + t137;
+        let t141 = time[5] * point[3];
+        let t142 = t116 * t53;
+        let t143 = t116 + t142;
+        let t203 = time[6] * point[0];
+        let t204 = t203 * t138;
+        let t205 = t15 * t21;
+        let t206 = t205 + t18;
+        let t207 = t206.ln_of_both_if::<NEAR>(t22);
+        let t209 = self.fixed[14] * t207;
+        let t210 = t209 * t137;
+        let t211 = t204 + t210;
+        let t212 = t52 * t211;
+        let t213 = t136 - t212;
+        let t215 = time[7] * point[1];
+        let t216 = t215 * t143;
+        let t217 = t209 * t142;
+        let t218 = t216 + t217;
+        let t219 = t53 * t218;
+        let t220 = t141 - t219;
+        crate::nalgebra::SVector::<T, 2>::new(t213, t220)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -780,19 +766,15 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t207 = self.fixed[11] * t8;
-        let t208 = t8 * t8;
-        let t209 = t208 * t8;
-        let t210 = self.fixed[12] * t209;
-        let t212 = self.fixed[13] * t208;
-        let t218 = self.fixed[14] * t8;
-        let t224 = self.fixed[11] * t10;
-        let t225 = t10 * t10;
-        let t226 = t225 * t10;
-        let t227 = self.fixed[12] * t226;
-        let t229 = self.fixed[13] * t225;
-        let t232 = self.fixed[14] * t10;
-        [t14, t17, t207, t210, t212, t218, t224, t227, t229, t232]
+        let t81 = self.fixed[3] * t8;
+        let t115 = self.fixed[3] * t10;
+        let t135 = self.fixed[11] * t8;
+        let t140 = self.fixed[11] * t10;
+        let t202 = self.fixed[13] * t8;
+        let t214 = self.fixed[13] * t10;
+        let t242 = self.fixed[14] * t81;
+        let t248 = self.fixed[14] * t115;
+        [t14, t17, t81, t115, t135, t140, t202, t214, t242, t248]
     }
     #[inline]
     fn lattice_coordinate(
@@ -820,36 +802,42 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
             0 => {
                 let t15 = time[0] * point[0];
                 let t20 = t15 + T::one();
-                let t211 = time[3] * point[0];
-                let t213 = t211 + time[4];
-                let t214 = point[0] * t213;
-                let t238 = t15.ln_of_both(t20);
-                let t240 = time[5] * t238;
-                let t241 = t214 + t240;
-                let t242 = t20 * t20;
-                let t243 = t241 / t242;
-                let t244 = time[2] - t243;
-                let t250 = point[1] * t244;
-                let t251 = time[5] * point[1];
-                let t252 = t251 / t242;
-                let t255 = time[9] * t238;
-                [t250, t252, t255]
+                let t203 = time[6] * point[0];
+                let t221 = T::one() / t20;
+                let t222 = T::one() + t221;
+                let t225 = t15.ln_of_both(t20);
+                let t227 = t203 * t222;
+                let t228 = self.fixed[14] * t225;
+                let t229 = t228 / t20;
+                let t230 = t227 + t229;
+                let t231 = time[2] * t230;
+                let t232 = t231 / t20;
+                let t233 = time[4] - t232;
+                let t241 = point[1] * t233;
+                let t243 = time[8] * point[1];
+                let t244 = t20 * t20;
+                let t245 = t243 / t244;
+                let t249 = time[9] * t225;
+                [t241, t245, t249]
             }
             1 => {
                 let t18 = time[1] * point[0];
                 let t21 = t18 + T::one();
-                let t228 = time[7] * point[0];
-                let t230 = t228 + time[8];
-                let t231 = point[0] * t230;
-                let t239 = t18.ln_of_both(t21);
-                let t245 = time[9] * t239;
-                let t246 = t231 + t245;
-                let t247 = t21 * t21;
-                let t248 = t246 / t247;
-                let t249 = time[6] - t248;
-                let t256 = point[1] / t247;
-                let t258 = point[1] * t249;
-                [t239, t256, t258]
+                let t215 = time[7] * point[0];
+                let t223 = T::one() / t21;
+                let t224 = T::one() + t223;
+                let t226 = t18.ln_of_both(t21);
+                let t234 = t215 * t224;
+                let t235 = self.fixed[14] * t226;
+                let t236 = t235 / t21;
+                let t237 = t234 + t236;
+                let t238 = time[3] * t237;
+                let t239 = t238 / t21;
+                let t240 = time[5] - t239;
+                let t250 = t21 * t21;
+                let t251 = point[1] / t250;
+                let t253 = point[1] * t240;
+                [t226, t251, t253]
             }
             _ => [T::zero(); 3],
         }
@@ -860,11 +848,11 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         time: &[T; 10],
         layers: [&[T; 3]; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t253 = layers[0][1] * layers[1][0];
-        let t254 = layers[0][0] - t253;
-        let t257 = layers[0][2] * layers[1][1];
-        let t259 = layers[1][2] - t257;
-        crate::nalgebra::SVector::<T, 2>::new(t254, t259)
+        let t246 = layers[0][1] * layers[1][0];
+        let t247 = layers[0][0] - t246;
+        let t252 = layers[0][2] * layers[1][1];
+        let t254 = layers[1][2] - t252;
+        crate::nalgebra::SVector::<T, 2>::new(t247, t254)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

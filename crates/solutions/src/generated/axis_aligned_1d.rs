@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 16],
+    fixed: [T; 15],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -142,20 +142,10 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t76 = t75 * parameters.E;
         let t77 = t76 * t54;
         let t78 = t77 / t58;
-        let t79 = parameters.A * parameters.A;
-        let t80 = t79 * parameters.A;
-        let t81 = t19 * t19;
-        let t82 = t80 * t81;
-        let t83 = t82 * t61;
-        let t84 = t83 / parameters.rho0;
-        let t85 = t19 * T::pi();
-        let t86 = T::nearest(2.0) * t79;
-        let t87 = t86 * t85;
-        let t88 = t87 * t61;
-        let t89 = t88 / parameters.rho0;
-        let t90 = t21 * parameters.nu;
-        let t91 = t90 / t58;
-        let t93 = T::nearest(2.0) / t7;
+        let t81 = t14 * t61;
+        let t82 = T::nearest(2.0) / t7;
+        let t105 = t70 * t81;
+        let t109 = t48 * t70;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -171,10 +161,9 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t61,
                 t70,
                 t78,
-                t84,
-                t89,
-                t91,
-                t93,
+                t82,
+                t105,
+                t109,
             ],
         })
     }
@@ -402,34 +391,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t95 = t27 + T::one();
-                let t96 = T::one() / t95;
-                let t97 = t96 + T::one();
-                let t98 = t27.log_1p();
-                let t99 = t9 * t97;
-                let t100 = self.fixed[6] * t99;
-                let t101 = t98 * t96;
-                let t102 = self.fixed[7] * t101;
-                let t103 = t100 + t102;
-                let t104 = -t103;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t104))
+                let t84 = t27 + T::one();
+                let t85 = T::one() / t84;
+                let t86 = t85 + T::one();
+                let t87 = t27.log_1p();
+                let t88 = t9 * t86;
+                let t89 = self.fixed[6] * t88;
+                let t90 = t87 * t85;
+                let t91 = self.fixed[7] * t90;
+                let t92 = t89 + t91;
+                let t93 = -t92;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t93))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t105 = T::one() - t27;
-                let t106 = T::one() / t105;
-                let t107 = t106 + T::one();
-                let t108 = -t27;
-                let t109 = t108.log_1p();
-                let t110 = t9 * t107;
-                let t111 = self.fixed[6] * t110;
-                let t112 = t109 * t106;
-                let t113 = self.fixed[7] * t112;
-                let t114 = t111 - t113;
-                let t115 = -t114;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t115))
+                let t94 = T::one() - t27;
+                let t95 = T::one() / t94;
+                let t96 = t95 + T::one();
+                let t97 = -t27;
+                let t98 = t97.log_1p();
+                let t99 = t9 * t96;
+                let t100 = self.fixed[6] * t99;
+                let t101 = t98 * t95;
+                let t102 = self.fixed[7] * t101;
+                let t103 = t100 - t102;
+                let t104 = -t103;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t104))
             }
             _ => None,
         }
@@ -468,14 +457,14 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[15]
+        self.fixed[12]
     }
     fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
         _lattice: ::std::option::Option<crate::Lattice<T, 1>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 4, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -485,19 +474,16 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for AxisAligned1d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 4, 2> for AxisAligned1d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 4] {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t27 = self.fixed[1] * t9;
-        let t116 = self.fixed[11] * t9;
-        let t117 = t9 * t9;
-        let t118 = t117 * t9;
-        let t119 = self.fixed[12] * t118;
-        let t121 = self.fixed[13] * t117;
-        let t124 = self.fixed[14] * t9;
-        [t27, t116, t119, t121, t124]
+        let t52 = self.fixed[3] * t9;
+        let t79 = self.fixed[11] * t9;
+        let t106 = self.fixed[13] * t9;
+        [t27, t52, t79, t106]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -508,23 +494,25 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for AxisAligned1d<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 5],
+        time: &[T; 4],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
         let t28 = time[0] * point[1];
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t92 = t36 * t36;
-        let t120 = time[2] * point[1];
-        let t122 = t120 + time[3];
-        let t123 = point[1] * t122;
-        let t125 = time[4] * t41;
-        let t126 = t123 + t125;
-        let t127 = t92 * t126;
-        let t128 = time[1] - t127;
-        let t129 = point[0] * t128;
-        crate::nalgebra::SVector::<T, 1>::new(t129)
+        let t53 = time[1] * point[0];
+        let t62 = t53 * t36;
+        let t64 = t53 + t62;
+        let t80 = time[2] * point[0];
+        let t107 = time[3] * point[1];
+        let t108 = t107 * t64;
+        let t110 = self.fixed[14] * t41;
+        let t111 = t110 * t62;
+        let t112 = t108 + t111;
+        let t113 = t36 * t112;
+        let t114 = t80 - t113;
+        crate::nalgebra::SVector::<T, 1>::new(t114)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 28],
+    fixed: [T; 26],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -153,33 +153,17 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t213 = t212 * parameters.E;
         let t214 = t213 * t156;
         let t215 = t214 / t160;
-        let t216 = parameters.A * parameters.A;
-        let t217 = t216 * parameters.A;
-        let t218 = t63 * t63;
-        let t219 = t217 * t218;
-        let t220 = t219 * t163;
-        let t221 = t220 / parameters.rho0;
-        let t222 = t63 * T::pi();
-        let t223 = T::nearest(2.0) * t216;
-        let t224 = t223 * t222;
-        let t225 = t224 * t163;
-        let t226 = t225 / parameters.rho0;
-        let t227 = t65 * parameters.nu;
-        let t228 = t227 / t160;
-        let t229 = t65 * t156;
-        let t230 = t229 / t160;
-        let t232 = T::nearest(0.125) * t217;
-        let t233 = t232 * t218;
-        let t234 = t233 * t163;
-        let t235 = t234 / parameters.rho0;
-        let t236 = T::nearest(0.5) * t216;
-        let t237 = t236 * t222;
-        let t238 = t237 * t163;
-        let t239 = t238 / parameters.rho0;
-        let t240 = t71 * parameters.nu;
-        let t241 = t240 / t160;
-        let t242 = T::nearest(2.0) / t6;
-        let t389 = t20 * T::nearest(2.0);
+        let t218 = t20 * t163;
+        let t219 = t65 * t156;
+        let t220 = t219 / t160;
+        let t223 = T::nearest(2.0) / t6;
+        let t360 = t179 * t218;
+        let t367 = t20 * T::nearest(2.0);
+        let t376 = t138 * t179;
+        let t383 = t70 * t138;
+        let t384 = t383 * t179;
+        let t389 = t70 * t163;
+        let t390 = t389 * t179;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -202,15 +186,13 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t179,
                 t186,
                 t215,
-                t221,
-                t226,
-                t228,
-                t230,
-                t235,
-                t239,
-                t241,
-                t242,
-                t389,
+                t220,
+                t223,
+                t360,
+                t367,
+                t376,
+                t384,
+                t390,
             ],
         })
     }
@@ -897,26 +879,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t123 = t28 * t36;
                 let t124 = t123 - t31;
                 let t128 = t28 * t32;
-                let t243 = t23 + T::one();
-                let t244 = T::one() / t243;
-                let t245 = t244 + T::one();
-                let t246 = t104 * t104;
-                let t247 = t116 * t246;
-                let t248 = t120 + t247;
-                let t249 = t8 * t124;
-                let t250 = t249 + t248;
-                let t251 = self.fixed[3] * t250;
-                let t252 = t251 + t128;
-                let t253 = t35 * t36;
-                let t254 = t243 * t253;
-                let t255 = t252.ln_of_both(t254);
-                let t256 = t8 * t245;
-                let t257 = self.fixed[12] * t256;
-                let t258 = self.fixed[13] * t244;
-                let t259 = t258 * t255;
-                let t260 = t257 + t259;
-                let t261 = -t260;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t261, T::zero(), T::zero()))
+                let t224 = t23 + T::one();
+                let t225 = T::one() / t224;
+                let t226 = t225 + T::one();
+                let t227 = t104 * t104;
+                let t228 = t116 * t227;
+                let t229 = t120 + t228;
+                let t230 = t8 * t124;
+                let t231 = t230 + t229;
+                let t232 = self.fixed[3] * t231;
+                let t233 = t232 + t128;
+                let t234 = t35 * t36;
+                let t235 = t224 * t234;
+                let t236 = t233.ln_of_both(t235);
+                let t237 = t8 * t226;
+                let t238 = self.fixed[12] * t237;
+                let t239 = self.fixed[13] * t225;
+                let t240 = t239 * t236;
+                let t241 = t238 + t240;
+                let t242 = -t241;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t242, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -952,26 +934,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t123 = t28 * t36;
                 let t124 = t123 - t31;
                 let t128 = t28 * t32;
-                let t249 = t8 * t124;
-                let t253 = t35 * t36;
-                let t262 = T::one() - t23;
-                let t263 = T::one() / t262;
-                let t264 = t263 + T::one();
-                let t265 = t102 * t102;
-                let t266 = t116 * t265;
-                let t267 = t120 - t266;
-                let t268 = t249 - t267;
-                let t269 = self.fixed[3] * t268;
-                let t270 = t128 - t269;
-                let t271 = t262 * t253;
-                let t272 = t270.ln_of_both(t271);
-                let t273 = t8 * t264;
-                let t274 = self.fixed[12] * t273;
-                let t275 = self.fixed[13] * t263;
-                let t276 = t275 * t272;
-                let t277 = t274 - t276;
-                let t278 = -t277;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t278, T::zero(), T::zero()))
+                let t230 = t8 * t124;
+                let t234 = t35 * t36;
+                let t243 = T::one() - t23;
+                let t244 = T::one() / t243;
+                let t245 = t244 + T::one();
+                let t246 = t102 * t102;
+                let t247 = t116 * t246;
+                let t248 = t120 - t247;
+                let t249 = t230 - t248;
+                let t250 = self.fixed[3] * t249;
+                let t251 = t128 - t250;
+                let t252 = t243 * t234;
+                let t253 = t251.ln_of_both(t252);
+                let t254 = t8 * t245;
+                let t255 = self.fixed[12] * t254;
+                let t256 = self.fixed[13] * t244;
+                let t257 = t256 * t253;
+                let t258 = t255 - t257;
+                let t259 = -t258;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t259, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -996,33 +978,33 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t110 = t109.sin_pi();
                 let t116 = T::nearest(2.0) * t8;
                 let t125 = t8 * t22;
-                let t279 = -t26;
-                let t280 = t279 + T::one();
-                let t281 = T::one() / t280;
-                let t282 = t281 + T::one();
-                let t283 = t100 * t100;
-                let t284 = t116 * t283;
-                let t285 = t110 * t110;
-                let t286 = t18 * t285;
-                let t287 = t284 - t286;
-                let t288 = self.fixed[3] * t287;
-                let t289 = t32 * t280;
-                let t290 = t289 - t26;
-                let t291 = t125 * t290;
-                let t292 = self.fixed[3] * t291;
-                let t293 = t279 * t32;
-                let t294 = t292 - t288;
-                let t295 = t294 + t293;
-                let t296 = t34 * t36;
-                let t297 = t280 * t296;
-                let t298 = t295.ln_of_both(t297);
-                let t299 = t279 * t282;
-                let t300 = self.fixed[11] * t299;
-                let t301 = self.fixed[13] * t281;
-                let t302 = t301 * t298;
-                let t303 = t300 + t302;
-                let t304 = -t303;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t304, T::zero()))
+                let t260 = -t26;
+                let t261 = t260 + T::one();
+                let t262 = T::one() / t261;
+                let t263 = t262 + T::one();
+                let t264 = t100 * t100;
+                let t265 = t116 * t264;
+                let t266 = t110 * t110;
+                let t267 = t18 * t266;
+                let t268 = t265 - t267;
+                let t269 = self.fixed[3] * t268;
+                let t270 = t32 * t261;
+                let t271 = t270 - t26;
+                let t272 = t125 * t271;
+                let t273 = self.fixed[3] * t272;
+                let t274 = t260 * t32;
+                let t275 = t273 - t269;
+                let t276 = t275 + t274;
+                let t277 = t34 * t36;
+                let t278 = t261 * t277;
+                let t279 = t276.ln_of_both(t278);
+                let t280 = t260 * t263;
+                let t281 = self.fixed[11] * t280;
+                let t282 = self.fixed[13] * t262;
+                let t283 = t282 * t279;
+                let t284 = t281 + t283;
+                let t285 = -t284;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t285, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -1046,31 +1028,31 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t109 = T::nearest(0.5) * X[2];
                 let t111 = t109.cos_pi();
                 let t116 = T::nearest(2.0) * t8;
-                let t296 = t34 * t36;
-                let t305 = t26 + T::one();
-                let t306 = T::one() / t305;
-                let t307 = t306 + T::one();
-                let t308 = t103 * t103;
-                let t309 = t116 * t308;
-                let t310 = t111 * t111;
-                let t311 = t18 * t310;
-                let t312 = t309 - t311;
-                let t313 = t32 * t305;
-                let t314 = t26 + t313;
-                let t315 = t22 * t314;
-                let t316 = t8 * t315;
-                let t317 = t316 + t312;
-                let t318 = self.fixed[3] * t317;
-                let t319 = t26 * t32;
-                let t320 = t318 + t319;
-                let t321 = t305 * t296;
-                let t322 = t320.ln_of_both(t321);
-                let t323 = t26 * t307;
-                let t324 = self.fixed[11] * t323;
-                let t325 = self.fixed[13] * t306;
-                let t326 = t325 * t322;
-                let t327 = t324 + t326;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t327, T::zero()))
+                let t277 = t34 * t36;
+                let t286 = t26 + T::one();
+                let t287 = T::one() / t286;
+                let t288 = t287 + T::one();
+                let t289 = t103 * t103;
+                let t290 = t116 * t289;
+                let t291 = t111 * t111;
+                let t292 = t18 * t291;
+                let t293 = t290 - t292;
+                let t294 = t32 * t286;
+                let t295 = t26 + t294;
+                let t296 = t22 * t295;
+                let t297 = t8 * t296;
+                let t298 = t297 + t293;
+                let t299 = self.fixed[3] * t298;
+                let t300 = t26 * t32;
+                let t301 = t299 + t300;
+                let t302 = t286 * t277;
+                let t303 = t301.ln_of_both(t302);
+                let t304 = t26 * t288;
+                let t305 = self.fixed[11] * t304;
+                let t306 = self.fixed[13] * t287;
+                let t307 = t306 * t303;
+                let t308 = t305 + t307;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t308, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1104,30 +1086,30 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t117 = t107 * t108;
                 let t118 = t116 * t117;
                 let t125 = t8 * t22;
-                let t246 = t104 * t104;
-                let t328 = -t30;
-                let t329 = t328 + T::one();
-                let t330 = T::one() / t329;
-                let t331 = t330 + T::one();
-                let t332 = t18 * t246;
-                let t333 = t118 + t332;
-                let t334 = self.fixed[3] * t333;
-                let t335 = t28 * t329;
-                let t336 = t335 - t30;
-                let t337 = t125 * t336;
-                let t338 = self.fixed[3] * t337;
-                let t339 = t328 * t28;
-                let t340 = t338 - t334;
-                let t341 = t340 + t339;
-                let t342 = t329 * t37;
-                let t343 = t341.ln_of_both(t342);
-                let t344 = t328 * t331;
-                let t345 = self.fixed[11] * t344;
-                let t346 = self.fixed[13] * t330;
-                let t347 = t346 * t343;
-                let t348 = t345 + t347;
-                let t349 = -t348;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t349))
+                let t227 = t104 * t104;
+                let t309 = -t30;
+                let t310 = t309 + T::one();
+                let t311 = T::one() / t310;
+                let t312 = t311 + T::one();
+                let t313 = t18 * t227;
+                let t314 = t118 + t313;
+                let t315 = self.fixed[3] * t314;
+                let t316 = t28 * t310;
+                let t317 = t316 - t30;
+                let t318 = t125 * t317;
+                let t319 = self.fixed[3] * t318;
+                let t320 = t309 * t28;
+                let t321 = t319 - t315;
+                let t322 = t321 + t320;
+                let t323 = t310 * t37;
+                let t324 = t322.ln_of_both(t323);
+                let t325 = t309 * t312;
+                let t326 = self.fixed[11] * t325;
+                let t327 = self.fixed[13] * t311;
+                let t328 = t327 * t324;
+                let t329 = t326 + t328;
+                let t330 = -t329;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t330))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1161,28 +1143,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t117 = t107 * t108;
                 let t118 = t116 * t117;
                 let t125 = t8 * t22;
-                let t265 = t102 * t102;
-                let t350 = t30 + T::one();
-                let t351 = T::one() / t350;
-                let t352 = t351 + T::one();
-                let t353 = t18 * t265;
-                let t354 = t118 - t353;
-                let t355 = self.fixed[3] * t354;
-                let t356 = t28 * t350;
-                let t357 = t30 + t356;
-                let t358 = t125 * t357;
-                let t359 = self.fixed[3] * t358;
-                let t360 = t30 * t28;
-                let t361 = t359 - t355;
-                let t362 = t361 + t360;
-                let t363 = t350 * t37;
-                let t364 = t362.ln_of_both(t363);
-                let t365 = t30 * t352;
-                let t366 = self.fixed[11] * t365;
-                let t367 = self.fixed[13] * t351;
-                let t368 = t367 * t364;
-                let t369 = t366 + t368;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t369))
+                let t246 = t102 * t102;
+                let t331 = t30 + T::one();
+                let t332 = T::one() / t331;
+                let t333 = t332 + T::one();
+                let t334 = t18 * t246;
+                let t335 = t118 - t334;
+                let t336 = self.fixed[3] * t335;
+                let t337 = t28 * t331;
+                let t338 = t30 + t337;
+                let t339 = t125 * t338;
+                let t340 = self.fixed[3] * t339;
+                let t341 = t30 * t28;
+                let t342 = t340 - t336;
+                let t343 = t342 + t341;
+                let t344 = t331 * t37;
+                let t345 = t343.ln_of_both(t344);
+                let t346 = t30 * t333;
+                let t347 = self.fixed[11] * t346;
+                let t348 = self.fixed[13] * t332;
+                let t349 = t348 * t345;
+                let t350 = t347 + t349;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t350))
             }
             _ => None,
         }
@@ -1237,7 +1219,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[26]
+        self.fixed[20]
     }
     fn has_form_on_lattice(&self) -> bool {
         true
@@ -1249,10 +1231,10 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
         if let ::std::option::Option::Some(lattice) = lattice {
             return ::std::boxed::Box::new(
-                crate::LatticePoints::<Self, T, 3, 15, 2, 5>::new(*self, lattice),
+                crate::LatticePoints::<Self, T, 3, 13, 2, 5>::new(*self, lattice),
             );
         }
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 17, 8>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 14, 8>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1262,9 +1244,9 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 8> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 14, 8> for AxisAligned3d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 17] {
+    fn body_force_time(&self, t: T) -> [T; 14] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1275,44 +1257,17 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 8> for AxisAligned3d<T> {
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
         let t83 = self.fixed[3] * t18;
-        let t370 = self.fixed[18] * t8;
-        let t379 = t8 * t8;
-        let t380 = t379 * t8;
-        let t381 = self.fixed[19] * t380;
-        let t383 = self.fixed[20] * t379;
-        let t390 = self.fixed[27] * t8;
-        let t398 = self.fixed[21] * t8;
-        let t406 = t14 * t14;
-        let t407 = t406 * t14;
-        let t408 = self.fixed[23] * t407;
-        let t410 = self.fixed[24] * t406;
-        let t413 = self.fixed[25] * t14;
-        let t417 = self.fixed[22] * t14;
-        let t422 = t18 * t18;
-        let t423 = t422 * t18;
-        let t424 = self.fixed[23] * t423;
-        let t426 = self.fixed[24] * t422;
-        let t429 = self.fixed[25] * t18;
-        let t433 = self.fixed[22] * t18;
-        [
-            t23,
-            t26,
-            t30,
-            t83,
-            t370,
-            t381,
-            t383,
-            t390,
-            t398,
-            t408,
-            t410,
-            t413,
-            t417,
-            t424,
-            t426,
-            t429,
-            t433,
-        ]
+        let t154 = self.fixed[7] * t8;
+        let t216 = self.fixed[18] * t8;
+        let t221 = self.fixed[19] * t14;
+        let t222 = self.fixed[19] * t18;
+        let t361 = self.fixed[21] * t8;
+        let t368 = self.fixed[22] * t8;
+        let t385 = self.fixed[24] * t14;
+        let t391 = self.fixed[25] * t14;
+        let t399 = self.fixed[24] * t18;
+        let t403 = self.fixed[25] * t18;
+        [t23, t26, t30, t83, t154, t216, t221, t222, t361, t368, t385, t391, t399, t403]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
@@ -1346,66 +1301,68 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 17, 8> for AxisAligned3d<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 17],
+        time: &[T; 14],
         point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t24 = time[0] * point[0];
         let t27 = time[1] * point[1];
         let t31 = time[2] * point[2];
         let t34 = t24 + T::one();
-        let t371 = T::one() - t27;
-        let t372 = T::one() - t31;
-        let t373 = t34 * t371;
-        let t374 = t372 * t373;
-        let t375 = T::one() / t374;
-        let t376 = t372 * t375;
-        let t377 = t371 * t376;
-        let t378 = t377 * t377;
-        let t382 = time[5] * point[0];
-        let t384 = t382 + time[6];
-        let t385 = point[0] * t384;
-        let t386 = t27 * t372;
-        let t387 = t386 + t31;
-        let t388 = t24 * t387;
-        let t391 = time[7] * point[6];
-        let t392 = time[3] * point[7];
-        let t393 = t391 - t392;
-        let t394 = t388 + t393;
-        let t395 = t27 * t31;
-        let t396 = t395 - t394;
-        let t397 = t396.ln_of_both_if::<NEAR>(t374);
-        let t399 = time[8] * t397;
-        let t400 = t385 + t399;
-        let t401 = t378 * t400;
-        let t402 = time[4] - t401;
-        let t403 = point[3] * t402;
-        let t404 = t34 * t376;
-        let t405 = t404 * t404;
-        let t409 = time[9] * point[1];
-        let t411 = t409 - time[10];
-        let t412 = point[1] * t411;
-        let t414 = time[11] * t397;
-        let t415 = t412 + t414;
-        let t416 = t405 * t415;
-        let t418 = t416 - time[12];
-        let t419 = point[4] * t418;
-        let t420 = t373 * t375;
-        let t421 = t420 * t420;
-        let t425 = time[13] * point[2];
-        let t427 = t425 - time[14];
-        let t428 = point[2] * t427;
-        let t430 = time[15] * t397;
-        let t431 = t428 + t430;
-        let t432 = t421 * t431;
-        let t434 = t432 - time[16];
-        let t435 = point[5] * t434;
-        crate::nalgebra::SVector::<T, 3>::new(t403, t419, t435)
+        let t155 = time[4] * point[3];
+        let t217 = time[5] * point[3];
+        let t351 = T::one() - t27;
+        let t352 = T::one() - t31;
+        let t353 = t34 * t351;
+        let t354 = t352 * t353;
+        let t355 = T::one() / t354;
+        let t356 = t352 * t355;
+        let t357 = t351 * t356;
+        let t358 = t357 * t155;
+        let t359 = t155 + t358;
+        let t362 = time[8] * point[0];
+        let t363 = t362 * t359;
+        let t364 = t27 * t352;
+        let t365 = t364 + t31;
+        let t366 = t24 * t365;
+        let t369 = time[9] * point[6];
+        let t370 = time[3] * point[7];
+        let t371 = t369 - t370;
+        let t372 = t366 + t371;
+        let t373 = t27 * t31;
+        let t374 = t373 - t372;
+        let t375 = t374.ln_of_both_if::<NEAR>(t354);
+        let t377 = self.fixed[23] * t375;
+        let t378 = t377 * t358;
+        let t379 = t363 + t378;
+        let t380 = t357 * t379;
+        let t381 = t217 - t380;
+        let t382 = t34 * t356;
+        let t386 = time[10] * t382;
+        let t387 = t386 * t375;
+        let t388 = t382 + T::one();
+        let t392 = time[11] * t27;
+        let t393 = t392 * t388;
+        let t394 = t387 - t393;
+        let t395 = t382 * t394;
+        let t396 = t395 - time[6];
+        let t397 = point[4] * t396;
+        let t398 = t353 * t355;
+        let t400 = time[12] * t398;
+        let t401 = t400 * t375;
+        let t402 = t398 + T::one();
+        let t404 = time[13] * t31;
+        let t405 = t404 * t402;
+        let t406 = t401 - t405;
+        let t407 = t398 * t406;
+        let t408 = t407 - time[7];
+        let t409 = point[5] * t408;
+        crate::nalgebra::SVector::<T, 3>::new(t381, t397, t409)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 13, 2, 5> for AxisAligned3d<T> {
     #[inline]
-    fn lattice_time(&self, t: T) -> [T; 15] {
+    fn lattice_time(&self, t: T) -> [T; 13] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1415,41 +1372,19 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t370 = self.fixed[18] * t8;
-        let t379 = t8 * t8;
-        let t380 = t379 * t8;
-        let t381 = self.fixed[19] * t380;
-        let t383 = self.fixed[20] * t379;
-        let t398 = self.fixed[21] * t8;
-        let t406 = t14 * t14;
-        let t407 = t406 * t14;
-        let t408 = self.fixed[23] * t407;
-        let t410 = self.fixed[24] * t406;
-        let t413 = self.fixed[25] * t14;
-        let t417 = self.fixed[22] * t14;
-        let t422 = t18 * t18;
-        let t423 = t422 * t18;
-        let t424 = self.fixed[23] * t423;
-        let t426 = self.fixed[24] * t422;
-        let t429 = self.fixed[25] * t18;
-        let t433 = self.fixed[22] * t18;
-        [
-            t23,
-            t26,
-            t30,
-            t370,
-            t381,
-            t383,
-            t398,
-            t408,
-            t410,
-            t413,
-            t417,
-            t424,
-            t426,
-            t429,
-            t433,
-        ]
+        let t154 = self.fixed[7] * t8;
+        let t216 = self.fixed[18] * t8;
+        let t221 = self.fixed[19] * t14;
+        let t222 = self.fixed[19] * t18;
+        let t361 = self.fixed[21] * t8;
+        let t385 = self.fixed[24] * t14;
+        let t391 = self.fixed[25] * t14;
+        let t399 = self.fixed[24] * t18;
+        let t403 = self.fixed[25] * t18;
+        let t426 = t26 * t391;
+        let t436 = t30 * t403;
+        let t443 = self.fixed[23] * t154;
+        [t23, t26, t30, t154, t216, t221, t222, t361, t385, t399, t426, t436, t443]
     }
     #[inline]
     fn lattice_coordinate(
@@ -1477,63 +1412,70 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
         }
     }
     #[inline]
-    fn lattice_layer(&self, axis: usize, time: &[T; 15], point: &[T; 2]) -> [T; 5] {
+    fn lattice_layer(&self, axis: usize, time: &[T; 13], point: &[T; 2]) -> [T; 5] {
         match axis {
             0 => {
                 let t24 = time[0] * point[0];
                 let t34 = t24 + T::one();
-                let t382 = time[4] * point[0];
-                let t384 = t382 + time[5];
-                let t385 = point[0] * t384;
-                let t436 = t24.ln_of_both(t34);
-                let t439 = time[6] * t436;
-                let t440 = t385 + t439;
-                let t441 = t34 * t34;
-                let t442 = t440 / t441;
-                let t443 = time[3] - t442;
-                let t454 = point[1] * t443;
-                let t455 = time[6] * point[1];
-                let t456 = t455 / t441;
-                let t461 = time[9] * t436;
-                let t470 = time[13] * t436;
-                [t454, t456, t461, t470, T::zero()]
+                let t362 = time[7] * point[0];
+                let t410 = T::one() / t34;
+                let t411 = T::one() + t410;
+                let t412 = t24.ln_of_both(t34);
+                let t415 = t362 * t411;
+                let t416 = self.fixed[23] * t412;
+                let t417 = t416 / t34;
+                let t418 = t415 + t417;
+                let t419 = time[3] * t418;
+                let t420 = t419 / t34;
+                let t421 = time[4] - t420;
+                let t442 = point[1] * t421;
+                let t444 = time[12] * point[1];
+                let t445 = t34 * t34;
+                let t446 = t444 / t445;
+                let t451 = time[8] * t412;
+                let t461 = time[9] * t412;
+                [t442, t446, t451, t461, T::zero()]
             }
             1 => {
                 let t27 = time[1] * point[0];
                 let t28 = -t27;
-                let t371 = T::one() - t27;
-                let t409 = time[7] * point[0];
-                let t411 = t409 - time[8];
-                let t412 = point[0] * t411;
-                let t437 = t28.ln_of_both(t371);
-                let t444 = time[9] * t437;
-                let t445 = t412 + t444;
-                let t446 = t371 * t371;
-                let t447 = t445 / t446;
-                let t448 = t447 - time[10];
-                let t462 = point[1] / t446;
-                let t464 = time[9] * point[1];
-                let t465 = t464 / t446;
-                let t467 = point[1] * t448;
-                let t473 = time[13] * t437;
-                [t437, t462, t465, t467, t473]
+                let t351 = T::one() - t27;
+                let t413 = t28.ln_of_both(t351);
+                let t422 = T::one() / t351;
+                let t423 = t422 + T::one();
+                let t424 = time[8] * t413;
+                let t425 = t424 / t351;
+                let t427 = time[10] * point[0];
+                let t428 = t427 * t423;
+                let t429 = t425 - t428;
+                let t430 = t429 / t351;
+                let t431 = t430 - time[5];
+                let t452 = t351 * t351;
+                let t453 = point[1] / t452;
+                let t455 = time[8] * point[1];
+                let t456 = t455 / t452;
+                let t458 = point[1] * t431;
+                let t465 = time[9] * t413;
+                [t413, t453, t456, t458, t465]
             }
             2 => {
                 let t31 = time[2] * point[0];
                 let t32 = -t31;
-                let t372 = T::one() - t31;
-                let t425 = time[11] * point[0];
-                let t427 = t425 - time[12];
-                let t428 = point[0] * t427;
-                let t438 = t32.ln_of_both(t372);
-                let t449 = time[13] * t438;
-                let t450 = t428 + t449;
-                let t451 = t372 * t372;
-                let t452 = t450 / t451;
-                let t453 = t452 - time[14];
-                let t471 = point[1] / t451;
-                let t475 = point[1] * t453;
-                [t438, t471, t475, T::zero(), T::zero()]
+                let t352 = T::one() - t31;
+                let t414 = t32.ln_of_both(t352);
+                let t432 = T::one() / t352;
+                let t433 = t432 + T::one();
+                let t434 = time[9] * t414;
+                let t435 = t434 / t352;
+                let t437 = time[11] * point[0];
+                let t438 = t437 * t433;
+                let t439 = t435 - t438;
+                let t440 = t439 / t352;
+                let t441 = t440 - time[6];
+                let t462 = t352 * t352;
+                let t463 = point[1] / t462;
+                let t467 = point[1] * t441;
+                [t414, t463, t467, T::zero(), T::zero()]
             }
             _ => [T::zero(); 5],
         }
@@ -1541,22 +1483,22 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 15, 2, 5> for AxisAligned3d
     #[inline(always)]
     fn lattice_body_force(
         &self,
-        time: &[T; 15],
+        time: &[T; 13],
         layers: [&[T; 5]; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t457 = layers[0][1] * layers[1][0];
-        let t458 = layers[0][1] * layers[2][0];
-        let t459 = layers[0][0] - t457;
-        let t460 = t459 - t458;
-        let t463 = layers[0][2] * layers[1][1];
-        let t466 = layers[1][2] * layers[2][0];
-        let t468 = t463 + t466;
-        let t469 = t468 + layers[1][3];
-        let t472 = layers[0][3] * layers[2][1];
-        let t474 = layers[1][4] * layers[2][1];
-        let t476 = t472 + t474;
-        let t477 = t476 + layers[2][2];
-        crate::nalgebra::SVector::<T, 3>::new(t460, t469, t477)
+        let t447 = layers[0][1] * layers[1][0];
+        let t448 = layers[0][1] * layers[2][0];
+        let t449 = layers[0][0] - t447;
+        let t450 = t449 - t448;
+        let t454 = layers[0][2] * layers[1][1];
+        let t457 = layers[1][2] * layers[2][0];
+        let t459 = t454 + t457;
+        let t460 = t459 + layers[1][3];
+        let t464 = layers[0][3] * layers[2][1];
+        let t466 = layers[1][4] * layers[2][1];
+        let t468 = t464 + t466;
+        let t469 = t468 + layers[2][2];
+        crate::nalgebra::SVector::<T, 3>::new(t450, t460, t469)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -40,7 +40,7 @@ impl<T: crate::Real> Default for BarParameters<T> {
 pub struct Bar<T: crate::Real> {
     parameters: BarParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 18],
+    fixed: [T; 17],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Bar<T> {
@@ -152,38 +152,19 @@ impl<T: crate::Real> Bar<T> {
         let t63 = t62 / t25;
         let t67 = t56 + t46;
         let t74 = T::one() / parameters.rho0;
-        let t80 = parameters.A * parameters.A;
-        let t81 = t80 * parameters.A;
-        let t82 = t25 * t25;
-        let t83 = t26 * t26;
-        let t84 = T::nearest(16.0) * t81;
-        let t85 = t84 * t83;
-        let t86 = t85 * t46;
-        let t87 = parameters.rho0 * t82;
-        let t88 = t86 / t87;
-        let t89 = t25 * parameters.L;
-        let t90 = t26 * T::pi();
-        let t91 = T::nearest(16.0) * t80;
-        let t92 = t91 * t90;
-        let t93 = t92 * t46;
-        let t94 = parameters.rho0 * t89;
-        let t95 = t93 / t94;
-        let t96 = t61 * parameters.E;
-        let t97 = t96 * parameters.nu;
-        let t98 = t97 * t26;
-        let t99 = t29 * t43;
-        let t100 = t99 * t50;
-        let t101 = t98 / t100;
-        let t102 = t46 + t67;
-        let t103 = t62 * t102;
-        let t104 = t103 / t29;
-        let t105 = T::nearest(2.0) * parameters.L;
-        let t106 = t105 / t11;
-        let t108 = -t36;
+        let t79 = T::nearest(2.0) * parameters.L;
+        let t80 = t79 / t11;
+        let t82 = -t36;
+        let t94 = t46 * t63;
+        let t95 = t94 * t74;
+        let t98 = t56 * t63;
+        let t99 = t98 * t74;
+        let t103 = t63 * t67;
+        let t104 = t103 * t74;
         if !(t36 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("2*Pi*A < L", &values));
         }
-        if !(t108 < parameters.L) {
+        if !(t82 < parameters.L) {
             return Err(Self::DESCRIPTION.requirement_broken("-2*Pi*A < L", &values));
         }
         Ok(Bar {
@@ -201,12 +182,11 @@ impl<T: crate::Real> Bar<T> {
                 t63,
                 t67,
                 t74,
-                t88,
+                t80,
+                t82,
                 t95,
-                t101,
+                t99,
                 t104,
-                t106,
-                t108,
             ],
         })
     }
@@ -444,32 +424,32 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t109 = t38 + T::one();
-                let t110 = T::one() / t109;
-                let t111 = t110 + T::one();
-                let t112 = t38.log_1p();
-                let t113 = t38 * t111;
-                let t114 = self.fixed[7] * t113;
-                let t115 = t112 * t110;
-                let t116 = self.fixed[8] * t115;
-                let t117 = t114 + t116;
-                let t118 = -t117;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t118))
+                let t83 = t38 + T::one();
+                let t84 = T::one() / t83;
+                let t85 = t84 + T::one();
+                let t86 = t38.log_1p();
+                let t87 = t38 * t85;
+                let t88 = self.fixed[7] * t87;
+                let t89 = t86 * t84;
+                let t90 = self.fixed[8] * t89;
+                let t91 = t88 + t90;
+                let t92 = -t91;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t92))
             }
             crate::Surface::Upper(0) => {
                 let t13 = self.fixed[2] * t;
                 let t14 = t13.cos_pi();
                 let t38 = self.fixed[6] * t14;
-                let t109 = t38 + T::one();
-                let t110 = T::one() / t109;
-                let t111 = t110 + T::one();
-                let t112 = t38.log_1p();
-                let t113 = t38 * t111;
-                let t114 = self.fixed[7] * t113;
-                let t115 = t112 * t110;
-                let t116 = self.fixed[8] * t115;
-                let t117 = t114 + t116;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t117))
+                let t83 = t38 + T::one();
+                let t84 = T::one() / t83;
+                let t85 = t84 + T::one();
+                let t86 = t38.log_1p();
+                let t87 = t38 * t85;
+                let t88 = self.fixed[7] * t87;
+                let t89 = t86 * t84;
+                let t90 = self.fixed[8] * t89;
+                let t91 = t88 + t90;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t91))
             }
             _ => None,
         }
@@ -508,14 +488,14 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
         self.fixed[1]
     }
     fn period(&self) -> T {
-        self.fixed[16]
+        self.fixed[12]
     }
     fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 1>],
         _lattice: ::std::option::Option<crate::Lattice<T, 1>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 1> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 2>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 2>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -525,20 +505,21 @@ impl<T: crate::Real> crate::Solution<T, 1> for Bar<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 1, 6, 2> for Bar<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 1, 5, 2> for Bar<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 6] {
+    fn body_force_time(&self, t: T) -> [T; 5] {
         let t13 = self.fixed[2] * t;
         let t14 = t13.cos_pi();
         let t31 = self.fixed[4] * t14;
         let t38 = self.fixed[6] * t14;
-        let t119 = self.fixed[15] * t14;
-        let t120 = t14 * t14;
-        let t121 = self.fixed[13] * t120;
-        let t122 = t120 * t14;
-        let t123 = self.fixed[12] * t122;
-        let t127 = self.fixed[14] * t14;
-        [t31, t38, t119, t121, t123, t127]
+        let t93 = -t31;
+        let t96 = self.fixed[14] * t14;
+        let t97 = -t96;
+        let t100 = self.fixed[15] * t14;
+        let t101 = -t100;
+        let t105 = self.fixed[16] * t14;
+        let t106 = -t105;
+        [t38, t93, t97, t101, t106]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -550,24 +531,21 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 6, 2> for Bar<T> {
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 6],
+        time: &[T; 5],
         point: &[T; 2],
     ) -> crate::nalgebra::SVector<T, 1> {
-        let t39 = time[1] * point[1];
+        let t39 = time[0] * point[1];
         let t41 = t39 + T::one();
         let t47 = T::one() / t41;
         let t51 = t39.log_1p();
         let t71 = t47 * t47;
-        let t124 = time[4] * point[1];
-        let t125 = time[3] + t124;
-        let t126 = point[1] * t125;
-        let t128 = time[5] * t51;
-        let t129 = t126 - t128;
-        let t130 = time[2] + t129;
-        let t131 = t71 * t130;
-        let t132 = t131 - time[0];
-        let t133 = point[0] * t132;
-        crate::nalgebra::SVector::<T, 1>::new(t133)
+        let t102 = time[3] * t51;
+        let t107 = t102 - time[4];
+        let t108 = t71 * t107;
+        let t109 = time[2] - t108;
+        let t110 = time[1] - t109;
+        let t111 = point[0] * t110;
+        crate::nalgebra::SVector::<T, 1>::new(t111)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -854,22 +854,22 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for Ring<T> {
         let t129 = t73 * t35;
         let t130 = time[0] * t129;
         let t131 = t130 * t100;
-        let t145 = point[0] * t35;
-        let t146 = t122 * t98;
-        let t147 = t146 + t131;
-        let t148 = t31 * point[3];
-        let t149 = time[0] * t148;
-        let t150 = t35 * t91;
-        let t151 = t147 * t98;
-        let t152 = t122 - t149;
+        let t145 = t122 * t98;
+        let t146 = t145 + t131;
+        let t147 = t31 * point[3];
+        let t148 = time[0] * t147;
+        let t149 = t35 * t91;
+        let t150 = t146 * t98;
+        let t151 = t122 - t148;
+        let t152 = t151 + t149;
         let t153 = t152 + t150;
-        let t154 = t153 + t151;
-        let t155 = self.fixed[11] * t154;
-        let t156 = t119 + t155;
-        let t157 = -t156;
-        let t158 = t145 * t157;
+        let t154 = self.fixed[11] * t153;
+        let t155 = t119 + t154;
+        let t156 = -t155;
+        let t157 = point[0] * t35;
+        let t158 = t157 * t156;
         let t159 = point[1] * t35;
-        let t160 = t159 * t157;
+        let t160 = t159 * t156;
         crate::nalgebra::SVector::<T, 2>::new(t158, t160)
     }
 }

@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 66],
+    fixed: [T; 26],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -142,121 +142,16 @@ impl<T: crate::Real> Skew2d<T> {
         let t179 = T::nearest(0.05) * parameters.A;
         let t190 = T::nearest(0.8) * parameters.A;
         let t210 = T::one() / parameters.rho0;
-        let t227 = T::nearest(3.0) * T::pi();
-        let t233 = parameters.A * parameters.A;
-        let t234 = t233 * t233;
-        let t235 = t234 * parameters.A;
-        let t238 = T::nearest(0.1) * t235;
-        let t239 = t238 * t105;
-        let t240 = t239 / parameters.rho0;
-        let t242 = T::nearest(6.0) * t234;
-        let t243 = t242 * t105;
-        let t244 = t243 / parameters.rho0;
-        let t245 = T::nearest(0.2) * t234;
-        let t246 = t245 * t105;
-        let t247 = t246 / parameters.rho0;
-        let t249 = T::nearest(6.0) * T::pi();
-        let t255 = t233 * parameters.A;
-        let t256 = T::nearest(2.0) * t255;
-        let t257 = t256 * t105;
-        let t258 = t257 / parameters.rho0;
-        let t261 = T::nearest(4.0) * T::pi();
-        let t263 = T::nearest(3.0) * t58;
-        let t284 = T::nearest(0.005) * t255;
-        let t285 = t284 * parameters.E;
-        let t286 = t285 * parameters.nu;
-        let t287 = parameters.rho0 * t103;
-        let t288 = t287 * t112;
-        let t289 = t286 / t288;
-        let t295 = T::nearest(20.0) * t105;
-        let t299 = t284 / parameters.rho0;
-        let t307 = T::nearest(0.2) * t233;
-        let t308 = t307 * parameters.E;
-        let t309 = t308 * parameters.nu;
-        let t310 = t309 / t288;
-        let t313 = T::nearest(10.0) * t105;
-        let t317 = t307 / parameters.rho0;
-        let t320 = T::nearest(90.0) * t255;
-        let t321 = t320 * t105;
-        let t322 = t321 / parameters.rho0;
-        let t324 = T::nearest(60.0) * t233;
-        let t325 = t324 * t105;
-        let t326 = t325 / parameters.rho0;
-        let t327 = t154 * parameters.E;
-        let t328 = t327 * parameters.nu;
-        let t329 = t328 / t288;
-        let t330 = T::nearest(9.0) * t161;
-        let t331 = t313 + t330;
-        let t332 = parameters.A * t331;
-        let t333 = t332 / parameters.rho0;
-        let t335 = T::nearest(0.005) * t233;
-        let t336 = t335 * parameters.E;
-        let t337 = t336 * parameters.nu;
-        let t338 = t337 / t288;
-        let t339 = t335 * t161;
-        let t340 = t339 / parameters.rho0;
-        let t341 = t172 * parameters.E;
-        let t342 = t341 * parameters.nu;
-        let t343 = t342 / t288;
-        let t344 = t172 * t161;
-        let t345 = t344 / parameters.rho0;
-        let t349 = t58 + T::nearest(16.0);
-        let t354 = T::nearest(0.0005) * t235;
-        let t355 = t354 * t105;
-        let t356 = t355 / parameters.rho0;
-        let t359 = T::nearest(0.03) * t234;
-        let t360 = t359 * t105;
-        let t361 = t360 / parameters.rho0;
-        let t362 = T::nearest(9.0) * t58;
-        let t363 = t362 + T::nearest(16.0);
-        let t370 = T::nearest(24.0) * T::pi();
-        let t375 = T::nearest(0.05) * t255;
-        let t376 = t375 * parameters.E;
-        let t377 = t376 * parameters.nu;
-        let t378 = t377 / t288;
-        let t379 = T::nearest(9.0) * t105;
-        let t380 = t375 / parameters.rho0;
-        let t382 = T::nearest(0.001) * t234;
-        let t383 = t382 * t105;
-        let t384 = t383 / parameters.rho0;
-        let t386 = T::nearest(0.01) * t255;
-        let t387 = t386 * t105;
-        let t388 = t387 / parameters.rho0;
-        let t391 = T::nearest(0.1) * t233;
-        let t392 = t391 * parameters.E;
-        let t393 = t392 * parameters.nu;
-        let t394 = t393 / t288;
-        let t395 = T::nearest(3.0) * t105;
-        let t396 = t391 / parameters.rho0;
-        let t397 = T::nearest(0.0005) * t255;
-        let t398 = t397 * t105;
-        let t399 = t398 / parameters.rho0;
-        let t403 = T::nearest(0.01) * t233;
-        let t404 = t403 * t105;
-        let t405 = t404 / parameters.rho0;
-        let t406 = t179 * parameters.E;
-        let t407 = t406 * parameters.nu;
-        let t408 = t407 / t288;
-        let t409 = t179 / parameters.rho0;
-        let t410 = t75 * parameters.E;
-        let t411 = t410 * parameters.nu;
-        let t412 = t411 / t288;
-        let t413 = t75 * t161;
-        let t414 = t413 / parameters.rho0;
-        let t416 = T::nearest(2.0) / t21;
-        let t421 = t42 * T::pi();
-        let t463 = T::nearest(2.0).cos();
-        let t465 = T::pi() * t463;
-        let t470 = T::nearest(2.0).sin();
-        let t471 = T::nearest(4.0) * t470;
-        let t506 = parameters.A * t105;
-        let t586 = parameters.A * t42;
-        let t647 = t161 * t380;
-        let t650 = t379 * t380;
-        let t670 = t161 * t396;
-        let t673 = t395 * t396;
-        let t689 = t105 * t409;
-        let t692 = t161 * t409;
+        let t233 = T::nearest(2.0) / t21;
+        let t238 = t42 * T::pi();
+        let t280 = T::nearest(2.0).cos();
+        let t282 = T::pi() * t280;
+        let t287 = T::nearest(2.0).sin();
+        let t288 = T::nearest(4.0) * t287;
+        let t323 = parameters.A * t105;
+        let t383 = t323 * t210;
+        let t387 = t105 * t210;
+        let t415 = -t210;
         Ok(Skew2d {
             parameters,
             fixed: [
@@ -278,54 +173,14 @@ impl<T: crate::Real> Skew2d<T> {
                 t179,
                 t190,
                 t210,
-                t227,
-                t240,
-                t244,
-                t247,
-                t249,
-                t258,
-                t261,
-                t263,
-                t289,
-                t295,
-                t299,
-                t310,
-                t313,
-                t317,
-                t322,
-                t326,
-                t329,
-                t333,
-                t338,
-                t340,
-                t343,
-                t345,
-                t349,
-                t356,
-                t361,
-                t363,
-                t370,
-                t378,
-                t384,
-                t388,
-                t394,
-                t399,
-                t405,
-                t408,
-                t412,
-                t414,
-                t416,
-                t421,
-                t465,
-                t471,
-                t506,
-                t586,
-                t647,
-                t650,
-                t670,
-                t673,
-                t689,
-                t692,
+                t233,
+                t238,
+                t282,
+                t288,
+                t323,
+                t383,
+                t387,
+                t415,
             ],
         })
     }
@@ -1052,40 +907,40 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t418 = X[1].cos();
-                let t419 = t76 * t418;
-                let t420 = t419 + T::one();
-                let t422 = self.fixed[55] * t40;
-                let t423 = t422 * t84;
-                let t424 = t423 + T::one();
-                let t425 = t43 * t33;
-                let t426 = t420 * t424;
-                let t427 = t24 * t418;
-                let t428 = t427 * t425;
-                let t429 = t426 - t428;
-                let t430 = t419 * t424;
-                let t431 = t428 - t430;
-                let t432 = T::one() / t429;
-                let t433 = t431 * t432;
-                let t434 = t419 - t433;
-                let t435 = t430 + t423;
-                let t436 = t435 - t428;
-                let t437 = t436.log_1p();
-                let t438 = self.fixed[8] * t434;
-                let t439 = t424 * t437;
-                let t440 = t439 * t432;
-                let t441 = self.fixed[9] * t440;
-                let t442 = t438 + t441;
-                let t443 = -t442;
-                let t444 = t427 * t432;
-                let t445 = t425 + t444;
-                let t446 = self.fixed[8] * t445;
-                let t447 = t136 * t418;
-                let t448 = t437 * t432;
-                let t449 = t447 * t448;
-                let t450 = t446 - t449;
-                let t451 = -t450;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t443, t451))
+                let t235 = X[1].cos();
+                let t236 = t76 * t235;
+                let t237 = t236 + T::one();
+                let t239 = self.fixed[19] * t40;
+                let t240 = t239 * t84;
+                let t241 = t240 + T::one();
+                let t242 = t43 * t33;
+                let t243 = t237 * t241;
+                let t244 = t24 * t235;
+                let t245 = t244 * t242;
+                let t246 = t243 - t245;
+                let t247 = t236 * t241;
+                let t248 = t245 - t247;
+                let t249 = T::one() / t246;
+                let t250 = t248 * t249;
+                let t251 = t236 - t250;
+                let t252 = t247 + t240;
+                let t253 = t252 - t245;
+                let t254 = t253.log_1p();
+                let t255 = self.fixed[8] * t251;
+                let t256 = t241 * t254;
+                let t257 = t256 * t249;
+                let t258 = self.fixed[9] * t257;
+                let t259 = t255 + t258;
+                let t260 = -t259;
+                let t261 = t244 * t249;
+                let t262 = t242 + t261;
+                let t263 = self.fixed[8] * t262;
+                let t264 = t136 * t235;
+                let t265 = t254 * t249;
+                let t266 = t264 * t265;
+                let t267 = t263 - t266;
+                let t268 = -t267;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t260, t268))
             }
             crate::Surface::Upper(0) => {
                 let t22 = self.fixed[0] * t;
@@ -1102,50 +957,50 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t84 = t29.cos_pi();
                 let t136 = self.fixed[10] * t23;
-                let t452 = T::nearest(3.0).sum_error(X[1]);
-                let t453 = T::nearest(3.0) + X[1];
-                let t454 = t453.cos();
-                let t455 = t453.sin();
-                let t456 = T::nearest(0.5) * t452;
-                let t457 = t456 * t454;
-                let t458 = t455 + t457;
-                let t459 = t452 * t458;
-                let t460 = t454 - t459;
-                let t461 = t76 * t460;
-                let t462 = t461 + T::one();
-                let t464 = T::nearest(2.0) * X[1];
-                let t466 = self.fixed[56] * t84;
-                let t467 = t464 + t466;
-                let t468 = t43 * t467;
-                let t469 = t468 + T::one();
-                let t472 = self.fixed[57] * t30;
-                let t473 = t33 - t472;
-                let t474 = t43 * t473;
-                let t475 = t462 * t469;
-                let t476 = t24 * t460;
-                let t477 = t476 * t474;
-                let t478 = t475 - t477;
-                let t479 = t461 * t469;
-                let t480 = t477 - t479;
-                let t481 = T::one() / t478;
-                let t482 = t480 * t481;
-                let t483 = t461 - t482;
-                let t484 = t479 + t468;
-                let t485 = t484 - t477;
-                let t486 = t485.log_1p();
-                let t487 = self.fixed[8] * t483;
-                let t488 = t469 * t486;
-                let t489 = t488 * t481;
-                let t490 = self.fixed[9] * t489;
-                let t491 = t487 + t490;
-                let t492 = t476 * t481;
-                let t493 = t474 + t492;
-                let t494 = self.fixed[8] * t493;
-                let t495 = t136 * t460;
-                let t496 = t486 * t481;
-                let t497 = t495 * t496;
-                let t498 = t494 - t497;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t491, t498))
+                let t269 = T::nearest(3.0).sum_error(X[1]);
+                let t270 = T::nearest(3.0) + X[1];
+                let t271 = t270.cos();
+                let t272 = t270.sin();
+                let t273 = T::nearest(0.5) * t269;
+                let t274 = t273 * t271;
+                let t275 = t272 + t274;
+                let t276 = t269 * t275;
+                let t277 = t271 - t276;
+                let t278 = t76 * t277;
+                let t279 = t278 + T::one();
+                let t281 = T::nearest(2.0) * X[1];
+                let t283 = self.fixed[20] * t84;
+                let t284 = t281 + t283;
+                let t285 = t43 * t284;
+                let t286 = t285 + T::one();
+                let t289 = self.fixed[21] * t30;
+                let t290 = t33 - t289;
+                let t291 = t43 * t290;
+                let t292 = t279 * t286;
+                let t293 = t24 * t277;
+                let t294 = t293 * t291;
+                let t295 = t292 - t294;
+                let t296 = t278 * t286;
+                let t297 = t294 - t296;
+                let t298 = T::one() / t295;
+                let t299 = t297 * t298;
+                let t300 = t278 - t299;
+                let t301 = t296 + t285;
+                let t302 = t301 - t294;
+                let t303 = t302.log_1p();
+                let t304 = self.fixed[8] * t300;
+                let t305 = t286 * t303;
+                let t306 = t305 * t298;
+                let t307 = self.fixed[9] * t306;
+                let t308 = t304 + t307;
+                let t309 = t293 * t298;
+                let t310 = t291 + t309;
+                let t311 = self.fixed[8] * t310;
+                let t312 = t136 * t277;
+                let t313 = t303 * t298;
+                let t314 = t312 * t313;
+                let t315 = t311 - t314;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t308, t315))
             }
             crate::Surface::Lower(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1159,32 +1014,32 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t39 = T::nearest(4.0) * t36;
                 let t40 = t37 + t39;
                 let t76 = self.fixed[7] * t23;
-                let t422 = self.fixed[55] * t40;
-                let t499 = t4.cos();
-                let t500 = t4.sin();
-                let t501 = T::nearest(0.5) * t3;
-                let t502 = t501 * t499;
-                let t503 = t500 + t502;
-                let t504 = t3 * t503;
-                let t505 = t499 - t504;
-                let t507 = self.fixed[58] * t23;
-                let t508 = t507 * t505;
-                let t509 = -t508;
-                let t510 = t422 * t28;
-                let t511 = t510 + T::one();
-                let t512 = T::one() / t511;
-                let t513 = t512 + T::one();
-                let t514 = t76 * t505;
-                let t515 = t514 * t511;
-                let t516 = t515 + t510;
-                let t517 = t516.log_1p();
-                let t518 = t510 * t513;
-                let t519 = self.fixed[8] * t518;
-                let t520 = t517 * t512;
-                let t521 = self.fixed[9] * t520;
-                let t522 = t519 + t521;
-                let t523 = -t522;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t509, t523))
+                let t239 = self.fixed[19] * t40;
+                let t316 = t4.cos();
+                let t317 = t4.sin();
+                let t318 = T::nearest(0.5) * t3;
+                let t319 = t318 * t316;
+                let t320 = t317 + t319;
+                let t321 = t3 * t320;
+                let t322 = t316 - t321;
+                let t324 = self.fixed[22] * t23;
+                let t325 = t324 * t322;
+                let t326 = -t325;
+                let t327 = t239 * t28;
+                let t328 = t327 + T::one();
+                let t329 = T::one() / t328;
+                let t330 = t329 + T::one();
+                let t331 = t76 * t322;
+                let t332 = t331 * t328;
+                let t333 = t332 + t327;
+                let t334 = t333.log_1p();
+                let t335 = t327 * t330;
+                let t336 = self.fixed[8] * t335;
+                let t337 = t334 * t329;
+                let t338 = self.fixed[9] * t337;
+                let t339 = t336 + t338;
+                let t340 = -t339;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t326, t340))
             }
             crate::Surface::Upper(1) => {
                 let t3 = T::nearest(3.0).product_error(X[0]);
@@ -1201,49 +1056,49 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t76 = self.fixed[7] * t23;
                 let t79 = t27.sin();
                 let t173 = self.fixed[14] * t40;
-                let t524 = T::one().sum_error(t4);
-                let t525 = T::one() + t4;
-                let t526 = t3 + t524;
-                let t527 = t525.cos();
-                let t528 = t525.sin();
-                let t529 = T::nearest(0.5) * t526;
-                let t530 = t529 * t527;
-                let t531 = t528 + t530;
-                let t532 = t526 * t531;
-                let t533 = t527 - t532;
-                let t534 = T::nearest(4.0) * t79;
-                let t535 = T::one() - t534;
-                let t536 = t43 * t535;
-                let t537 = t76 * t533;
-                let t538 = t537 + T::one();
-                let t539 = t173 * X[0];
-                let t540 = t539 + T::one();
-                let t541 = t538 * t540;
-                let t542 = t24 * t533;
-                let t543 = t542 * t536;
-                let t544 = t541 - t543;
-                let t545 = T::one() / t544;
-                let t546 = t536 * t545;
-                let t547 = t542 + t546;
-                let t548 = t537 * t540;
-                let t549 = t548 + t539;
-                let t550 = t549 - t543;
-                let t551 = t550.log_1p();
-                let t552 = self.fixed[8] * t547;
-                let t553 = t536 * t551;
-                let t554 = t553 * t545;
-                let t555 = self.fixed[9] * t554;
-                let t556 = t552 - t555;
-                let t557 = t538 * t539;
-                let t558 = t543 - t557;
-                let t559 = t558 * t545;
-                let t560 = t539 - t559;
-                let t561 = self.fixed[8] * t560;
-                let t562 = t538 * t551;
-                let t563 = t562 * t545;
-                let t564 = self.fixed[9] * t563;
-                let t565 = t561 + t564;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t556, t565))
+                let t341 = T::one().sum_error(t4);
+                let t342 = T::one() + t4;
+                let t343 = t3 + t341;
+                let t344 = t342.cos();
+                let t345 = t342.sin();
+                let t346 = T::nearest(0.5) * t343;
+                let t347 = t346 * t344;
+                let t348 = t345 + t347;
+                let t349 = t343 * t348;
+                let t350 = t344 - t349;
+                let t351 = T::nearest(4.0) * t79;
+                let t352 = T::one() - t351;
+                let t353 = t43 * t352;
+                let t354 = t76 * t350;
+                let t355 = t354 + T::one();
+                let t356 = t173 * X[0];
+                let t357 = t356 + T::one();
+                let t358 = t355 * t357;
+                let t359 = t24 * t350;
+                let t360 = t359 * t353;
+                let t361 = t358 - t360;
+                let t362 = T::one() / t361;
+                let t363 = t353 * t362;
+                let t364 = t359 + t363;
+                let t365 = t354 * t357;
+                let t366 = t365 + t356;
+                let t367 = t366 - t360;
+                let t368 = t367.log_1p();
+                let t369 = self.fixed[8] * t364;
+                let t370 = t353 * t368;
+                let t371 = t370 * t362;
+                let t372 = self.fixed[9] * t371;
+                let t373 = t369 - t372;
+                let t374 = t355 * t356;
+                let t375 = t360 - t374;
+                let t376 = t375 * t362;
+                let t377 = t356 - t376;
+                let t378 = self.fixed[8] * t377;
+                let t379 = t355 * t368;
+                let t380 = t379 * t362;
+                let t381 = self.fixed[9] * t380;
+                let t382 = t378 + t381;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t373, t382))
             }
             _ => None,
         }
@@ -1290,14 +1145,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[54]
+        self.fixed[18]
     }
     fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 2>],
         _lattice: ::std::option::Option<crate::Lattice<T, 2>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 2> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 35, 17>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 9, 8>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1307,97 +1162,31 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 2, 35, 17> for Skew2d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 8> for Skew2d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 35] {
+    fn body_force_time(&self, t: T) -> [T; 9] {
         let t22 = self.fixed[0] * t;
         let t23 = t22.cos_pi();
+        let t24 = self.parameters.A * t23;
         let t36 = t22.sin_pi();
         let t37 = T::nearest(3.0) * t23;
         let t39 = T::nearest(4.0) * t36;
         let t40 = t37 + t39;
         let t43 = self.fixed[1] * t40;
         let t62 = self.fixed[5] * t23;
+        let t68 = self.fixed[6] * t40;
         let t76 = self.fixed[7] * t23;
-        let t566 = self.fixed[35] * t23;
-        let t568 = t23 * t23;
-        let t569 = t568 * t40;
-        let t570 = self.fixed[19] * t569;
-        let t572 = self.fixed[20] * t568;
-        let t577 = t23 * t40;
-        let t578 = self.fixed[21] * t577;
-        let t582 = self.fixed[23] * t23;
-        let t587 = self.fixed[59] * t577;
-        let t600 = self.fixed[33] * t568;
-        let t602 = t568 * t23;
-        let t603 = self.fixed[32] * t602;
-        let t607 = self.fixed[34] * t23;
-        let t615 = t40 * t40;
-        let t616 = self.fixed[37] * t615;
-        let t617 = self.fixed[36] * t615;
-        let t621 = self.fixed[38] * t40;
-        let t625 = self.fixed[39] * t40;
-        let t634 = t569 * t40;
-        let t635 = self.fixed[42] * t634;
-        let t637 = t634 * t40;
-        let t638 = self.fixed[41] * t637;
-        let t642 = self.fixed[45] * t569;
-        let t648 = self.fixed[60] * t569;
-        let t651 = self.fixed[61] * t569;
-        let t656 = t577 * t40;
-        let t657 = self.fixed[47] * t656;
-        let t660 = t656 * t40;
-        let t661 = self.fixed[46] * t660;
-        let t666 = self.fixed[48] * t577;
-        let t671 = self.fixed[62] * t577;
-        let t674 = self.fixed[63] * t577;
-        let t678 = t615 * t40;
-        let t680 = self.fixed[50] * t615;
-        let t685 = self.fixed[51] * t40;
-        let t690 = self.fixed[64] * t40;
-        let t693 = self.fixed[65] * t40;
-        let t697 = self.fixed[53] * t23;
-        let t698 = self.fixed[52] * t23;
-        [
-            t40,
-            t43,
-            t62,
-            t76,
-            t566,
-            t570,
-            t572,
-            t577,
-            t578,
-            t582,
-            t587,
-            t600,
-            t603,
-            t607,
-            t616,
-            t617,
-            t621,
-            t625,
-            t635,
-            t638,
-            t642,
-            t648,
-            t651,
-            t657,
-            t661,
-            t666,
-            t671,
-            t674,
-            t678,
-            t680,
-            t685,
-            t690,
-            t693,
-            t697,
-            t698,
-        ]
+        let t155 = self.fixed[12] * t23;
+        let t173 = self.fixed[14] * t40;
+        let t180 = self.fixed[15] * t40;
+        let t191 = self.fixed[16] * t40;
+        let t384 = self.fixed[23] * t23;
+        let t385 = t384 - t62;
+        let t408 = -t68;
+        [t24, t43, t76, t155, t173, t180, t191, t385, t408]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 17] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
         let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
         let t6 = t4.sum_error(X[1]);
@@ -1439,209 +1228,73 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 35, 17> for Skew2d<T> {
         let t175 = T::nearest(4.0) * X[0];
         let t176 = self.fixed[4] * t31;
         let t177 = t175 - t176;
-        let t228 = self.fixed[18] * t85;
-        let t230 = T::nearest(6.0) * t87;
-        let t231 = t82 - t228;
-        let t232 = t231 - t230;
-        let t250 = self.fixed[22] * t85;
-        let t252 = T::nearest(12.0) * t87;
-        let t253 = t82 - t250;
-        let t254 = t253 - t252;
-        let t259 = T::nearest(12.0) * X[0];
-        let t260 = T::nearest(4.0) * X[1];
-        let t262 = self.fixed[24] * t168;
-        let t264 = self.fixed[25] * t31;
-        let t265 = t259 - t260;
-        let t266 = t265 + t262;
-        let t267 = t266 - t264;
-        let t268 = t16 * t232;
-        let t269 = T::nearest(2.0) * t268;
-        let t270 = t74 * t267;
-        let t271 = t269 + t270;
-        let t272 = T::nearest(4.0) * t31;
-        let t273 = T::nearest(3.0) * t170;
-        let t274 = t272 + t273;
-        let t275 = T::nearest(2.0) * t274;
-        let t276 = t74 * t275;
-        let t277 = T::nearest(3.0) * t268;
-        let t278 = t276 + t277;
-        let t279 = t82 * t271;
-        let t280 = t89 * t278;
-        let t281 = T::nearest(2.0) * t280;
-        let t282 = t279 - t281;
-        let t290 = self.fixed[26] * t282;
-        let t291 = -t290;
-        let t292 = self.fixed[13] * t282;
-        let t294 = t89 * t89;
-        let t296 = t16 * t294;
-        let t297 = self.fixed[27] * t296;
-        let t298 = t292 + t297;
-        let t300 = self.fixed[28] * t298;
-        let t301 = t74 * t170;
-        let t302 = t301 + t268;
-        let t303 = T::nearest(3.0) * t302;
-        let t304 = t31 * t74;
-        let t305 = T::nearest(4.0) * t304;
-        let t306 = t303 + t305;
-        let t311 = self.fixed[29] * t306;
-        let t312 = self.fixed[13] * t306;
-        let t314 = t16 * t89;
-        let t315 = self.fixed[30] * t314;
-        let t316 = t312 - t315;
-        let t318 = self.fixed[31] * t316;
-        let t346 = self.fixed[6] * t35;
-        let t347 = -t346;
-        let t350 = self.fixed[40] * t30;
-        let t351 = t28 * t350;
-        let t352 = t175 - t351;
-        let t364 = self.fixed[43] * t30;
-        let t365 = t28 * t364;
-        let t367 = T::nearest(36.0) * X[0];
-        let t369 = T::nearest(24.0) * X[1];
-        let t371 = self.fixed[44] * t168;
-        let t372 = t367 - t365;
-        let t373 = t372 - t369;
-        let t374 = t373 + t371;
-        let t390 = t268 + t270;
-        let t400 = t294 * t352;
-        let t401 = self.fixed[49] * t400;
-        let t402 = -t401;
-        [
-            t16,
-            t74,
-            t82,
-            t89,
-            t170,
-            t177,
-            t232,
-            t254,
-            t291,
-            t300,
-            t311,
-            t318,
-            t347,
-            t352,
-            t374,
-            t390,
-            t402,
-        ]
+        [t16, t31, t35, t74, t82, t89, t170, t177]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 35],
-        point: &[T; 17],
+        time: &[T; 9],
+        point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t63 = time[2] * point[0];
-        let t77 = time[3] * point[1];
-        let t90 = time[1] * point[3];
+        let t77 = time[2] * point[3];
+        let t78 = time[0] * point[3];
+        let t83 = time[1] * point[4];
+        let t90 = time[1] * point[5];
         let t92 = t77 + T::one();
         let t98 = t90 + T::one();
         let t99 = t92 * t98;
+        let t100 = t78 * t83;
+        let t101 = t99 - t100;
         let t106 = t77 * t98;
+        let t108 = T::one() / t101;
         let t113 = t106 + t90;
-        let t236 = point[1] * point[1];
-        let t237 = point[6] * point[6];
-        let t241 = point[0] * t236;
-        let t248 = point[0] * point[1];
-        let t334 = point[2] * point[5];
-        let t357 = t236 * point[13];
-        let t389 = point[1] * point[13];
-        let t415 = time[0] * point[12];
-        let t567 = time[4] * point[0];
-        let t571 = time[5] * t237;
-        let t573 = time[6] * point[6];
-        let t574 = t571 - t573;
-        let t575 = t241 * t574;
-        let t576 = point[3] * point[6];
-        let t579 = time[8] * t248;
-        let t580 = t579 * t576;
-        let t581 = t575 - t580;
-        let t583 = time[9] * t248;
-        let t584 = t583 * point[7];
-        let t585 = t581 - t584;
-        let t588 = time[10] * point[1];
-        let t589 = t588 * point[2];
-        let t590 = t113 - t589;
-        let t591 = t590.log_1p();
-        let t592 = point[8] * t591;
-        let t593 = point[9] + t592;
-        let t594 = time[0] * t593;
-        let t595 = t585 + t594;
-        let t596 = point[10] * t591;
-        let t597 = t595 + t596;
-        let t598 = t597 - point[11];
-        let t599 = time[7] * t598;
-        let t601 = time[11] * t248;
-        let t604 = time[12] * t241;
-        let t605 = t601 + t604;
-        let t606 = t599 + t605;
-        let t608 = time[13] * point[0];
-        let t609 = t608 * t591;
-        let t610 = t606 - t609;
-        let t611 = t567 + t610;
-        let t612 = T::nearest(4.0) * point[3];
-        let t613 = t612 * point[4];
-        let t614 = t334 - t613;
-        let t618 = time[15] * t591;
-        let t619 = time[14] - t618;
-        let t620 = t614 * t619;
-        let t622 = time[16] * point[4];
-        let t623 = t622 * t591;
-        let t624 = t620 + t623;
-        let t626 = time[17] * point[4];
-        let t627 = t624 - t626;
-        let t628 = t611 + t627;
-        let t629 = t99 - t589;
-        let t630 = T::one() / t629;
-        let t631 = t630 * t630;
-        let t632 = t628 * t631;
-        let t633 = t632 - t63;
-        let t636 = time[18] * point[6];
-        let t639 = time[19] * t237;
-        let t640 = t636 - t639;
-        let t641 = t357 * t640;
-        let t643 = time[20] * t236;
-        let t644 = t643 * point[14];
-        let t645 = t644 * t591;
-        let t646 = t641 + t645;
-        let t649 = time[21] * point[14];
-        let t652 = time[22] * point[13];
-        let t653 = t649 + t652;
-        let t654 = t236 * t653;
-        let t655 = t646 - t654;
-        let t658 = time[23] * point[7];
-        let t659 = t658 * t389;
-        let t662 = time[24] * t389;
-        let t663 = t662 * t576;
-        let t664 = t659 + t663;
-        let t665 = t655 + t664;
-        let t667 = time[25] * point[15];
-        let t668 = t667 * t591;
-        let t669 = t665 + t668;
-        let t672 = time[26] * point[15];
-        let t675 = time[27] * t389;
-        let t676 = t672 + t675;
-        let t677 = t669 - t676;
-        let t679 = time[28] * point[16];
-        let t681 = time[29] * point[3];
-        let t682 = t681 * point[13];
-        let t683 = t679 - t682;
-        let t684 = t677 + t683;
-        let t686 = time[30] * point[5];
-        let t687 = t686 * t591;
-        let t688 = t684 + t687;
-        let t691 = time[31] * point[13];
-        let t694 = time[32] * point[5];
-        let t695 = t691 + t694;
-        let t696 = t688 - t695;
-        let t699 = time[34] * t591;
-        let t700 = time[33] - t699;
-        let t701 = point[0] * t700;
-        let t702 = t696 + t701;
-        let t703 = t631 * t702;
-        let t704 = t415 + t703;
-        crate::nalgebra::SVector::<T, 2>::new(t633, t704)
+        let t114 = t113 - t100;
+        let t115 = t114.log_1p();
+        let t156 = time[3] * point[0];
+        let t166 = time[2] * point[0];
+        let t174 = time[4] * point[6];
+        let t181 = time[5] * point[7];
+        let t185 = t92 * t181;
+        let t192 = time[6] * point[1];
+        let t195 = t92 * t174;
+        let t216 = t181 - t192;
+        let t220 = self.fixed[8] * t216;
+        let t227 = self.fixed[9] * t115;
+        let t228 = t227 - self.fixed[13];
+        let t229 = point[0] * t83;
+        let t230 = point[3] * t174;
+        let t231 = t229 - t230;
+        let t232 = t108 * t108;
+        let t386 = time[7] * point[0];
+        let t388 = self.fixed[24] * t156;
+        let t389 = t386 + t388;
+        let t390 = time[0] * t231;
+        let t391 = t166 * t98;
+        let t392 = t390 - t391;
+        let t393 = t392 + t185;
+        let t394 = t83 * t393;
+        let t395 = T::nearest(3.0) * t229;
+        let t396 = point[3] * t192;
+        let t397 = t395 + t396;
+        let t398 = time[0] * t397;
+        let t399 = t98 * t156;
+        let t400 = t398 - t399;
+        let t401 = t400 + t195;
+        let t402 = t98 * t401;
+        let t403 = t394 - t402;
+        let t404 = t228 * t232;
+        let t405 = self.fixed[17] * t403;
+        let t406 = t405 * t404;
+        let t407 = t389 - t406;
+        let t409 = time[8] * point[2];
+        let t410 = t78 * t401;
+        let t411 = t92 * t393;
+        let t412 = t410 - t411;
+        let t413 = t412 * t404;
+        let t414 = t220 + t413;
+        let t416 = self.fixed[25] * t414;
+        let t417 = t409 + t416;
+        crate::nalgebra::SVector::<T, 2>::new(t407, t417)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 33],
+    fixed: [T; 23],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -176,66 +176,31 @@ impl<T: crate::Real> SphereShell<T> {
         let t190 = t189 / parameters.rho0;
         let t201 = t141 + t136;
         let t224 = T::one() / parameters.rho0;
-        let t236 = T::nearest(5.0) / parameters.Ro;
-        let t241 = t127 * t127;
-        let t242 = t128 * t128;
-        let t244 = T::nearest(144.0) * t241;
-        let t245 = t244 * t136;
-        let t246 = parameters.rho0 * t242;
-        let t247 = t245 / t246;
-        let t255 = t127 * parameters.A;
-        let t256 = t11 * parameters.Ro;
-        let t257 = t256 * t256;
-        let t258 = T::nearest(48.0) * t255;
-        let t259 = t258 * t136;
-        let t260 = parameters.rho0 * t257;
-        let t261 = t259 / t260;
-        let t272 = T::nearest(6.0) * t127;
-        let t273 = t272 * parameters.E;
-        let t274 = t273 * parameters.nu;
-        let t275 = parameters.rho0 * t128;
-        let t276 = t275 * t114;
-        let t277 = t276 * t116;
-        let t278 = t274 / t277;
-        let t282 = T::nearest(14.0) / parameters.Ro;
-        let t286 = T::nearest(3.0) * t201;
-        let t288 = T::nearest(2.0) * t136;
-        let t292 = T::nearest(2.0) * t127;
-        let t293 = t292 / t275;
-        let t297 = T::nearest(4.0) * parameters.A;
-        let t298 = t297 * parameters.E;
-        let t299 = t298 * parameters.nu;
-        let t300 = t48 * t114;
-        let t301 = t300 * t116;
-        let t302 = t299 / t301;
-        let t304 = t136 + t201;
-        let t305 = t297 * t304;
-        let t306 = t305 / t48;
-        let t310 = T::nearest(2.0) / t16;
-        let t312 = parameters.Ri / parameters.Ro;
-        let t313 = T::one() - t312;
-        let t314 = t103 * parameters.Ri;
-        let t315 = t314 * t313;
-        let t316 = t315 / t11;
-        let t321 = T::nearest(2.0) * parameters.Ri;
-        let t322 = t321 / parameters.Ro;
-        let t323 = T::nearest(3.0) - t322;
-        let t325 = t119 * parameters.Ri;
-        let t326 = t325 * t323;
-        let t327 = t326 / t11;
-        let t330 = parameters.Ri * parameters.Ri;
-        let t331 = t323 * t323;
-        let t332 = t127 * t330;
-        let t333 = t332 * t331;
-        let t334 = t333 / t128;
-        let t338 = parameters.A * parameters.Ri;
-        let t339 = t338 * t323;
-        let t340 = t339 / t11;
-        let t351 = T::one() / parameters.Ri;
-        let t359 = parameters.A / parameters.Ro;
-        let t367 = parameters.Ro * t114;
-        let t368 = t367 * t116;
-        let t369 = t139 / t368;
+        let t250 = T::nearest(2.0) / t16;
+        let t252 = parameters.Ri / parameters.Ro;
+        let t253 = T::one() - t252;
+        let t254 = t103 * parameters.Ri;
+        let t255 = t254 * t253;
+        let t256 = t255 / t11;
+        let t261 = T::nearest(2.0) * parameters.Ri;
+        let t262 = t261 / parameters.Ro;
+        let t263 = T::nearest(3.0) - t262;
+        let t265 = t119 * parameters.Ri;
+        let t266 = t265 * t263;
+        let t267 = t266 / t11;
+        let t270 = parameters.Ri * parameters.Ri;
+        let t271 = t263 * t263;
+        let t272 = t127 * t270;
+        let t273 = t272 * t271;
+        let t274 = t273 / t128;
+        let t278 = parameters.A * parameters.Ri;
+        let t279 = t278 * t263;
+        let t280 = t279 / t11;
+        let t291 = T::one() / parameters.Ri;
+        let t299 = parameters.A / parameters.Ro;
+        let t307 = parameters.Ro * t114;
+        let t308 = t307 * t116;
+        let t309 = t139 / t308;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -257,24 +222,14 @@ impl<T: crate::Real> SphereShell<T> {
                 t190,
                 t201,
                 t224,
-                t236,
-                t247,
-                t261,
-                t278,
-                t282,
-                t286,
-                t288,
-                t293,
-                t302,
-                t306,
-                t310,
-                t316,
-                t327,
-                t334,
-                t340,
-                t351,
-                t359,
-                t369,
+                t250,
+                t256,
+                t267,
+                t274,
+                t280,
+                t291,
+                t299,
+                t309,
             ],
         })
     }
@@ -943,50 +898,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t317 = self.fixed[26] * t18;
-                let t318 = t317 + T::one();
-                let t319 = T::one() / t318;
-                let t320 = t319 + T::one();
-                let t324 = t18 * t318;
-                let t328 = self.fixed[27] * t324;
-                let t329 = t122 * t318;
-                let t335 = self.fixed[28] * t329;
-                let t336 = t328 + t335;
-                let t337 = t336 + t317;
-                let t341 = self.fixed[29] * t18;
-                let t342 = t341 + T::one();
-                let t343 = t342 * t342;
-                let t344 = t318 * t343;
-                let t345 = t337.ln_of_both(t344);
-                let t346 = t317 * t320;
-                let t347 = self.fixed[10] * t346;
-                let t348 = t345 * t319;
-                let t349 = self.fixed[11] * t348;
-                let t350 = t347 + t349;
-                let t352 = self.fixed[30] * t350;
-                let t353 = t352 * X[0];
-                let t354 = -t353;
-                let t355 = t352 * X[1];
-                let t356 = -t355;
-                let t357 = t352 * X[2];
-                let t358 = -t357;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t354, t356, t358))
+                let t257 = self.fixed[16] * t18;
+                let t258 = t257 + T::one();
+                let t259 = T::one() / t258;
+                let t260 = t259 + T::one();
+                let t264 = t18 * t258;
+                let t268 = self.fixed[17] * t264;
+                let t269 = t122 * t258;
+                let t275 = self.fixed[18] * t269;
+                let t276 = t268 + t275;
+                let t277 = t276 + t257;
+                let t281 = self.fixed[19] * t18;
+                let t282 = t281 + T::one();
+                let t283 = t282 * t282;
+                let t284 = t258 * t283;
+                let t285 = t277.ln_of_both(t284);
+                let t286 = t257 * t260;
+                let t287 = self.fixed[10] * t286;
+                let t288 = t285 * t259;
+                let t289 = self.fixed[11] * t288;
+                let t290 = t287 + t289;
+                let t292 = self.fixed[20] * t290;
+                let t293 = t292 * X[0];
+                let t294 = -t293;
+                let t295 = t292 * X[1];
+                let t296 = -t295;
+                let t297 = t292 * X[2];
+                let t298 = -t297;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t360 = self.fixed[31] * t18;
-                let t361 = t360 + T::nearest(2.0);
-                let t362 = t18 * t361;
-                let t363 = self.fixed[31] * t362;
-                let t364 = t360 + T::one();
-                let t365 = t364 * t364;
-                let t366 = t363.ln_of_both(t365);
-                let t370 = self.fixed[32] * t366;
-                let t371 = t370 * X[0];
-                let t372 = t370 * X[1];
-                let t373 = t370 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t371, t372, t373))
+                let t300 = self.fixed[21] * t18;
+                let t301 = t300 + T::nearest(2.0);
+                let t302 = t18 * t301;
+                let t303 = self.fixed[21] * t302;
+                let t304 = t300 + T::one();
+                let t305 = t304 * t304;
+                let t306 = t303.ln_of_both(t305);
+                let t310 = self.fixed[22] * t306;
+                let t311 = t310 * X[0];
+                let t312 = t310 * X[1];
+                let t313 = t310 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t311, t312, t313))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -1033,12 +988,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t374 = t64 * t67;
-                let t375 = t25 * t374;
-                let t376 = t375 * t151;
-                let t377 = t158 - t376;
-                let t378 = -t377;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t378, T::zero(), T::zero()))
+                let t314 = t64 * t67;
+                let t315 = t25 * t314;
+                let t316 = t315 * t151;
+                let t317 = t158 - t316;
+                let t318 = -t317;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t318, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1086,12 +1041,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t380 = t85 * t67;
-                let t381 = t25 * t380;
-                let t382 = t381 * t151;
-                let t383 = t158 - t382;
-                let t384 = -t383;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t384, T::zero()))
+                let t320 = t85 * t67;
+                let t321 = t25 * t320;
+                let t322 = t321 * t151;
+                let t323 = t158 - t322;
+                let t324 = -t323;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t324, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1139,12 +1094,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t385 = t96 * t67;
-                let t386 = t25 * t385;
-                let t387 = t386 * t151;
-                let t388 = t158 - t387;
-                let t389 = -t388;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t389))
+                let t325 = t96 * t67;
+                let t326 = t25 * t325;
+                let t327 = t326 * t151;
+                let t328 = t158 - t327;
+                let t329 = -t328;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t329))
             }
             _ => None,
         }
@@ -1195,14 +1150,14 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[25]
+        self.fixed[15]
     }
     fn body_force_on(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
         _lattice: ::std::option::Option<crate::Lattice<T, 3>>,
     ) -> ::std::boxed::Box<dyn crate::BodyForceAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 5, 12>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 6, 6>::new(*self, X))
     }
     fn state_at(
         &self,
@@ -1212,112 +1167,93 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 5, 12> for SphereShell<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for SphereShell<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 5] {
+    fn body_force_time(&self, t: T) -> [T; 6] {
         let t17 = self.fixed[0] * t;
         let t18 = t17.cos_pi();
         let t25 = self.fixed[2] * t18;
+        let t50 = self.fixed[4] * t18;
         let t105 = self.fixed[7] * t18;
         let t122 = t18 * t18;
         let t195 = self.fixed[8] * t18;
-        let t391 = self.fixed[9] * t122;
-        [t18, t25, t105, t195, t391]
+        [t18, t25, t50, t105, t122, t195]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 12] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
         let t3 = X[1] * X[1];
         let t4 = X[2] * X[2];
         let t5 = X[0] * X[0];
         let t6 = t3 + t4;
         let t7 = t6 + t5;
         let t8 = t7.sqrt();
-        let t21 = self.fixed[1] * t8;
-        let t23 = T::nearest(3.0) - t21;
-        let t26 = t8 * t23;
-        let t59 = self.fixed[5] * t8;
-        let t60 = T::one() - t59;
         let t66 = T::one() / t7;
         let t67 = t8 * t66;
-        let t72 = self.fixed[6] * t8;
-        let t73 = T::nearest(3.0) - t72;
-        let t106 = t8 * t60;
-        let t123 = t23 * t23;
-        let t124 = t7 * t123;
-        let t193 = T::one() - t21;
-        let t232 = X[0] * t67;
-        let t233 = t7 * t23;
-        let t234 = self.fixed[4] * t233;
-        let t237 = self.fixed[15] * t8;
-        let t238 = T::nearest(3.0) - t237;
-        let t240 = t7 * t8;
-        let t243 = t60 * t60;
-        let t248 = t240 * t23;
-        let t249 = t248 * t243;
-        let t250 = t249 * t238;
-        let t251 = self.fixed[16] * t250;
-        let t252 = -t251;
-        let t253 = T::nearest(6.0) - t237;
-        let t262 = t7 * t60;
-        let t263 = t262 * t253;
-        let t264 = t263 * t238;
-        let t265 = self.fixed[17] * t264;
-        let t268 = t23 * t193;
-        let t269 = t60 * t73;
-        let t270 = T::nearest(2.0) * t269;
-        let t271 = t268 + t270;
-        let t279 = t8 * t271;
-        let t280 = self.fixed[18] * t279;
-        let t283 = self.fixed[19] * t8;
-        let t285 = T::nearest(15.0) - t283;
-        let t287 = self.fixed[20] * t271;
-        let t289 = t238 * t285;
-        let t290 = self.fixed[21] * t289;
-        let t291 = t287 + t290;
-        let t294 = t8 * t291;
-        let t295 = self.fixed[22] * t294;
-        let t308 = X[1] * t67;
-        let t309 = X[2] * t67;
-        [t26, t106, t124, t232, t234, t238, t252, t265, t280, t295, t308, t309]
+        let t197 = T::nearest(2.0) * t67;
+        let t244 = X[0] * t67;
+        let t246 = X[1] * t67;
+        let t248 = X[2] * t67;
+        [t7, t8, t197, t244, t246, t248]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 5],
-        point: &[T; 12],
+        time: &[T; 6],
+        point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t107 = time[2] * point[1];
+        let t21 = self.fixed[1] * point[1];
+        let t23 = T::nearest(3.0) - t21;
+        let t26 = point[1] * t23;
+        let t59 = self.fixed[5] * point[1];
+        let t60 = T::one() - t59;
+        let t72 = self.fixed[6] * point[1];
+        let t73 = T::nearest(3.0) - t72;
+        let t106 = point[1] * t60;
+        let t107 = time[3] * t106;
         let t108 = t107 + T::one();
-        let t109 = time[1] * point[0];
+        let t109 = time[1] * t26;
         let t110 = t109 + T::one();
-        let t266 = time[0] * point[6];
-        let t267 = t266 - point[7];
-        let t296 = time[0] * t267;
-        let t303 = self.fixed[23] * point[5];
-        let t307 = self.fixed[24] * point[5];
-        let t390 = time[3] * point[0];
-        let t392 = time[4] * point[2];
-        let t393 = t390 + t392;
-        let t394 = t108 * t393;
-        let t395 = t394 + t107;
-        let t396 = t108 * t110;
-        let t397 = t110 * t396;
-        let t398 = t395.ln_of_both_if::<NEAR>(t397);
-        let t399 = point[8] * t398;
-        let t400 = t296 + t399;
-        let t401 = t400 - point[9];
-        let t402 = time[0] * t401;
-        let t403 = t303 * t398;
-        let t404 = t402 + t403;
-        let t405 = t404 - t307;
-        let t406 = t108 * t396;
-        let t407 = t405 / t406;
-        let t408 = t407 - point[4];
-        let t409 = time[0] * t408;
-        let t410 = point[3] * t409;
-        let t411 = point[10] * t409;
-        let t412 = point[11] * t409;
-        crate::nalgebra::SVector::<T, 3>::new(t410, t411, t412)
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t117 = time[0] * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[8] * t118;
+        let t123 = t23 * t23;
+        let t124 = point[0] * t123;
+        let t125 = time[4] * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[9] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
+        let t133 = t132.ln_of_both_if::<NEAR>(t112);
+        let t137 = T::one() / t108;
+        let t146 = T::one() / t110;
+        let t158 = self.fixed[11] * t133;
+        let t193 = T::one() - t21;
+        let t194 = time[3] * t193;
+        let t196 = time[5] * t23;
+        let t198 = point[2] * t107;
+        let t199 = t194 - t196;
+        let t200 = t199 + t198;
+        let t216 = t194 * t137;
+        let t217 = time[5] * t73;
+        let t220 = self.fixed[10] * t200;
+        let t232 = point[0] * t23;
+        let t233 = time[2] * t232;
+        let t234 = t158 - self.fixed[13];
+        let t235 = -t234;
+        let t236 = t217 * t146;
+        let t237 = t216 + t236;
+        let t238 = t235 * t237;
+        let t239 = t238 * t137;
+        let t240 = t220 + t239;
+        let t241 = self.fixed[14] * t240;
+        let t242 = t233 + t241;
+        let t243 = -t242;
+        let t245 = point[3] * t243;
+        let t247 = point[4] * t243;
+        let t249 = point[5] * t243;
+        crate::nalgebra::SVector::<T, 3>::new(t245, t247, t249)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
