@@ -221,10 +221,9 @@ fn the_vortex_keeps_its_digits_next_to_incompressibility() {
 /// stretches are negative, and 16 to 27 in a body that is as large.
 #[test]
 fn staged_body_forces_keep_the_digits_of_single_ones() {
-    for (name, places) in [
-        ("sphere-shell", SHELL_INSIDE_OUT.as_slice()),
-        ("skew-2d", SKEW_FAR_DEFORMED.as_slice()),
-    ] {
+    for (name, places) in
+        [("sphere-shell", SHELL_INSIDE_OUT.as_slice()), ("skew-2d", SKEW_FAR_DEFORMED.as_slice())]
+    {
         let spec = of_library(name);
         let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
         let code = generated(&spec);
