@@ -313,7 +313,7 @@ impl Program {
 
     /// The operations that `outputs` need, by what they depend on.
     #[must_use]
-    pub fn operations_by_stage(&self, outputs: &[Slot]) -> OperationsByStage {
+    pub(crate) fn operations_by_stage(&self, outputs: &[Slot]) -> OperationsByStage {
         let mut stages = OperationsByStage::default();
         for (index, _) in self.needed(outputs).iter().enumerate().filter(|(_, needed)| **needed) {
             let dependence = self.dependence[index];

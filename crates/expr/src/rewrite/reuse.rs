@@ -15,7 +15,7 @@ const MOST_PRODUCTS: usize = 400;
 
 /// `outputs` in forms of the same value that cost less in all, where there are such.
 ///
-/// `inputs` and `definitions` are those of [`Program::lower`](crate::Program::lower), which the result is meant for.
+/// `inputs` and `definitions` are those of [`Program::lower`], which the result is meant for.
 #[must_use]
 pub fn reuse(
     graph: &mut Graph,
