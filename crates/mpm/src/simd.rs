@@ -86,6 +86,8 @@ pub(crate) trait Vectors: Copy {
     fn min8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// The larger of both; `b` where one is not a number.
     fn max8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    /// Asks for the memory of a value that will be read soon.
+    fn prefetch<A>(self, value: &A);
 }
 
 /// Operations lane by lane, and moves between lanes.
@@ -117,6 +119,9 @@ macro_rules! lane_by_lane {
             fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
                 Lane8(*values)
             }
+
+            #[inline(always)]
+            fn prefetch<A>(self, _: &A) {}
 
             $(
                 #[cfg_attr(target_arch = "x86_64", inline(never))]
@@ -258,7 +263,10 @@ mod x86 {
     use super::{Lane4, Lane8, Lanes, Vectors};
     use bytemuck::{bytes_of, must_cast, pod_read_unaligned};
     use pulp::x86::{V3, V4};
-    use std::arch::x86_64::{__m128, __m256, __m256d, __m512d};
+    use std::arch::x86_64::{__m128, __m256, __m256d, __m512d, _MM_HINT_T0};
+
+    /// Bytes that pass from memory at once.
+    const CACHE_LINE: usize = 64;
 
     /// The instructions for an operation on four numbers and for one on eight, in double and in single precision. Registers of 512 bits
     /// hold eight numbers in double precision, others half of them.
@@ -457,6 +465,14 @@ mod x86 {
                 #[inline(always)]
                 fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
                     <T as Instructions<$V>>::load8(self, values)
+                }
+
+                #[inline(always)]
+                fn prefetch<A>(self, value: &A) {
+                    let first = std::ptr::from_ref(value).cast::<i8>();
+                    for line in (0..size_of::<A>()).step_by(CACHE_LINE) {
+                        self.sse._mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(line));
+                    }
                 }
             }
         };

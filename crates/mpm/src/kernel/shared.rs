@@ -11,7 +11,7 @@ use crate::geometry::Constants;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
 use crate::kernel::parallelograms::GROUP;
-use crate::mesh::Share;
+use crate::mesh::{Mesh, Share};
 use crate::node::Node;
 use crate::shared_corners::SharedCorners;
 use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
@@ -41,6 +41,23 @@ fn take_corners<T: Lanes, V: Vectors, const D: usize>(
             for a in 0..D {
                 of_group[corner][a].lanes.0[n] = at[a];
             }
+        }
+    }
+}
+
+/// Asks for the memory of what the group of cells from `first` on has at its corners: at those with which a cell ends, since it mostly
+/// begins with those of the cell before it.
+#[inline(always)]
+fn prefetch_at_corners<T: Lanes, V: Vectors, const D: usize>(
+    vectors: V,
+    mesh: &Mesh<T, D>,
+    first: usize,
+    prefetch: impl Fn(V, usize),
+) {
+    let cells = mesh.corners[(first << D).min(mesh.corners.len())..].chunks_exact(1 << D);
+    for own in cells.take(GROUP) {
+        for [_, corner] in &PAIRS[..1 << (D - 1)] {
+            prefetch(vectors, own[*corner] as usize);
         }
     }
 }
@@ -391,6 +408,12 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
         take_corners(corners, &mesh.x, of_group(0), &mut ahead);
         for (group, receiver) in receiver.chunks_mut(GROUP).enumerate() {
             let (x, next) = (ahead, (group + 1) * GROUP);
+            prefetch_at_corners(vectors, mesh, first + next, |vectors, corner| {
+                vectors.prefetch(&values.nodes[corner]);
+                if AFFINE {
+                    vectors.prefetch(&values.moments[corner]);
+                }
+            });
             if next < count {
                 take_corners(corners, &mesh.x, of_group(next), &mut ahead);
             }
