@@ -2,7 +2,7 @@
 
     python hosts.py MMS FOLDER [--solutions NAME|FILE,...] HOST...
 
-Hosts: cpp, fortran, abaqus, calculix, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
+Hosts: cpp, cuda, fortran, abaqus, calculix, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
 
 Differences are told in units of 2^-52 of the largest entry of the field over all points; LARGEST says what a host may have. Zero
 means the same bits.
@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 SPECS = HERE.parents[1] / "mms-specs"
 FIELDS = {"u": 1, "v": 1, "a": 1, "H": 2, "F": 2, "J": 0, "P": 2, "b": 1}
 POINTS = 1000
-LARGEST = {"cpp": 0, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
+LARGEST = {"cpp": 0, "cuda": 16, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
 
 
 class Refused(Exception):
@@ -135,6 +135,16 @@ def cpp(case):
     call(["g++", *strict, f'-DHEADER="{header}"', f"-DSPACE=mms::{space}", HERE / "fields.cc", "-o", program])
     points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
     return case.unpacked(call([program], input=points.tobytes()), ALL)
+
+
+def cuda(case):
+    """On a graphics processor. Of the functions of <math.h> it has its own last bits."""
+    header = case.generate("c", ".h")
+    program = case.folder / "cuda"
+    strict = ["-std=c++17", "-fmad=false", "-Werror", "all-warnings", "-Xcompiler", "-Wall,-Wextra"]
+    call(["nvcc", *strict, f'-DHEADER="{header}"', f"-DNAME={case.module}", HERE / "fields.cu", "-o", program])
+    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
+    return case.unpacked(call([program], input=points.tobytes()), FIELDS)
 
 
 def fortran_program(case, source, driver, points):
@@ -460,7 +470,7 @@ def main():
     names = sorted(path.stem for path in SPECS.glob("*.toml"))
     if hosts[0] == "--solutions":
         names, hosts = hosts[1].split(","), hosts[2:]
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         cases = list(pool.map(lambda name: Case(mms, folder, name), names))
         failed = False
         for host in hosts:
@@ -468,7 +478,7 @@ def main():
                 moose_program(folder)
             run = tried(globals()[host])
             chosen = cases
-            compiled = host in ("cpp", "fortran", "openfoam", "abaqus", "calculix", "moose")
+            compiled = host in ("cpp", "cuda", "fortran", "openfoam", "abaqus", "calculix", "moose")
             results = list((pool.map if compiled else map)(run, chosen))
             refused = [case.name for case, found in zip(chosen, results) if found is None]
             chosen, results = [c for c, f in zip(chosen, results) if f is not None], [f for f in results if f is not None]

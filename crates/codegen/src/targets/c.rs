@@ -22,7 +22,7 @@ NAME_u, _v, _a, _H, _F, _J, _P, _b compute one field, NAME_fields all of them; t
 The body force at points that stay: NAME_point_array once a run, NAME_b_array once a step, or for single points NAME_at_point once a run, \
 NAME_at_time once a step, NAME_b_staged. All ways give the same bits.
 Results equal those of the Rust functions bit for bit where the compiler keeps every rounding: -ffp-contract=off where the processor fuses \
-products and sums (nvcc: -fmad=false), and no -ffast-math.";
+products and sums (nvcc: -fmad=false), and no -ffast-math. A graphics processor has last bits of its own in functions of <math.h>.";
 
 const REFUSAL: Refusal = Refusal {
     finite: "isfinite(#)",

@@ -24,7 +24,8 @@
  *   points ring_nu_at_point once a run, ring_nu_at_time once a step, ring_nu_b_staged. All ways give the same
  *   bits.
  * Results equal those of the Rust functions bit for bit where the compiler keeps every rounding: -ffp-contract=off
- *   where the processor fuses products and sums (nvcc: -fmad=false), and no -ffast-math.
+ *   where the processor fuses products and sums (nvcc: -fmad=false), and no -ffast-math. A graphics processor has
+ *   last bits of its own in functions of <math.h>.
  *
  * force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is
  *   rho0_b/J. The balance is rho0 a = Div P + rho0 b, so that it stands on the side of the stresses, with a plus
