@@ -45,19 +45,24 @@ fn take_corners<T: Lanes, V: Vectors, const D: usize>(
     }
 }
 
-/// Asks for the memory of what the group of cells from `first` on has at its corners: at those with which a cell ends, since it mostly
-/// begins with those of the cell before it.
+/// In space: asks for the memory of the velocities and moments at the corners of the group of cells from `first` on, at those with which a
+/// cell ends, since it mostly begins with those of the cell before it. In the plane, and without moments, they come in time.
 #[inline(always)]
-fn prefetch_at_corners<T: Lanes, V: Vectors, const D: usize>(
+fn prefetch_moments<T: Lanes, V: Vectors, const D: usize>(
     vectors: V,
     mesh: &Mesh<T, D>,
     first: usize,
-    prefetch: impl Fn(V, usize),
+    values: &CornerValues<T, D>,
 ) {
+    if D < 3 {
+        return;
+    }
     let cells = mesh.corners[(first << D).min(mesh.corners.len())..].chunks_exact(1 << D);
     for own in cells.take(GROUP) {
         for [_, corner] in &PAIRS[..1 << (D - 1)] {
-            prefetch(vectors, own[*corner] as usize);
+            let corner = own[*corner] as usize;
+            vectors.prefetch(&values.nodes[corner]);
+            vectors.prefetch(&values.moments[corner]);
         }
     }
 }
@@ -408,12 +413,9 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
         take_corners(corners, &mesh.x, of_group(0), &mut ahead);
         for (group, receiver) in receiver.chunks_mut(GROUP).enumerate() {
             let (x, next) = (ahead, (group + 1) * GROUP);
-            prefetch_at_corners(vectors, mesh, first + next, |vectors, corner| {
-                vectors.prefetch(&values.nodes[corner]);
-                if AFFINE {
-                    vectors.prefetch(&values.moments[corner]);
-                }
-            });
+            if AFFINE {
+                prefetch_moments(vectors, mesh, first + next, values);
+            }
             if next < count {
                 take_corners(corners, &mesh.x, of_group(next), &mut ahead);
             }
