@@ -1,7 +1,7 @@
 //! Coordinate systems: orthogonal coordinates, their unit vectors, and the way to Cartesian components.
 
 use mmsmith_expr::{CosineAndSine, Expr, Function, Graph, Node, Rational};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The coordinates in which a solution is stated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -212,6 +212,11 @@ impl Geometry {
 
     pub(crate) fn dimension(&self) -> usize {
         self.coordinates.len()
+    }
+
+    /// The coordinates, without an order.
+    pub(crate) fn places(&self) -> BTreeSet<Expr> {
+        self.coordinates.iter().copied().collect()
     }
 
     /// `expr` with the cosines, sines and tangents of whole multiples of the angles, and of sums with such a multiple, in

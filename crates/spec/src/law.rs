@@ -15,6 +15,7 @@ use crate::tensor::{
 };
 use crate::{DeriveError, Law};
 use energy::ComponentLaw;
+use kinematics::doubled_strain;
 use mmsmith_expr::{Expr, Function, Graph, Node};
 use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
 use std::collections::BTreeSet;
@@ -108,7 +109,7 @@ impl Deformation {
         let J = graph.whole(determinant);
         // J - 1 as the sum of the principal minors of H, small where H is small.
         let dilation =
-            dilation(graph, &open, &H, &derivation.variables, &derivation.geometry.coordinates);
+            dilation(graph, &open, &H, &derivation.variables, &derivation.geometry.places());
         let volume_change = match &turn {
             Some(turn) => turn.volume_change(graph),
             None => {
@@ -185,7 +186,7 @@ fn dilation(
     open: &Matrix,
     H: &Matrix,
     variables: &BTreeSet<Expr>,
-    coordinates: &[Expr],
+    places: &BTreeSet<Expr>,
 ) -> Vec<Expr> {
     let n = H.len();
     let trace = graph.sum_of((0..n).map(|i| open[i][i]));
@@ -193,7 +194,7 @@ fn dilation(
     if graph.vanishes(cancelled) {
         return Vec::new();
     }
-    let differences = graph.in_differences(trace, &coordinates.iter().copied().collect());
+    let differences = graph.in_differences(trace, places);
     if differences == trace {
         return (0..n).map(|i| H[i][i]).collect();
     }
@@ -304,11 +305,16 @@ fn linear_elastic(
     let n = H.len();
     let trace = graph.sum_of(deformation.dilation.iter().copied());
     let pressure = graph.mul(lambda, trace);
+    let places = derivation.geometry.places();
+    let doubled_strain = doubled_strain(graph, deformation, &derivation.variables, &places);
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
-            let strain = graph.add(H[i][j], H[j][i]);
+            let strain = match doubled_strain[i][j] {
+                Some(strain) => strain,
+                None => graph.add(H[i][j], H[j][i]),
+            };
             let shear = graph.mul(mu, strain);
             anisotropic[i][j] = zero_if_vanishing(graph, shear);
             let normal = if i == j { pressure } else { Graph::ZERO };

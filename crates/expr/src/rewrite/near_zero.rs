@@ -7,7 +7,7 @@
 
 use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
-use num_traits::{Signed, ToPrimitive};
+use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::BTreeSet;
 
 impl Graph {
@@ -16,6 +16,12 @@ impl Graph {
     /// The two add up to `expr`. Where `expr` has no value at zero, as `ln(x)` at `x = 0`, all of it is the rest.
     pub fn split_at_zero(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> (Expr, Expr) {
         Splitting { graph: self, small, known: NumberMap::default() }.split(expr)
+    }
+
+    /// An expression that is zero where all of `small` are, less its part of first order in them, as terms that are all of second order.
+    /// `None` where no such form is known.
+    pub fn beyond_linear(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> Option<Expr> {
+        Splitting { graph: self, small, known: NumberMap::default() }.beyond_linear(expr)
     }
 }
 
@@ -159,6 +165,54 @@ impl Splitting<'_> {
         match function.difference() {
             Some(rule) => (at_zero, rule.with(self.graph, &[value, rest])),
             None => self.plain(expr, function, &[value]),
+        }
+    }
+
+    fn beyond_linear(&mut self, expr: Expr) -> Option<Expr> {
+        if expr == Graph::ZERO || self.small.contains(&expr) {
+            return Some(Graph::ZERO);
+        }
+        match self.graph.node(expr).clone() {
+            Node::Sum { constant, terms } if constant.is_zero() => {
+                let mut parts = Vec::new();
+                for (term, coefficient) in terms {
+                    parts.push((coefficient, self.beyond_linear(term)?));
+                }
+                Some(self.graph.sum(parts))
+            }
+            Node::Product(factors) => {
+                let (mut small, mut others) = (Vec::new(), Vec::new());
+                for (base, exponent) in factors {
+                    let of =
+                        if self.split(base).0 == Graph::ZERO { &mut small } else { &mut others };
+                    of.push((base, exponent));
+                }
+                match &*small {
+                    // `r f = r k + r (f - k)`
+                    [(base, exponent)] if exponent.is_one() => {
+                        let others = self.graph.product(others);
+                        let (value, rest) = self.split(others);
+                        let beyond = self.beyond_linear(*base)?;
+                        let first = self.graph.mul(beyond, value);
+                        let second = self.graph.mul(*base, rest);
+                        Some(self.graph.add(first, second))
+                    }
+                    [] => None,
+                    _ => small
+                        .iter()
+                        .all(|(_, exponent)| *exponent >= Rational::one())
+                        .then_some(expr),
+                }
+            }
+            Node::Call(Function::Ln1p, arguments) if self.split(arguments[0]).0 == Graph::ZERO => {
+                let beyond = self.beyond_linear(arguments[0])?;
+                let of_logarithm = self.graph.call(Function::Ln1pMinusX, &[arguments[0]]);
+                Some(self.graph.add(of_logarithm, beyond))
+            }
+            Node::Call(Function::Ln1pMinusX, arguments) => {
+                (self.split(arguments[0]).0 == Graph::ZERO).then_some(expr)
+            }
+            _ => None,
         }
     }
 

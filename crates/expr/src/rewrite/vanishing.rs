@@ -174,16 +174,26 @@ impl Graph {
             return None;
         }
         let differences = others.iter().map(|(_, argument, coefficient)| {
-            let difference = self.difference_of_waves(*function, *argument, *first);
+            let difference = self.difference_of_waves(*function, *argument, *first, places);
             self.mul(*coefficient, difference)
         });
         let differences: Vec<Expr> = differences.collect();
         Some(self.sum_of(differences))
     }
 
-    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`, as the product of sine and cosine of half the sum and half the difference, each
-    /// written in half the angles: what belongs to one axis stays a factor of its own, as points of a lattice need it.
-    fn difference_of_waves(&mut self, function: Function, a: Expr, b: Expr) -> Expr {
+    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`, as the product of sine and cosine of half the sum and half the difference. Where both
+    /// angles depend on the same places, these two are formed in symbols: their slopes may cancel. Else each is written in half the
+    /// angles: what belongs to one axis stays a factor of its own, as points of a lattice need it.
+    fn difference_of_waves(
+        &mut self,
+        function: Function,
+        a: Expr,
+        b: Expr,
+        places: &BTreeSet<Expr>,
+    ) -> Expr {
+        if self.places_of(a, places) == self.places_of(b, places) {
+            return self.product_of_waves(function, true, [a, b]);
+        }
         let half = Rational::new(1.into(), 2.into());
         let of_half = |graph: &mut Self, angle: Expr| {
             let angle = graph.sum([(half.clone(), angle)]);
@@ -199,6 +209,32 @@ impl Graph {
             (self.sub(first, second), 2)
         };
         let product = self.mul(of_mean, apart);
+        self.sum([(Rational::from(factor), product)])
+    }
+
+    /// Those of `places` on which `expr` depends.
+    fn places_of(&self, expr: Expr, places: &BTreeSet<Expr>) -> BTreeSet<Expr> {
+        self.reachable(&[expr]).into_iter().filter(|part| places.contains(part)).collect()
+    }
+
+    /// `cos(a) -+ cos(b)` or `sin(a) -+ sin(b)` as a product, with the angles formed in symbols.
+    fn product_of_waves(
+        &mut self,
+        function: Function,
+        is_difference: bool,
+        [a, b]: [Expr; 2],
+    ) -> Expr {
+        let half = Rational::new(1.into(), 2.into());
+        let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
+        let apart = self.sum([(half.clone(), a), (-half, b)]);
+        let (of_mean, of_apart, factor) = match (function, is_difference) {
+            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
+            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
+            (_, true) => (Function::Cos, Function::Sin, 2),
+            (_, false) => (Function::Sin, Function::Cos, 2),
+        };
+        let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(of_apart, &[apart]));
+        let product = self.mul(of_mean, of_apart);
         self.sum([(Rational::from(factor), product)])
     }
 
@@ -232,18 +268,8 @@ impl Graph {
         if !matches!(f, Function::Sin | Function::Cos) || !are_alike(self, [first, second]) {
             return None;
         }
-        let half = Rational::new(1.into(), 2.into());
-        let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
-        let apart = self.sum([(half.clone(), a), (-half, b)]);
-        let (of_mean, of_apart, factor) = match (f, is_difference) {
-            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
-            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
-            (_, true) => (Function::Cos, Function::Sin, 2),
-            (_, false) => (Function::Sin, Function::Cos, 2),
-        };
-        let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(of_apart, &[apart]));
-        let product = self.mul(of_mean, of_apart);
-        Some(self.sum([(Rational::from(factor) * of_first, product)]))
+        let product = self.product_of_waves(f, is_difference, [a, b]);
+        Some(self.sum([(of_first.clone(), product)]))
     }
 }
 

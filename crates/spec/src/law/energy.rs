@@ -5,6 +5,7 @@
 //! ([`Graph::split_at_zero`]), so that no digits are lost at small strain. By the chain rule
 //! `Div P = A(0) : grad H + (A - A(0)) : grad H`, linear part and remainder.
 
+use super::kinematics::doubled_strain;
 use super::{Deformation, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
@@ -97,10 +98,18 @@ impl ComponentLaw {
             let value = zero_if_vanishing(graph, value);
             *entry = graph.add(value, rest);
         }
+        let places = derivation.geometry.places();
+        let doubled_strain = match &deformation.turn {
+            Some(_) => vec![vec![None; n]; n],
+            None => doubled_strain(graph, deformation, &derivation.variables, &places),
+        };
         let mut P = stress.clone();
-        for entry in P.iter_mut().flatten() {
-            *entry = graph.replace(*entry, &actual);
-            *entry = zero_if_vanishing(graph, *entry);
+        for (i, J) in (0..n).flat_map(|i| (0..n).map(move |J| (i, J))) {
+            let apart = doubled_strain[i][J]
+                .and_then(|strain| self.with_strain(graph, P[i][J], [i, J], strain, &small));
+            let entry = apart.unwrap_or(P[i][J]);
+            let entry = graph.replace(entry, &actual);
+            P[i][J] = zero_if_vanishing(graph, entry);
         }
 
         let open = derivation.second_gradient(&deformation.open, self.isotropic);
@@ -147,6 +156,39 @@ impl ComponentLaw {
             isotropic_and_rest(&mut derivation.graph, deformation, lambda, &P)
         };
         Stress { P, isotropic, anisotropic, linear, remainder, whole: None, energy }
+    }
+}
+
+impl ComponentLaw {
+    /// An entry of `P` beside the diagonal, with what is of first order in `h_iJ` and `h_Ji` as a multiple of `strain`, their sum. `None`
+    /// where their moduli differ at rest, or the rest has no form of second order.
+    fn with_strain(
+        &self,
+        graph: &mut Graph,
+        entry: Expr,
+        [i, J]: [usize; 2],
+        strain: Expr,
+        small: &BTreeSet<Expr>,
+    ) -> Option<Expr> {
+        let mut derivatives = Derivatives::limited();
+        let mut modulus = |graph: &mut Graph, h: Expr| {
+            let slope = derivatives.of(graph, entry, h);
+            let (value, _) = graph.split_at_zero(slope, small);
+            zero_if_vanishing(graph, value)
+        };
+        let pair = [self.h[i][J], self.h[J][i]];
+        let [own, other] = pair.map(|h| modulus(graph, h));
+        let apart = graph.sub(own, other);
+        if !graph.vanishes(apart) {
+            return None;
+        }
+        let mut terms = vec![graph.mul(own, strain)];
+        for &h in self.h.iter().flatten().filter(|h| !pair.contains(h)) {
+            let modulus = modulus(graph, h);
+            terms.push(graph.mul(modulus, h));
+        }
+        terms.push(graph.beyond_linear(entry, small)?);
+        Some(graph.sum_of(terms))
     }
 }
 

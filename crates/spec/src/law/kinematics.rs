@@ -14,6 +14,8 @@ pub(super) struct Kinematics {
     pub(super) trace: Expr,
     /// `F F^T - I`, where a turn drops out of it.
     pub(super) strain: Option<Matrix>,
+    /// `H + H^T` without its diagonal, where it has a form of its own.
+    pub(super) doubled_strain: DoubledStrain,
     /// `F - F^-T`.
     pub(super) difference: Matrix,
     /// Whether the entry of that is of first order in strains; else it has the size of `H`, and the two parts are better apart.
@@ -47,11 +49,14 @@ impl Kinematics {
         let trace = graph.whole(trace);
         let f = &deformation.inverse_transpose;
         let mut M = deformation.transposed_gradient_times_inverse(graph);
+        let mut doubled_strain = vec![vec![None; n]; n];
         let (difference, is_small) = if let Some(B) = &strain {
             // F - F^-T = (F F^T - I) F^-T
             (matrix_product(graph, B, f), vec![vec![true; n]; n])
         } else {
-            let doubled_strain = doubled_strain(graph, deformation, &derivation.variables);
+            let places = derivation.geometry.places();
+            doubled_strain =
+                self::doubled_strain(graph, deformation, &derivation.variables, &places);
             let mut whole = M.clone();
             let mut is_small = vec![vec![true; n]; n];
             for i in 0..n {
@@ -71,7 +76,7 @@ impl Kinematics {
                 M[i][j] = graph.neg(f[i][j]);
             }
         }
-        Kinematics { trace, strain, difference, is_small, M }
+        Kinematics { trace, strain, doubled_strain, difference, is_small, M }
     }
 
     /// `J - 1 - tr(C - I)/2`, of second order.
@@ -252,14 +257,16 @@ pub(super) fn row_times(graph: &mut Graph, A: &Matrix, i: usize, x: &Vector) -> 
     graph.sum_of(terms)
 }
 
-/// Entries of `H + H^T` but for the diagonal, where terms of the sum cancel in symbols. Shear strains are small next to the turn there,
-/// and the entry of `F - F^-T` is `H + H^T - H^T (H^T F^-T)`, whose second part is of second order.
+/// Entries of `H + H^T` but for the diagonal, where terms of the sum cancel in symbols, or where it is a difference of waves, which vanishes
+/// with its slope. Shear strains are small next to the turn there, and the entry of `F - F^-T` is `H + H^T - H^T (H^T F^-T)`, whose second
+/// part is of second order.
 pub(super) type DoubledStrain = Vec<Vec<Option<Expr>>>;
 
 pub(super) fn doubled_strain(
     graph: &mut Graph,
     deformation: &Deformation,
     variables: &BTreeSet<Expr>,
+    places: &BTreeSet<Expr>,
 ) -> DoubledStrain {
     let open = &deformation.open;
     let n = open.len();
@@ -267,12 +274,19 @@ pub(super) fn doubled_strain(
     for i in 0..n {
         for j in 0..i {
             let negative = graph.neg(open[j][i]);
-            let sum = graph.sub(open[i][j], negative);
-            let sum = graph.cancel(sum, variables);
-            if is_joined(graph, sum, [open[i][j], negative], variables) {
-                let sum = graph.whole(sum);
-                (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
-            }
+            let whole = graph.sub(open[i][j], negative);
+            let joined = graph.cancel(whole, variables);
+            let sum = if is_joined(graph, joined, [open[i][j], negative], variables) {
+                joined
+            } else {
+                let differences = graph.in_differences(whole, places);
+                if differences == whole {
+                    continue;
+                }
+                differences
+            };
+            let sum = graph.whole(sum);
+            (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
         }
     }
     strain

@@ -34,7 +34,10 @@ pub(super) fn stress(
     let doubled_strain = match strain {
         // By which P is formed then.
         Some(_) => Vec::new(),
-        None => doubled_strain(graph, deformation, &derivation.variables),
+        None => {
+            let places = derivation.geometry.places();
+            doubled_strain(graph, deformation, &derivation.variables, &places)
+        }
     };
     let law = NeoHookean { deformation, lambda, mu, doubled_strain };
     let P = match &strain {

@@ -160,7 +160,11 @@ fn deviator(graph: &mut Graph, deformation: &Deformation, kinematics: &Kinematic
             }
         }
     } else {
-        let (normal, shear) = (graph.sub(H[0][0], H[1][1]), graph.add(H[0][1], H[1][0]));
+        let normal = graph.sub(H[0][0], H[1][1]);
+        let shear = match kinematics.doubled_strain[0][1] {
+            Some(strain) => strain,
+            None => graph.add(H[0][1], H[1][0]),
+        };
         M = vec![vec![normal, shear], vec![shear, graph.neg(normal)]];
     }
     for entry in M.iter_mut().flatten() {

@@ -3,6 +3,7 @@
 //! With `G = 2 E = H + H^T + H^T H` it is `P = S + H S`: the part linear in `H` and the remainder
 //! `lambda/2 (H : H) I + mu H^T H + H S`, all of them sums in which nothing large cancels.
 
+use super::kinematics::doubled_strain;
 use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, matrix_product, transpose};
@@ -23,10 +24,15 @@ pub(super) fn stress(
     let G = match &deformation.turn {
         Some(turn) => turn.right_strain(graph),
         None => {
+            let places = derivation.geometry.places();
+            let doubled_strain = doubled_strain(graph, deformation, &derivation.variables, &places);
             let mut G = products.clone();
             for i in 0..n {
                 for j in 0..n {
-                    G[i][j] = graph.sum_of([H[i][j], H[j][i], products[i][j]]);
+                    G[i][j] = match doubled_strain[i][j] {
+                        Some(strain) => graph.add(strain, products[i][j]),
+                        None => graph.sum_of([H[i][j], H[j][i], products[i][j]]),
+                    };
                 }
             }
             G
