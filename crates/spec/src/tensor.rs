@@ -22,10 +22,16 @@ pub(crate) fn matrix_product(graph: &mut Graph, A: &Matrix, B: &Matrix) -> Matri
     product
 }
 
-/// The determinant, by expansion along the first row.
+/// The determinant, by expansion along a row or a column with one entry where there is one, so that it is a product then; else along the
+/// first row.
 pub(crate) fn determinant(graph: &mut Graph, A: &Matrix) -> Expr {
     if A.is_empty() {
         return Graph::ONE;
+    }
+    let along = lone_entry(A).or_else(|| lone_entry(&transpose(A)).map(|[j, i]| [i, j]));
+    if let Some([i, j]) = along {
+        let cofactor = cofactor(graph, A, i, j);
+        return graph.mul(A[i][j], cofactor);
     }
     let mut terms = Vec::new();
     for j in 0..A.len() {
@@ -33,6 +39,15 @@ pub(crate) fn determinant(graph: &mut Graph, A: &Matrix) -> Expr {
         terms.push(graph.mul(A[0][j], cofactor));
     }
     graph.sum_of(terms)
+}
+
+/// Row and column of an entry that is the only one in its row.
+fn lone_entry(A: &Matrix) -> Option<[usize; 2]> {
+    A.iter().enumerate().find_map(|(i, row)| {
+        let mut entries = row.iter().enumerate().filter(|(_, entry)| **entry != Graph::ZERO);
+        let (j, _) = entries.next()?;
+        entries.next().is_none().then_some([i, j])
+    })
 }
 
 /// The cofactor of entry `(i, j)`.
