@@ -167,9 +167,16 @@ impl Deformation {
         graph.sum_of((0..self.open.len()).map(|i| self.open[i][i]))
     }
 
-    /// `H^T F^-T`.
+    /// `H^T F^-T = I - F^-T`: beside the diagonal the second, since the terms of the first may cancel there.
     fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
-        matrix_product(graph, &transpose(&self.H), &self.inverse_transpose)
+        let f = &self.inverse_transpose;
+        let mut M = matrix_product(graph, &transpose(&self.H), f);
+        for i in 0..f.len() {
+            for j in (0..f.len()).filter(|j| *j != i) {
+                M[i][j] = graph.neg(f[i][j]);
+            }
+        }
+        M
     }
 
     /// Whether the volume is shown in symbols to be constant. A pressure that follows from `J` is then the same everywhere; between

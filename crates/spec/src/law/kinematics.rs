@@ -48,7 +48,7 @@ impl Kinematics {
         };
         let trace = graph.whole(trace);
         let f = &deformation.inverse_transpose;
-        let mut M = deformation.transposed_gradient_times_inverse(graph);
+        let M = deformation.transposed_gradient_times_inverse(graph);
         let mut doubled_strain = vec![vec![None; n]; n];
         let (difference, is_small) = if let Some(B) = &strain {
             // F - F^-T = (F F^T - I) F^-T
@@ -62,20 +62,11 @@ impl Kinematics {
             for i in 0..n {
                 for j in 0..n {
                     is_small[i][j] = i == j || doubled_strain[i][j].is_some();
-                    whole[i][j] = match is_small[i][j] {
-                        true => difference(graph, deformation, &doubled_strain, &M, [i, j]),
-                        // H^T F^-T is -F^-T there.
-                        false => graph.sub(H[i][j], f[i][j]),
-                    };
+                    whole[i][j] = difference(graph, deformation, &doubled_strain, &M, [i, j]);
                 }
             }
             (whole, is_small)
         };
-        for i in 0..n {
-            for j in (0..n).filter(|j| *j != i) {
-                M[i][j] = graph.neg(f[i][j]);
-            }
-        }
         Kinematics { trace, strain, doubled_strain, difference, is_small, M }
     }
 
