@@ -167,6 +167,37 @@ impl Deformation {
         graph.sum_of((0..self.open.len()).map(|i| self.open[i][i]))
     }
 
+    /// The slope of `tr H` along a unit vector.
+    fn trace_along(&self, derivation: &mut Derivation, k: usize) -> Expr {
+        self.trace_difference_along(derivation, k).unwrap_or_else(|| {
+            let trace = self.trace(&mut derivation.graph);
+            derivation.along(trace, k)
+        })
+    }
+
+    /// The same where it is a difference of waves, as products: it vanishes where they are equal, and `lambda` multiplies it, which next to
+    /// incompressibility is large.
+    fn trace_difference_along(&self, derivation: &mut Derivation, k: usize) -> Option<Expr> {
+        let trace = self.trace(&mut derivation.graph);
+        let along = derivation.along(trace, k);
+        let places = derivation.geometry.places();
+        let differences = derivation.graph.in_differences(along, &places);
+        (differences != along).then(|| derivation.graph.whole(differences))
+    }
+
+    /// The slope of `ln J` along a unit vector, where `of_M` is `M : dH` with `M = H^T F^-T`: that of `tr H` less `of_M` where the first has
+    /// a form of its own.
+    fn log_J_along(&self, derivation: &mut Derivation, of_M: Expr, k: usize) -> Expr {
+        let along = if self.is_free_of_divergence() {
+            derivation.graph.neg(of_M)
+        } else if let Some(of_trace) = self.trace_difference_along(derivation, k) {
+            derivation.graph.sub(of_trace, of_M)
+        } else {
+            derivation.along(self.log_J, k)
+        };
+        derivation.graph.whole(along)
+    }
+
     /// `H^T F^-T = I - F^-T`: beside the diagonal the second, since the terms of the first may cancel there.
     fn transposed_gradient_times_inverse(&self, graph: &mut Graph) -> Matrix {
         let f = &self.inverse_transpose;
@@ -341,7 +372,6 @@ fn linear_divergence(
 ) -> Vector {
     let H = &deformation.open;
     let n = H.len();
-    let trace = deformation.trace(&mut derivation.graph);
     let mut symmetric = H.clone();
     for i in 0..n {
         for j in 0..n {
@@ -351,7 +381,7 @@ fn linear_divergence(
     let strain = derivation.divergence(&symmetric);
     (0..n)
         .map(|i| {
-            let dilation = derivation.along(trace, i);
+            let dilation = deformation.trace_along(derivation, i);
             let graph = &mut derivation.graph;
             let dilation = graph.mul(lambda, dilation);
             let shear = graph.mul(mu, strain[i]);

@@ -121,7 +121,8 @@ impl Graph {
     }
 
     /// `expr` with sums of cosines, or of sines, of `places` in which the coefficients add up to zero as differences of them: such a sum
-    /// vanishes where all are equal, as the divergence of standing waves along several axes does.
+    /// vanishes where all are equal, as the divergence of standing waves along several axes does. So does a sum of two with equal
+    /// coefficients where one is the negative of the other.
     pub fn in_differences(&mut self, expr: Expr, places: &BTreeSet<Expr>) -> Expr {
         let mut known = BTreeMap::new();
         for sum in self.reachable(&[expr]) {
@@ -158,6 +159,17 @@ impl Graph {
             let others = self.product(others);
             waves.push((function, argument, self.sum([(coefficient, others)])));
         }
+        if let [(function, first, of_first), (other, second, of_second)] = &*waves {
+            let (function, angles, coefficient) = (*function, [*first, *second], *of_first);
+            let (sum, difference) =
+                (self.add(coefficient, *of_second), self.sub(coefficient, *of_second));
+            let is_difference = self.vanishes(sum);
+            if *other != function || !(is_difference || self.vanishes(difference)) {
+                return None;
+            }
+            let product = self.two_waves(function, is_difference, angles, places);
+            return Some(self.mul(coefficient, product));
+        }
         // All are compared with one whose coefficient is a sum, which is zero at no special time: where one of the others is, two waves
         // are left, and compared with each other.
         let is_sum = |(_, _, coefficient): &(Function, Expr, Expr)| {
@@ -174,25 +186,25 @@ impl Graph {
             return None;
         }
         let differences = others.iter().map(|(_, argument, coefficient)| {
-            let difference = self.difference_of_waves(*function, *argument, *first, places);
+            let difference = self.two_waves(*function, true, [*argument, *first], places);
             self.mul(*coefficient, difference)
         });
         let differences: Vec<Expr> = differences.collect();
         Some(self.sum_of(differences))
     }
 
-    /// `cos(a) - cos(b)` or `sin(a) - sin(b)`, as the product of sine and cosine of half the sum and half the difference. Where both
+    /// `cos(a) -+ cos(b)` or `sin(a) -+ sin(b)`, as the product of functions of half the sum and half the difference. Where both
     /// angles depend on the same places, these two are formed in symbols: their slopes may cancel. Else each is written in half the
     /// angles: what belongs to one axis stays a factor of its own, as points of a lattice need it.
-    fn difference_of_waves(
+    fn two_waves(
         &mut self,
         function: Function,
-        a: Expr,
-        b: Expr,
+        is_difference: bool,
+        [a, b]: [Expr; 2],
         places: &BTreeSet<Expr>,
     ) -> Expr {
         if self.places_of(a, places) == self.places_of(b, places) {
-            return self.product_of_waves(function, true, [a, b]);
+            return self.product_of_waves(function, is_difference, [a, b]);
         }
         let half = Rational::new(1.into(), 2.into());
         let of_half = |graph: &mut Self, angle: Expr| {
@@ -200,16 +212,21 @@ impl Graph {
             [Function::Sin, Function::Cos].map(|function| graph.call(function, &[angle]))
         };
         let ([sin_a, cos_a], [sin_b, cos_b]) = (of_half(self, a), of_half(self, b));
-        let [first, second] = [self.mul(sin_a, cos_b), self.mul(cos_a, sin_b)];
-        let apart = self.sub(first, second);
-        let (of_mean, factor) = if function == Function::Cos {
-            (self.add(first, second), -2)
-        } else {
-            let [first, second] = [self.mul(cos_a, cos_b), self.mul(sin_a, sin_b)];
-            (self.sub(first, second), 2)
+        let sines = [self.mul(sin_a, cos_b), self.mul(cos_a, sin_b)];
+        let cosines = [self.mul(cos_a, cos_b), self.mul(sin_a, sin_b)];
+        let of_apart = |graph: &mut Self, function| match function {
+            Function::Sin => graph.sub(sines[0], sines[1]),
+            _ => graph.add(cosines[0], cosines[1]),
         };
-        let product = self.mul(of_mean, apart);
-        self.sum([(Rational::from(factor), product)])
+        let of_mean = |graph: &mut Self, function| match function {
+            Function::Sin => graph.add(sines[0], sines[1]),
+            _ => graph.sub(cosines[0], cosines[1]),
+        };
+        let own = OfHalfAngles::new(function, is_difference);
+        let apart = of_apart(self, own.of_apart);
+        let mean = of_mean(self, own.of_mean);
+        let product = self.mul(mean, apart);
+        self.sum([(Rational::from(own.factor), product)])
     }
 
     /// Those of `places` on which `expr` depends.
@@ -227,12 +244,7 @@ impl Graph {
         let half = Rational::new(1.into(), 2.into());
         let mean = self.sum([(half.clone(), a), (half.clone(), b)]);
         let apart = self.sum([(half.clone(), a), (-half, b)]);
-        let (of_mean, of_apart, factor) = match (function, is_difference) {
-            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
-            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
-            (_, true) => (Function::Cos, Function::Sin, 2),
-            (_, false) => (Function::Sin, Function::Cos, 2),
-        };
+        let OfHalfAngles { of_mean, of_apart, factor } = OfHalfAngles::new(function, is_difference);
         let (of_mean, of_apart) = (self.call(of_mean, &[mean]), self.call(of_apart, &[apart]));
         let product = self.mul(of_mean, of_apart);
         self.sum([(Rational::from(factor), product)])
@@ -270,6 +282,25 @@ impl Graph {
         }
         let product = self.product_of_waves(f, is_difference, [a, b]);
         Some(self.sum([(of_first.clone(), product)]))
+    }
+}
+
+/// The functions of half the sum and half the difference of two angles whose product is the sum or difference of two waves, and its factor.
+struct OfHalfAngles {
+    of_mean: Function,
+    of_apart: Function,
+    factor: i64,
+}
+
+impl OfHalfAngles {
+    fn new(function: Function, is_difference: bool) -> Self {
+        let (of_mean, of_apart, factor) = match (function, is_difference) {
+            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
+            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
+            (_, true) => (Function::Cos, Function::Sin, 2),
+            (_, false) => (Function::Sin, Function::Cos, 2),
+        };
+        OfHalfAngles { of_mean, of_apart, factor }
     }
 }
 

@@ -242,7 +242,6 @@ impl Invariants {
             false => graph.add(shear, self.stiffness_at_rest),
         };
         let (open_mu, open_modulus) = (modulus_at_rest(graph, mu), modulus_at_rest(graph, modulus));
-        let trace = deformation.trace(graph);
 
         // Of the factor of F^-T g what it is more than at rest.
         let slope_change = self.scaled_slope_change(graph);
@@ -270,7 +269,7 @@ impl Invariants {
         let of_H = derivation.divergence(H);
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..n {
-            let dilation = derivation.along(trace, i);
+            let dilation = deformation.trace_along(derivation, i);
             let graph = &mut derivation.graph;
             let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
             linear.push(graph.sum_of(first));

@@ -132,16 +132,9 @@ impl Kinematics {
         let n = deformation.H.len();
         let of_M: Vector =
             (0..n).map(|k| work_along(derivation, &self.M, &deformation.H, k)).collect();
-        let along = |k: usize| {
-            let along = match deformation.is_free_of_divergence() {
-                true => derivation.graph.neg(of_M[k]),
-                false => derivation.along(deformation.log_J, k),
-            };
-            derivation.graph.whole(along)
-        };
         let g = match deformation.is_isochoric() {
             true => vec![Graph::ZERO; n],
-            false => (0..n).map(along).collect(),
+            false => (0..n).map(|k| deformation.log_J_along(derivation, of_M[k], k)).collect(),
         };
         DilationGradient { of_M, g }
     }
@@ -201,14 +194,13 @@ impl ChainRule<'_> {
         let open = derivation.divergence(&deformation.open);
         let of_H = derivation.divergence(&deformation.H);
         let graph = &mut derivation.graph;
-        let trace = deformation.trace(graph);
         // With J = 1 everywhere, what belongs to the change of volume adds up to zero.
         let modulus = if deformation.is_isochoric() { Graph::ZERO } else { self.modulus };
         let open_mu = modulus_at_rest(graph, self.S_at_rest);
         let open_modulus = modulus_at_rest(graph, modulus);
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..f.len() {
-            let dilation = derivation.along(trace, i);
+            let dilation = deformation.trace_along(derivation, i);
             let graph = &mut derivation.graph;
             let first = [graph.mul(open_modulus, dilation), graph.mul(open_mu, open[i])];
             linear.push(graph.sum_of(first));

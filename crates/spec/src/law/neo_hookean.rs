@@ -158,7 +158,6 @@ impl NeoHookean<'_> {
         let graph = &mut derivation.graph;
         let modulus = graph.add(lambda, mu);
         let modulus = graph.whole(modulus);
-        let trace = deformation.trace(graph);
         let pressure = graph.mul(lambda, deformation.log_J);
         let factor = graph.sub(modulus, pressure);
         let factor = graph.whole(factor);
@@ -176,16 +175,12 @@ impl NeoHookean<'_> {
             let sum = derivation.graph.sum_of(terms);
             let sum = zero_if_vanishing(&mut derivation.graph, sum);
             m.push(sum);
-            let along = match deformation.is_free_of_divergence() {
-                true => derivation.graph.neg(sum),
-                false => derivation.along(deformation.log_J, k),
-            };
-            g.push(derivation.graph.whole(along));
+            g.push(deformation.log_J_along(derivation, sum, k));
         }
         let (open, of_H) = (derivation.divergence(&deformation.open), derivation.divergence(H));
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..n {
-            let dilation = derivation.along(trace, i);
+            let dilation = deformation.trace_along(derivation, i);
             let graph = &mut derivation.graph;
             let shear = graph.mul(open_mu, open[i]);
             if is_isochoric {
