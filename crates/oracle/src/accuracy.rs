@@ -531,7 +531,8 @@ impl<'a> Accuracy<'a> {
     ) -> Result<Vec<Vec<f64>>, AccuracyError> {
         let fail = |reason: String| AccuracyError::Evaluation { place: self.place(inputs), reason };
         let given = judged(inputs).map_err(fail)?;
-        self.expressions
+        let results: Result<Vec<Vec<f64>>, _> = self
+            .expressions
             .iter()
             .map(|(letter, expressions)| {
                 given
@@ -542,7 +543,22 @@ impl<'a> Accuracy<'a> {
                         fail(format!("there is no field {letter} of {} entries", expressions.len()))
                     })
             })
-            .collect()
+            .collect();
+        let mut results = results?;
+        // The body force of a lattice's point that is not a number is evaluated anew by itself.
+        let of_way = |is_it: fn(&Way) -> bool| {
+            JUDGED
+                .iter()
+                .position(|judged| judged.name == FieldName::BodyForce && is_it(&judged.way))
+        };
+        let single = of_way(|way| matches!(way, Way::Single)).map(|place| results[place].clone());
+        let lattice = of_way(|way| matches!(way, Way::Lattice)).map(|place| &mut results[place]);
+        if let (Some(single), Some(lattice)) = (single, lattice)
+            && lattice.iter().any(|b| b.is_nan())
+        {
+            *lattice = single;
+        }
+        Ok(results)
     }
 
     fn exact_inputs(&self, inputs: &[f64]) -> Vec<(Expr, Rational)> {
