@@ -244,6 +244,41 @@ mod tests {
     }
 
     #[test]
+    fn what_is_beyond_first_order_is_of_second() {
+        for (text, is_known) in [
+            ("mu*(h + k) - mu*k*(1 + h)", true),
+            ("mu*h + (1/(1 + h) - 1)*(k - h*mu)", true),
+            ("(h + h*k)*exp(k)*(mu + k^2)/(1 + h)", true),
+            ("h^2*mu - 3*k", true),
+            ("mu*log1p(h + k*h)*(1 + k) - h", true),
+            ("sin(h)", false),
+            ("h + mu", false),
+        ] {
+            let mut graph = Graph::new();
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            let [h, k, mu] = ["h", "k", "mu"].map(|name| graph.symbol(name));
+            let beyond = graph.beyond_linear(expr, &BTreeSet::from([h, k]));
+            assert_eq!(beyond.is_some(), is_known, "{text}");
+            let Some(beyond) = beyond else { continue };
+            let inputs = [h, k, mu].map(|symbol| (symbol, Default::default()));
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr, beyond]);
+            // The slopes at zero from differences, which are exact there but for rounding.
+            let slope = |h: f64, k: f64| program.evaluate(&[h, k, 1.7])[0] / (h + k);
+            let linear = 0.3 * slope(1e-200, 0.0) + 0.2 * slope(0.0, 1e-200);
+            let at = program.evaluate(&[0.3, 0.2, 1.7]);
+            assert!((at[0] - linear - at[1]).abs() < 1e-14, "{text}: {at:?} {linear}");
+            // Of second order: a hundredth of a hundredth, but for the third.
+            let small = program.evaluate(&[3e-8, 2e-8, 1.7])[1];
+            let smaller = program.evaluate(&[3e-10, 2e-10, 1.7])[1];
+            assert!(
+                (small * 1e-4 - smaller).abs() <= 1e-6 * smaller.abs(),
+                "{text}: {small} {smaller}"
+            );
+        }
+    }
+
+    #[test]
     fn values_at_zero_cancel() {
         let cases = [
             ("mu*(1+h) - mu/(1+h)", "0", 3.4e-30),

@@ -331,5 +331,19 @@ mod tests {
              *(cos(Y*Pi/2)*sin(Z*Pi/2) + sin(Y*Pi/2)*cos(Z*Pi/2)))"
         );
         assert_eq!(graph.in_differences(left, &places), left);
+        let mut compared = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let waves = graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap();
+            let compared = graph.in_differences(waves, &places);
+            graph.print(compared)
+        };
+        // Angles of the same places are joined, those of others halved.
+        assert_eq!(compared("A*cos(X + Y) - A*cos(X - Y)"), "-2*A*sin(X)*sin(Y)");
+        assert_eq!(compared("A*sin(X + Y) + A*sin(Y - X)"), "2*A*sin(Y)*cos(X)");
+        assert_eq!(
+            compared("cos(X) + cos(Y)"),
+            "2*(cos(X/2)*cos(Y/2) + sin(X/2)*sin(Y/2))*(cos(X/2)*cos(Y/2) - sin(X/2)*sin(Y/2))"
+        );
+        assert_eq!(compared("2*cos(X) + cos(Y)"), "2*cos(X) + cos(Y)");
     }
 }
