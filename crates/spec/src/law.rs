@@ -58,6 +58,14 @@ pub(crate) struct Stress {
     pub(crate) energy: Option<Expr>,
 }
 
+/// `Div H`.
+struct OfGradient {
+    /// As it was derived, for sums in which terms may cancel.
+    open: Vector,
+    /// Of entries in one piece.
+    of_H: Vector,
+}
+
 /// The divergence of `P` in two parts, see [`Stress`], and whole.
 struct Divergence {
     /// `mu Div H + (lambda + mu) grad tr H`.
@@ -118,6 +126,15 @@ impl Deformation {
             }
         };
         let volume_change = zero_if_vanishing(graph, volume_change);
+        // Where J = 1, tr H is what is left of J - 1, of second order; by its terms of first order it would have no digits.
+        let dilation = if volume_change == Graph::ZERO && turn.is_none() && !dilation.is_empty() {
+            let minors = minors_beyond_trace(graph, &H);
+            let minors = graph.sum_of(minors);
+            let trace = graph.neg(minors);
+            vec![graph.whole(trace)]
+        } else {
+            dilation
+        };
         let J = if volume_change == Graph::ZERO { Graph::ONE } else { J };
         let volume_change = graph.whole(volume_change);
         let mut inverse_transpose = vec![vec![Graph::ZERO; n]; n];
@@ -164,7 +181,36 @@ impl Deformation {
         if self.is_free_of_divergence() {
             return Graph::ZERO;
         }
+        if self.is_isochoric() && self.turn.is_none() {
+            return graph.sum_of(self.dilation.iter().copied());
+        }
         graph.sum_of((0..self.open.len()).map(|i| self.open[i][i]))
+    }
+
+    /// `Div H`.
+    fn divergence_of_gradient(&self, derivation: &mut Derivation) -> OfGradient {
+        match self.divergence_of_second_order(derivation) {
+            Some(of_H) => OfGradient { open: of_H.clone(), of_H },
+            None => OfGradient {
+                open: derivation.divergence(&self.open),
+                of_H: derivation.divergence(&self.H),
+            },
+        }
+    }
+
+    /// `Div H` where `H` is symmetric and `J = 1`: there it is the gradient of `tr H`, which is of second order, and so is `Div H^T`.
+    fn divergence_of_second_order(&self, derivation: &mut Derivation) -> Option<Vector> {
+        let n = self.H.len();
+        let is_symmetric = (0..n).all(|i| {
+            (0..i).all(|j| {
+                let turn = derivation.graph.sub(self.open[i][j], self.open[j][i]);
+                derivation.graph.vanishes(turn)
+            })
+        });
+        (self.is_isochoric() && self.turn.is_none() && is_symmetric).then(|| {
+            let trace = self.trace(&mut derivation.graph);
+            (0..n).map(|k| derivation.along(trace, k)).collect()
+        })
     }
 
     /// The slope of `tr H` along a unit vector.
@@ -372,13 +418,18 @@ fn linear_divergence(
 ) -> Vector {
     let H = &deformation.open;
     let n = H.len();
-    let mut symmetric = H.clone();
-    for i in 0..n {
-        for j in 0..n {
-            symmetric[i][j] = derivation.graph.add(H[i][j], H[j][i]);
+    let strain = match deformation.divergence_of_second_order(derivation) {
+        Some(of_H) => of_H.iter().map(|&of_H| derivation.graph.add(of_H, of_H)).collect(),
+        None => {
+            let mut symmetric = H.clone();
+            for i in 0..n {
+                for j in 0..n {
+                    symmetric[i][j] = derivation.graph.add(H[i][j], H[j][i]);
+                }
+            }
+            derivation.divergence(&symmetric)
         }
-    }
-    let strain = derivation.divergence(&symmetric);
+    };
     (0..n)
         .map(|i| {
             let dilation = deformation.trace_along(derivation, i);

@@ -21,7 +21,7 @@ use super::energy::{EXCESS, modulus_at_rest, own_symbol};
 use super::kinematics::{
     DilationGradient, Kinematics, row_times, volume_symbols, volume_values, work_along,
 };
-use super::{Deformation, Divergence, Stress, zero_if_vanishing};
+use super::{Deformation, Divergence, OfGradient, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
@@ -265,8 +265,7 @@ impl Invariants {
         let of_K: Vector = (0..n).map(|k| work_along(derivation, &self.K, H, k)).collect();
         let DilationGradient { of_M, g } =
             self.kinematics.dilation_gradient(derivation, deformation);
-        let open = derivation.divergence(&deformation.open);
-        let of_H = derivation.divergence(H);
+        let OfGradient { open, of_H } = deformation.divergence_of_gradient(derivation);
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..n {
             let dilation = deformation.trace_along(derivation, i);

@@ -1,7 +1,7 @@
 //! Measures of strain that are small where the displacement gradient is, and what laws in invariants need of their gradients.
 
 use super::energy::modulus_at_rest;
-use super::{Deformation, Divergence, zero_if_vanishing};
+use super::{Deformation, Divergence, OfGradient, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
@@ -191,8 +191,7 @@ impl ChainRule<'_> {
         DilationGradient { of_M, g }: &DilationGradient,
     ) -> Divergence {
         let f = &deformation.inverse_transpose;
-        let open = derivation.divergence(&deformation.open);
-        let of_H = derivation.divergence(&deformation.H);
+        let OfGradient { open, of_H } = deformation.divergence_of_gradient(derivation);
         let graph = &mut derivation.graph;
         // With J = 1 everywhere, what belongs to the change of volume adds up to zero.
         let modulus = if deformation.is_isochoric() { Graph::ZERO } else { self.modulus };
@@ -259,8 +258,10 @@ pub(super) fn doubled_strain(
             let negative = graph.neg(open[j][i]);
             let whole = graph.sub(open[i][j], negative);
             let joined = graph.cancel(whole, variables);
-            let sum = if is_joined(graph, joined, [open[i][j], negative], variables) {
-                joined
+            let is_joined = is_joined(graph, joined, [open[i][j], negative], variables);
+            let of_joined = graph.in_differences(joined, places);
+            let differences = if is_joined || of_joined != joined {
+                of_joined
             } else {
                 let differences = graph.in_differences(whole, places);
                 if differences == whole {
@@ -268,7 +269,7 @@ pub(super) fn doubled_strain(
                 }
                 differences
             };
-            let sum = graph.whole(sum);
+            let sum = graph.whole(differences);
             (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
         }
     }

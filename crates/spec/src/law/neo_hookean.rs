@@ -14,7 +14,7 @@
 //!   `-(lambda + mu) (m + M g) - lambda ln J F^-T g`, where `m = M : grad H`.
 
 use super::kinematics::{DoubledStrain, difference, doubled_strain};
-use super::{Deformation, Divergence, Stress, zero_if_vanishing};
+use super::{Deformation, Divergence, OfGradient, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, matrix_product};
 use mmsmith_expr::{Expr, Graph};
@@ -177,7 +177,7 @@ impl NeoHookean<'_> {
             m.push(sum);
             g.push(deformation.log_J_along(derivation, sum, k));
         }
-        let (open, of_H) = (derivation.divergence(&deformation.open), derivation.divergence(H));
+        let OfGradient { open, of_H } = deformation.divergence_of_gradient(derivation);
         let (mut linear, mut remainder, mut whole) = (Vector::new(), Vector::new(), Vector::new());
         for i in 0..n {
             let dilation = deformation.trace_along(derivation, i);
