@@ -280,6 +280,7 @@ fn stresses_keep_the_digits_of_what_cancels() {
         (of_file("digits/waves-of-one-size"), TWO_WAVES_NEARLY_INCOMPRESSIBLE),
         (of_file("digits/one-direction-alone"), PLANE_AND_DIRECTION),
         (of_file("digits/triangular"), LARGE_STRETCHES),
+        (of_file("digits/tube-of-constant-area"), STIFF_TUBE),
     ];
     for (text, inputs) in cases {
         let spec = Spec::parse(&text, "a case").unwrap();
@@ -300,6 +301,26 @@ fn stresses_keep_the_digits_of_what_cancels() {
     }
 }
 
+/// A cube root less the radius, at a tiny amplitude: `u` had no digit.
+#[test]
+fn displacements_keep_the_digits_of_roots() {
+    let file = "../../tests/data/specs/attack/open/cavity.toml";
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
+    let spec = Spec::parse(&text, file).unwrap();
+    let accuracy = Accuracy::new(&spec, spec.derive().unwrap());
+    let programs = accuracy.programs();
+    let judged = |inputs: &[f64]| {
+        Ok(programs.iter().map(|(letter, program)| (*letter, program.evaluate(inputs))).collect())
+    };
+    // X, Y, Z, t, A, E, nu, rho0, Ri, Ro.
+    let worst =
+        accuracy.at(&[0.2, 0.3, 0.4, 0.02, 1e-20, 1e3, 0.3, 1.3, 0.4, 1.0], &judged).unwrap();
+    let of_motion: Vec<_> =
+        worst.iter().filter(|worst| ["u", "v", "a", "H", "F"].contains(&&*worst.field)).collect();
+    assert_eq!(of_motion.len(), 5);
+    assert!(of_motion.iter().all(|field| field.factor <= LARGEST_FACTOR), "{of_motion:?}");
+}
+
 /// X, Y, t, A, E, nu, rho0; `K` of `b` was 654.
 #[rustfmt::skip]
 const TWO_WAVES_NEARLY_INCOMPRESSIBLE: &[f64] = &[
@@ -311,7 +332,13 @@ const PLANE_AND_DIRECTION: &[f64] = &[
     0.6107453693404187, 0.04869929523324742, 0.7931761868448093, 0.0647568951270023, 0.48822104590255655, 982.6244353488844,
     -0.04233786355029113, 1.4180183319165744,
 ];
-/// The same; `K` of `P` was 46.
+/// X, Y, t, A, E, nu, rho0, Ri, Ro; `K` of `b` was 1e5.
+#[rustfmt::skip]
+const STIFF_TUBE: &[f64] = &[
+    0.5019618375027151, 0.0, 0.06206126361709265, 4.78680188994553e-11, 1193.1512917658697, -0.999981282872775, 1.80559907310866,
+    0.3798167489560368, 0.7104921380374318,
+];
+/// X, Y, Z, t, A, E, nu, rho0; `K` of `P` was 46.
 #[rustfmt::skip]
 const LARGE_STRETCHES: &[f64] = &[
     0.5901485613459356, 0.1785482531420035, 0.24794417460485374, 0.04398709176664889, -74.54070291472605, 3166.433511046547,

@@ -10,7 +10,7 @@ use crate::law::energy::{INVARIANTS, component_names};
 use crate::read::LONGEST_FILE;
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
-use mmsmith_expr::{Expr, Function, Graph, Node, Program};
+use mmsmith_expr::{Expr, Function, Graph, Node, Program, Rational};
 use mmsmith_vocabulary::{
     Components, Constant, Material, Moduli, Response, Row, Stated, Term, UnknownLaw, Volumetric,
 };
@@ -438,8 +438,11 @@ impl Spec {
         let mut positive = BTreeMap::new();
         if self.coordinates != Coordinates::Cartesian {
             let radius = graph.symbol("R");
-            let square = graph.powi(radius, 2);
-            positive.insert(graph.sqrt(square), radius);
+            for n in 2..=4 {
+                let power = graph.powi(radius, n);
+                let root = graph.product([(power, Rational::new(1.into(), n.into()))]);
+                positive.insert(root, radius);
+            }
         }
         for component in &mut self.displacement {
             let formed = symbols.iter().find_map(|symbol| {
