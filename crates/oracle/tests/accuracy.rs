@@ -316,7 +316,7 @@ fn displacements_keep_the_digits_of_roots() {
     let worst =
         accuracy.at(&[0.2, 0.3, 0.4, 0.02, 1e-20, 1e3, 0.3, 1.3, 0.4, 1.0], &judged).unwrap();
     let of_motion: Vec<_> =
-        worst.iter().filter(|worst| ["u", "v", "a", "H", "F"].contains(&&*worst.field)).collect();
+        worst.iter().filter(|worst| ["u", "v", "a", "H", "F"].contains(&worst.field)).collect();
     assert_eq!(of_motion.len(), 5);
     assert!(of_motion.iter().all(|field| field.factor <= LARGEST_FACTOR), "{of_motion:?}");
 }
