@@ -110,6 +110,10 @@ class Case:
                 worst = max(worst, largest / scale if scale > 0 else math.inf)
         return worst
 
+    def packed(self):
+        """How many points there are, then each position and time, for drivers."""
+        return np.concatenate([[POINTS], np.column_stack([self.X, self.t]).ravel()])
+
     def unpacked(self, flat, fields):
         """Fields from one row a point."""
         flat = np.frombuffer(flat, dtype=float).reshape(POINTS, -1)
@@ -133,8 +137,7 @@ def cpp(case):
     program = case.folder / "cpp"
     space = re.search(r"namespace (\w+) \{\n\nusing", header.read_text())[1]
     call(["g++", *strict, f'-DHEADER="{header}"', f"-DSPACE=mms::{space}", HERE / "fields.cc", "-o", program])
-    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
-    return case.unpacked(call([program], input=points.tobytes()), ALL)
+    return case.unpacked(call([program], input=case.packed().tobytes()), ALL)
 
 
 def cuda(case):
@@ -143,8 +146,7 @@ def cuda(case):
     program = case.folder / "cuda"
     strict = ["-std=c++17", "-fmad=false", "-Werror", "all-warnings", "-Xcompiler", "-Wall,-Wextra"]
     call(["nvcc", *strict, f'-DHEADER="{header}"', f"-DNAME={case.module}", HERE / "fields.cu", "-o", program])
-    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
-    return case.unpacked(call([program], input=points.tobytes()), FIELDS)
+    return case.unpacked(call([program], input=case.packed().tobytes()), FIELDS)
 
 
 def fortran_program(case, source, driver, points):
@@ -161,8 +163,7 @@ def fortran_program(case, source, driver, points):
 
 
 def fortran(case):
-    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
-    return case.unpacked(fortran_program(case, case.generate("fortran", ".f90"), "fields.f90", points), ALL)
+    return case.unpacked(fortran_program(case, case.generate("fortran", ".f90"), "fields.f90", case.packed()), ALL)
 
 
 def abaqus(case):
@@ -181,8 +182,7 @@ def abaqus(case):
 
 
 def calculix(case):
-    points = np.concatenate([[POINTS], np.column_stack([case.X, case.t]).ravel()])
-    return case.unpacked(fortran_program(case, case.generate("calculix", "_calculix.f90"), "calculix.f90", points), {"rho0_b": 1})
+    return case.unpacked(fortran_program(case, case.generate("calculix", "_calculix.f90"), "calculix.f90", case.packed()), {"rho0_b": 1})
 
 
 def python_fields(solution, X, t):

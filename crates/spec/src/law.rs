@@ -15,7 +15,7 @@ use crate::tensor::{
 };
 use crate::{DeriveError, Law};
 use energy::ComponentLaw;
-use kinematics::doubled_strain;
+use kinematics::{doubled_strain, with_transpose};
 use mmsmith_expr::{Expr, Function, Graph, Node};
 use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
 use std::collections::BTreeSet;
@@ -389,16 +389,13 @@ fn linear_elastic(
     let n = H.len();
     let trace = graph.sum_of(deformation.dilation.iter().copied());
     let pressure = graph.mul(lambda, trace);
-    let places = derivation.geometry.places();
-    let doubled_strain = doubled_strain(graph, deformation, &derivation.variables, &places);
+    let doubled_strain = doubled_strain(derivation, deformation);
+    let graph = &mut derivation.graph;
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
-            let strain = match doubled_strain[i][j] {
-                Some(strain) => strain,
-                None => graph.add(H[i][j], H[j][i]),
-            };
+            let strain = with_transpose(graph, deformation, &doubled_strain, [i, j]);
             let shear = graph.mul(mu, strain);
             anisotropic[i][j] = zero_if_vanishing(graph, shear);
             let normal = if i == j { pressure } else { Graph::ZERO };

@@ -98,11 +98,11 @@ impl ComponentLaw {
             let value = zero_if_vanishing(graph, value);
             *entry = graph.add(value, rest);
         }
-        let places = derivation.geometry.places();
         let doubled_strain = match &deformation.turn {
             Some(_) => vec![vec![None; n]; n],
-            None => doubled_strain(graph, deformation, &derivation.variables, &places),
+            None => doubled_strain(derivation, deformation),
         };
+        let graph = &mut derivation.graph;
         let mut P = stress.clone();
         for (i, J) in (0..n).flat_map(|i| (0..n).map(move |J| (i, J))) {
             let apart = doubled_strain[i][J]

@@ -6,7 +6,7 @@ use crate::derivation::Derivation;
 use crate::derive::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Measures of the strain of one deformation.
 pub(super) struct Kinematics {
@@ -54,9 +54,8 @@ impl Kinematics {
             // F - F^-T = (F F^T - I) F^-T
             (matrix_product(graph, B, f), vec![vec![true; n]; n])
         } else {
-            let places = derivation.geometry.places();
-            doubled_strain =
-                self::doubled_strain(graph, deformation, &derivation.variables, &places);
+            doubled_strain = self::doubled_strain(derivation, deformation);
+            let graph = &mut derivation.graph;
             let mut whole = M.clone();
             let mut is_small = vec![vec![true; n]; n];
             for i in 0..n {
@@ -245,11 +244,11 @@ pub(super) fn row_times(graph: &mut Graph, A: &Matrix, i: usize, x: &Vector) -> 
 pub(super) type DoubledStrain = Vec<Vec<Option<Expr>>>;
 
 pub(super) fn doubled_strain(
-    graph: &mut Graph,
+    derivation: &mut Derivation,
     deformation: &Deformation,
-    variables: &BTreeSet<Expr>,
-    places: &BTreeSet<Expr>,
 ) -> DoubledStrain {
+    let places = &derivation.geometry.places();
+    let Derivation { graph, variables, .. } = derivation;
     let open = &deformation.open;
     let n = open.len();
     let mut strain = vec![vec![None; n]; n];
@@ -274,6 +273,17 @@ pub(super) fn doubled_strain(
         }
     }
     strain
+}
+
+/// An entry of `H + H^T`.
+pub(super) fn with_transpose(
+    graph: &mut Graph,
+    deformation: &Deformation,
+    doubled_strain: &DoubledStrain,
+    [i, j]: [usize; 2],
+) -> Expr {
+    let H = &deformation.H;
+    doubled_strain[i][j].unwrap_or_else(|| graph.add(H[i][j], H[j][i]))
 }
 
 /// An entry of `F - F^-T`, from `M = H^T F^-T`: `H + M`, or `H + H^T - H^T M`.

@@ -34,11 +34,9 @@ pub(super) fn stress(
     let doubled_strain = match strain {
         // By which P is formed then.
         Some(_) => Vec::new(),
-        None => {
-            let places = derivation.geometry.places();
-            doubled_strain(graph, deformation, &derivation.variables, &places)
-        }
+        None => doubled_strain(derivation, deformation),
     };
+    let graph = &mut derivation.graph;
     let law = NeoHookean { deformation, lambda, mu, doubled_strain };
     let P = match &strain {
         Some(strain) => law.by_strain(graph, strain),

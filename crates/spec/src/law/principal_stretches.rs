@@ -14,7 +14,9 @@
 //! diagonal `P` is formed as `(phi - psi (J - 1)) F^-T + psi (F - F^-T)`, whose factor of `F^-T` is `lambda (J - 1)` to first order.
 
 use super::energy::{RATIO, modulus_at_rest, own_symbol};
-use super::kinematics::{ChainRule, Kinematics, volume_symbols, volume_values, work_along};
+use super::kinematics::{
+    ChainRule, Kinematics, volume_symbols, volume_values, with_transpose, work_along,
+};
 use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::DeriveError;
 use crate::derivation::Derivation;
@@ -161,10 +163,7 @@ fn deviator(graph: &mut Graph, deformation: &Deformation, kinematics: &Kinematic
         }
     } else {
         let normal = graph.sub(H[0][0], H[1][1]);
-        let shear = match kinematics.doubled_strain[0][1] {
-            Some(strain) => strain,
-            None => graph.add(H[0][1], H[1][0]),
-        };
+        let shear = with_transpose(graph, deformation, &kinematics.doubled_strain, [0, 1]);
         M = vec![vec![normal, shear], vec![shear, graph.neg(normal)]];
     }
     for entry in M.iter_mut().flatten() {

@@ -3,7 +3,7 @@
 //! With `G = 2 E = H + H^T + H^T H` it is `P = S + H S`: the part linear in `H` and the remainder
 //! `lambda/2 (H : H) I + mu H^T H + H S`, all of them sums in which nothing large cancels.
 
-use super::kinematics::doubled_strain;
+use super::kinematics::{doubled_strain, with_transpose};
 use super::{Deformation, Stress, linear_divergence, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, matrix_product, transpose};
@@ -24,20 +24,19 @@ pub(super) fn stress(
     let G = match &deformation.turn {
         Some(turn) => turn.right_strain(graph),
         None => {
-            let places = derivation.geometry.places();
-            let doubled_strain = doubled_strain(graph, deformation, &derivation.variables, &places);
+            let doubled_strain = doubled_strain(derivation, deformation);
+            let graph = &mut derivation.graph;
             let mut G = products.clone();
             for i in 0..n {
                 for j in 0..n {
-                    G[i][j] = match doubled_strain[i][j] {
-                        Some(strain) => graph.add(strain, products[i][j]),
-                        None => graph.sum_of([H[i][j], H[j][i], products[i][j]]),
-                    };
+                    let linear = with_transpose(graph, deformation, &doubled_strain, [i, j]);
+                    G[i][j] = graph.add(linear, products[i][j]);
                 }
             }
             G
         }
     };
+    let graph = &mut derivation.graph;
     let diagonal = |A: &Matrix| -> Vec<Expr> { (0..n).map(|k| A[k][k]).collect() };
     // tr G = 2 tr H + H : H.
     let mut of_trace = diagonal(if deformation.turn.is_some() { &G } else { &products });
