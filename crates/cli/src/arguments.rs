@@ -67,7 +67,7 @@ pub(crate) use tradeoff::{Against, TradeoffOptions};
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
 #[derive(Parser)]
-#[command(name = "mms", version, max_term_width = 100)]
+#[command(name = "mms", version)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(crate) talk: TalkOptions,

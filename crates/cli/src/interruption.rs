@@ -3,7 +3,7 @@
 use anyhow::Error;
 use mmsmith_verify::{CaseError, StudyError};
 
-use crate::processes;
+use crate::{processes, progress, terminal};
 
 /// The exit status of an interrupted command, as of any program that a shell interrupts.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -16,6 +16,8 @@ pub fn end_on_signals() {
     let mut asked = false;
     let handled = ctrlc::set_handler(move || {
         if std::mem::replace(&mut asked, true) || !mmsmith_verify::interrupt() {
+            progress::clear();
+            terminal::error("interrupted");
             std::process::exit(INTERRUPTED.into());
         }
         processes::tell_last_checkpoint();

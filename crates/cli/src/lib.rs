@@ -50,7 +50,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let joined = processes::join();
     let arguments = read(&given).unwrap_or_else(|refusal| {
         if processes::is_first() {
-            let _ = refusal.print();
+            terminal::show_refusal(&refusal, color_of(&given));
         }
         processes::leave();
         std::process::exit(refusal.exit_code())
@@ -73,7 +73,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
             // A diagnostic is laid out as a whole already.
             match error.downcast_ref::<mmsmith_spec::Diagnostic>() {
                 _ if !processes::is_first() => {}
-                Some(diagnostic) => terminal::complain(&format!("{diagnostic}\n")),
+                Some(diagnostic) => terminal::show(diagnostic),
                 None => terminal::error(format_args!("{error:#}")),
             }
             let status = if is_interrupted(&error) { INTERRUPTED } else { 2 };
@@ -134,6 +134,7 @@ fn message(error: &anyhow::Error) -> String {
 fn read(given: &[OsString]) -> Result<Arguments, clap::Error> {
     line()
         .color(color_of(given).into())
+        .term_width(terminal::columns_of_help())
         .try_get_matches_from(given)
         .and_then(|matches| Arguments::from_arg_matches(&matches))
 }

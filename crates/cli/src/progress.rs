@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 use std::io::{IsTerminal, stderr};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 use mmsmith_verify::Progress;
 
 use crate::terminal;
@@ -18,6 +18,19 @@ pub(crate) struct Bar {
     line: Arc<Line>,
     /// The share of the whole at which this part begins and at which it ends.
     stretch: (f64, f64),
+}
+
+/// Bars that may be on the terminal.
+static SHOWN: Mutex<Vec<WeakProgressBar>> = Mutex::new(Vec::new());
+
+/// Takes all bars off the terminal, for a process that is about to end.
+pub(crate) fn clear() {
+    // A thread that is just adding a bar keeps the list; its bar has drawn nothing yet.
+    for bar in SHOWN.try_lock().map(|mut bars| std::mem::take(&mut *bars)).unwrap_or_default() {
+        if let Some(bar) = bar.upgrade() {
+            bar.finish_and_clear();
+        }
+    }
 }
 
 /// The line on the terminal.
@@ -48,7 +61,9 @@ impl Bar {
         if terminal::is_quiet() || !stderr().is_terminal() {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
-        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent}%, {prefix}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("{wide_msg} [{bar:20}] {percent:>3}%, {prefix}")
+        {
             bar.set_style(style.progress_chars("=> "));
         }
         let line = Line { bar, begun: Instant::now(), predicted_s, first: OnceLock::new() };
@@ -56,6 +71,10 @@ impl Bar {
         line.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
         // What the bar says is complete before it is first drawn.
         line.bar.enable_steady_tick(Duration::from_millis(500));
+        let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.retain(|bar| bar.upgrade().is_some());
+        shown.push(line.bar.downgrade());
+        drop(shown);
         Self { line: Arc::new(line), stretch: (0.0, 1.0) }
     }
 
@@ -161,7 +180,7 @@ fn in_words(left: Option<Duration>) -> String {
     match left {
         // Never none while there is work.
         Some(left) => format!("{} left", HumanDuration(left.max(Duration::from_secs(1)))),
-        None => "estimating the time left".into(),
+        None => "estimating".into(),
     }
 }
 
@@ -196,7 +215,7 @@ mod tests {
     fn nothing_is_said_of_the_time_left_until_something_tells_it() {
         assert_eq!((seconds(0, None, 0.0), seconds(60, None, 0.001)), (None, None));
         assert_eq!(seconds(10, None, 0.25), Some(30.0));
-        assert_eq!(in_words(None), "estimating the time left");
+        assert_eq!(in_words(None), "estimating");
         assert_eq!(in_words(Some(Duration::from_secs(30))), "30 seconds left");
         assert_eq!(in_words(Some(Duration::ZERO)), "1 second left");
     }

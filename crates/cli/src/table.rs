@@ -1,20 +1,43 @@
 //! Tables for people.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::ops::Range;
 
-use crate::html;
 use crate::svg::escape;
+use crate::{html, terminal};
 
 /// Rows of cells under a header; columns as wide as they need to be.
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,
     /// Columns from the left that are aligned to the left; numbers go to the right.
     words: usize,
+    /// Columns that text leaves out where they do not fit, in this order.
+    spare: Vec<Range<usize>>,
+    /// The least width of a last column of words, which go on in the next line where they do not fit.
+    flow: Option<usize>,
 }
+
+/// Columns of blanks between two columns of a table.
+const GAP: usize = 2;
 
 impl Table {
     pub(crate) fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
-        Self { rows: vec![header.into_iter().map(Into::into).collect()], words }
+        let rows = vec![header.into_iter().map(Into::into).collect()];
+        Self { rows, words, spare: Vec::new(), flow: None }
+    }
+
+    /// The table with columns that text leaves out where the line is too short for all of them; those of the first call first.
+    pub(crate) fn sparing(mut self, columns: Range<usize>) -> Self {
+        self.spare.push(columns);
+        self
+    }
+
+    /// The table with a last column of words, which go on in the next line where the line is too short, and which keeps `least`
+    /// characters.
+    pub(crate) fn flowing(mut self, least: usize) -> Self {
+        self.flow = Some(least);
+        self
     }
 
     pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
@@ -31,28 +54,85 @@ impl Table {
         self
     }
 
-    /// The table as text, each line indented by two spaces.
+    /// The table as text for the terminal, each line indented by two spaces; the usual width where there is no terminal.
     pub(crate) fn text(&self) -> String {
+        self.text_within(terminal::columns())
+    }
+
+    /// The headers of the columns that [`text`](Self::text) leaves out.
+    fn left_out(&self) -> Vec<&str> {
+        let kept = self.kept(&self.widths(), terminal::columns());
+        let header = self.rows.first().into_iter().flatten().map(String::as_str).enumerate();
+        let (shown, others): (Vec<_>, Vec<_>) =
+            header.partition(|(column, _)| kept.contains(column));
+        let is_shown = |name: &str| shown.iter().any(|(_, other)| *other == name);
+        others.into_iter().map(|(_, name)| name).filter(|name| !is_shown(name)).collect()
+    }
+
+    /// The table in lines of at most `most` characters: without the columns that can be spared, then in parts below each other that
+    /// repeat the first columns.
+    fn text_within(&self, most: usize) -> String {
+        let mut widths = self.widths();
+        let kept = self.kept(&widths, most);
+        if let (Some(least), Some((&last, others))) = (self.flow, kept.split_last()) {
+            let room = most.saturating_sub(line_length(&widths, others) + GAP);
+            widths[last] = widths[last].min(room.max(least));
+        }
+        let parts = parts(&widths, &kept, self.words.max(1), most);
+        let text = |part: &Vec<usize>| -> String {
+            self.rows.iter().map(|row| self.line(row, part, &widths)).collect()
+        };
+        parts.iter().map(text).collect::<Vec<_>>().join("\n")
+    }
+
+    fn widths(&self) -> Vec<usize> {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let width = |column| {
             let cells = self.rows.iter().filter_map(|row: &Vec<String>| row.get(column));
             cells.map(|cell: &String| cell.chars().count()).max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..columns).map(width).collect();
-        let mut text = String::new();
-        for row in &self.rows {
-            let mut line = String::new();
-            for (column, cell) in row.iter().enumerate() {
-                let width = widths[column];
-                // Writing to a string cannot fail.
-                let _ = if column < self.words {
-                    write!(line, "  {cell:<width$}")
-                } else {
-                    write!(line, "  {cell:>width$}")
-                };
+        (0..columns).map(width).collect()
+    }
+
+    /// The columns that remain where the line is too short.
+    fn kept(&self, widths: &[usize], most: usize) -> Vec<usize> {
+        let mut narrowest = widths.to_vec();
+        if let (Some(least), Some(last)) = (self.flow, narrowest.last_mut()) {
+            *last = (*last).min(least);
+        }
+        let mut kept: Vec<usize> = (0..widths.len()).collect();
+        for columns in &self.spare {
+            if line_length(&narrowest, &kept) <= most {
+                break;
             }
-            text.push_str(line.trim_end());
-            text.push('\n');
+            kept.retain(|column| !columns.contains(column));
+        }
+        kept
+    }
+
+    /// A row as text: one line, or several where its last cell flows.
+    fn line(&self, row: &[String], columns: &[usize], widths: &[usize]) -> String {
+        let mut line = String::new();
+        let mut more = Vec::new();
+        for &column in columns {
+            let Some(cell) = row.get(column) else { break };
+            let width = widths[column];
+            let is_flowing = self.flow.is_some() && column + 1 == widths.len();
+            // Writing to a string cannot fail.
+            let _ = if is_flowing {
+                let mut pieces = terminal::wrapped(cell, width).into_iter();
+                let first = pieces.next().unwrap_or_default();
+                more = pieces.map(|piece| (line.chars().count() + GAP, piece)).collect();
+                write!(line, "  {first}")
+            } else if column < self.words {
+                write!(line, "  {cell:<width$}")
+            } else {
+                write!(line, "  {cell:>width$}")
+            };
+        }
+        let mut text = format!("{}\n", line.trim_end());
+        for (indent, piece) in more {
+            let _ = writeln!(text, "{:indent$}{piece}", "");
         }
         text
     }
@@ -116,6 +196,38 @@ impl Table {
     }
 }
 
+/// The length of a line of these columns.
+fn line_length(widths: &[usize], columns: &[usize]) -> usize {
+    columns.iter().map(|&column| GAP + widths[column]).sum()
+}
+
+/// Columns in parts that fit a line each; every part begins with the first `heads` columns.
+fn parts(widths: &[usize], kept: &[usize], heads: usize, most: usize) -> Vec<Vec<usize>> {
+    let (heads, others) = kept.split_at(heads.min(kept.len()));
+    let mut parts = vec![heads.to_vec()];
+    for &column in others {
+        let is_full = |part: &Vec<usize>| {
+            part.len() > heads.len() && line_length(widths, part) + GAP + widths[column] > most
+        };
+        match parts.last_mut() {
+            Some(part) if !is_full(part) => part.push(column),
+            _ => parts.push([heads, &[column]].concat()),
+        }
+    }
+    parts
+}
+
+/// A line on the columns that the text of some tables leaves out, and what has them; nothing where there are none.
+pub(crate) fn on_left_out<'a>(tables: impl IntoIterator<Item = &'a Table>, has: &str) -> String {
+    let mut names: Vec<&str> = tables.into_iter().flat_map(Table::left_out).collect();
+    let mut known = BTreeSet::new();
+    names.retain(|name| known.insert(*name));
+    match names.is_empty() {
+        true => String::new(),
+        false => format!("Left out for lack of room: {}. {has}\n", names.join(", ")),
+    }
+}
+
 /// A cell in LaTeX: numbers with an exponent in mathematics, all else as it reads.
 fn latex(cell: &str) -> String {
     let bare = cell.trim_start_matches('(').trim_end_matches(')');
@@ -165,6 +277,25 @@ mod tests {
         assert_eq!(table.text(), expected);
         let markdown = table.markdown();
         assert!(markdown.starts_with("| field | linf | rate |\n| --- | ---: | ---: |\n| u |"));
+    }
+
+    #[test]
+    fn a_line_that_is_too_short_takes_no_spare_columns_then_parts() {
+        let mut table = Table::new(0, ["cells", "h", "linf", "rate"]).sparing(1..2);
+        table.row(["16", "6.25e-2", "4.077e-3", "-"]);
+        assert_eq!(table.text_within(80).lines().count(), 2);
+        assert_eq!(table.text_within(23), "  cells      linf  rate\n     16  4.077e-3     -\n");
+        let parts = "  cells      linf\n     16  4.077e-3\n\n  cells  rate\n     16     -\n";
+        assert_eq!(table.text_within(20), parts);
+    }
+
+    #[test]
+    fn words_of_the_last_column_go_on_in_the_next_line() {
+        let mut table = Table::new(1, ["field", "verdict"]).flowing(10);
+        table.row(["u", "the finest run's errors say nothing"]);
+        let lines = "  field  verdict\n  u      the finest run's\n         errors say nothing\n";
+        assert_eq!(table.text_within(29), lines);
+        assert!(table.text_within(80).contains("  u      the finest run's errors say nothing\n"));
     }
 
     #[test]

@@ -1,13 +1,15 @@
-//! Standard output and standard error, and how much is said on them.
+//! Standard output and standard error: how much is said on them, how wide, and in which colours.
 
+use std::borrow::Cow;
 use std::env;
-use std::fmt::Display;
+use std::fmt::{Display, Write as _};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use clap::{ColorChoice, ValueEnum};
+use mmsmith_spec::{Diagnostic, Looks};
 use serde_json::Value;
 
 /// How much is said beside results and errors.
@@ -89,9 +91,73 @@ pub(crate) fn reserve() -> Result<()> {
     Ok(())
 }
 
+/// Columns of a table where standard output is no terminal, so that files and pages have the same tables everywhere.
+const USUAL_COLUMNS: usize = 80;
+/// Narrower terminals get lines of this length.
+const FEWEST_COLUMNS: usize = 40;
+/// Longer lines of words are hard to read.
+const MOST_COLUMNS_OF_WORDS: usize = 100;
+
+/// The columns of the terminal that a stream is shown on, if it is one.
+fn columns_of(size: Option<(terminal_size::Width, terminal_size::Height)>) -> Option<usize> {
+    let (terminal_size::Width(columns), _) = size?;
+    // Some terminals do not know their size and say 0.
+    (columns > 0).then(|| usize::from(columns).max(FEWEST_COLUMNS))
+}
+
+/// The columns that a table on standard output has room for.
+pub(crate) fn columns() -> usize {
+    columns_of(terminal_size::terminal_size_of(io::stdout())).unwrap_or(USUAL_COLUMNS)
+}
+
+/// The columns of help and of errors in the command line.
+pub(crate) fn columns_of_help() -> usize {
+    columns().min(MOST_COLUMNS_OF_WORDS)
+}
+
+/// Words in lines of at most so many characters; a word that is longer has a line of its own.
+pub(crate) fn wrapped(words: &str, most: usize) -> Vec<String> {
+    let options = textwrap::Options::new(most)
+        .break_words(false)
+        .word_splitter(textwrap::WordSplitter::NoHyphenation);
+    textwrap::wrap(words, options).into_iter().map(Cow::into_owned).collect()
+}
+
+/// Text whose lines of words fit a terminal: a line that is longer goes on in the next one, indented. Elsewhere lines stay whole, for
+/// those who search them.
+fn fitted(text: &str, columns: Option<usize>) -> Cow<'_, str> {
+    let Some(columns) = columns else { return text.into() };
+    let mut fitted = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let (words, end) = line.strip_suffix('\n').map_or((line, ""), |words| (words, "\n"));
+        if textwrap::core::display_width(words) <= columns {
+            fitted += line;
+            continue;
+        }
+        let indent = words.len() - words.trim_start_matches(' ').len();
+        let lines = wrapped(
+            &words[indent..],
+            columns.min(MOST_COLUMNS_OF_WORDS).saturating_sub(indent + 2),
+        );
+        let lines = lines.iter().enumerate().map(|(index, line)| {
+            let indent = if index == 0 { indent } else { indent + 2 };
+            format!("{:indent$}{line}", "")
+        });
+        fitted += &lines.collect::<Vec<_>>().join("\n");
+        fitted += end;
+    }
+    fitted.into()
+}
+
 /// Writes tables and captions to standard output, unless it is [kept](reserve) for a document.
 pub(crate) fn say(text: &str) -> Result<()> {
-    if RESERVED.load(Ordering::Relaxed) { Ok(()) } else { print(text.as_bytes()) }
+    if RESERVED.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    let columns = columns_of(terminal_size::terminal_size_of(io::stdout()));
+    let text = fitted(text, columns);
+    let text = if has_colors(&io::stdout()) { painted(&text).into() } else { text };
+    print(text.as_bytes())
 }
 
 /// Writes to standard output; a reader that went away, such as `head`, is no error.
@@ -105,9 +171,37 @@ pub(crate) fn print(bytes: &[u8]) -> Result<()> {
     }
 }
 
-/// Writes to standard error; if even that fails there is nobody left to tell.
-pub(crate) fn complain(text: &str) {
+/// Writes to standard error as it is; if even that fails there is nobody left to tell.
+fn write_error(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// Writes to standard error, in lines that fit its terminal.
+pub(crate) fn complain(text: &str) {
+    write_error(&fitted(text, columns_of(terminal_size::terminal_size_of(io::stderr()))));
+}
+
+/// Shows on standard error a mistake in a specification, whose layout stays.
+pub(crate) fn show(diagnostic: &Diagnostic) {
+    let columns = columns_of(terminal_size::terminal_size_of(io::stderr()));
+    let looks = Looks { has_colors: has_colors(&io::stderr()), columns };
+    write_error(&format!("{}\n", diagnostic.rendered(looks)));
+}
+
+/// Shows what clap says of a command line: help on standard output, refusals on standard error.
+pub(crate) fn show_refusal(refusal: &clap::Error, color: Color) {
+    let styled = refusal.render();
+    let text = |has_colors| match has_colors {
+        true => styled.ansi().to_string(),
+        false => styled.to_string(),
+    };
+    if refusal.use_stderr() {
+        complain(&text(colors_of(color, &io::stderr())));
+    } else {
+        let columns = columns_of(terminal_size::terminal_size_of(io::stdout()));
+        // Nobody is left to tell that help cannot be shown.
+        let _ = print(fitted(&text(colors_of(color, &io::stdout())), columns).as_bytes());
+    }
 }
 
 /// Says on standard error why the work ends.
@@ -149,23 +243,87 @@ pub(crate) fn detail_once(settings: &Value) {
     }
 }
 
-/// A word in bold and in the colour of an SGR code, where standard error shows colours.
-fn marked(word: &str, code: &str) -> String {
-    if has_colors() { format!("\x1b[1;{code}m{word}\x1b[0m") } else { word.to_owned() }
+/// Words that verdicts are told with, and their SGR codes. Capitals are kept for failures in all output.
+const VERDICTS: [(&str, &str); 9] = [
+    ("passed", GREEN),
+    ("ok", GREEN),
+    ("FAILED", RED),
+    ("STOPPED", RED),
+    ("PROBLEM", RED),
+    ("UNSTABLE", RED),
+    ("DOES", RED),
+    ("NOT", RED),
+    ("warning", YELLOW),
+];
+const GREEN: &str = "32";
+const RED: &str = "31";
+const YELLOW: &str = "33";
+
+/// Text with the words of verdicts in their colours.
+fn painted(text: &str) -> String {
+    let mut painted = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(from) = rest.find(|c: char| c.is_ascii_alphabetic()) {
+        let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+        let to = rest[from..].find(|c| !is_part(c)).map_or(rest.len(), |length| from + length);
+        let word = &rest[from..to];
+        let ends = word.trim_end_matches('.').len();
+        painted += &rest[..from];
+        match VERDICTS.iter().find(|(verdict, _)| *verdict == &word[..ends]) {
+            Some((verdict, code)) => {
+                let _ = write!(painted, "\x1b[1;{code}m{verdict}\x1b[0m{}", &word[ends..]);
+            }
+            None => painted += word,
+        }
+        rest = &rest[to..];
+    }
+    painted + rest
 }
 
-/// Whether messages on standard error have colours; as clap decides it for its own.
-fn has_colors() -> bool {
+/// A word in bold and in the colour of an SGR code, where standard error shows colours.
+fn marked(word: &str, code: &str) -> String {
+    if has_colors(&io::stderr()) { format!("\x1b[1;{code}m{word}\x1b[0m") } else { word.to_owned() }
+}
+
+/// Whether a stream has colours.
+fn has_colors(stream: &impl IsTerminal) -> bool {
+    colors_of(manner().color, stream)
+}
+
+/// Whether a stream has colours where the command line asks for `color`; as clap decides it for its own messages.
+fn colors_of(color: Color, stream: &impl IsTerminal) -> bool {
     let set = |name: &str| env::var_os(name).is_some_and(|value| !value.is_empty());
     let enabled = |name: &str| env::var_os(name).map(|value| value != "0");
-    match manner().color {
+    match color {
         Color::Always => true,
         Color::Never => false,
         Color::Auto if set("NO_COLOR") => false,
         Color::Auto if enabled("CLICOLOR_FORCE") == Some(true) => true,
         Color::Auto if enabled("CLICOLOR") == Some(false) => false,
         Color::Auto => {
-            io::stderr().is_terminal() && env::var_os("TERM").is_none_or(|term| term != "dumb")
+            stream.is_terminal() && env::var_os("TERM").is_none_or(|term| term != "dumb")
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_that_are_too_long_go_on_indented_and_no_word_is_broken() {
+        let text = "short\n  a note: --set rho0=1 mends it\n";
+        assert_eq!(fitted(text, None), text);
+        let expected = "short\n  a note:\n    --set\n    rho0=1\n    mends it\n";
+        assert_eq!(fitted(text, Some(12)), expected);
+        // A word that is longer than the line stays whole, and blank lines stay.
+        assert_eq!(fitted("a\n\n0123456789 b", Some(6)), "a\n\n0123456789\n  b");
+    }
+
+    #[test]
+    fn verdicts_have_colours_where_they_are_words_of_their_own() {
+        let told = painted("u: passed, v: FAILED. oklahoma, not passed-on, run/ok");
+        let expected = "u: \u{1b}[1;32mpassed\u{1b}[0m, v: \u{1b}[1;31mFAILED\u{1b}[0m. oklahoma, not passed-on, run/ok";
+        assert_eq!(told, expected);
     }
 }

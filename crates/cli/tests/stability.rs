@@ -12,7 +12,11 @@ fn a_limit_is_bracketed_and_its_failure_told() {
     let place = place.path();
     let called = mms(place, "stability axis-aligned --cells 8 --json limit.json");
     assert_eq!(called.status, 0, "{}", called.stderr);
-    assert!(called.stdout.contains("unstable: J <= 0"), "{}", called.stdout);
+    assert!(
+        called.stdout.contains("A run is unstable if\n  a particle has J <= 0"),
+        "{}",
+        called.stdout
+    );
     let found = read_json(&place.join("limit.json"));
     assert_eq!(keys(&found), "over rows schema search settings");
     assert_eq!(found["schema"], "mmsmith.stability/1");

@@ -30,10 +30,10 @@ impl Diagnostic {
         let line = before.matches('\n').count() + 1;
         (line, before[line_start..].chars().count() + 1)
     }
-}
 
-impl fmt::Display for Diagnostic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// The display for a terminal.
+    #[must_use]
+    pub fn rendered(&self, looks: Looks) -> String {
         // An empty span at the end of a text has nothing to mark: mark the last character.
         let end = self.span.end.clamp(self.span.start, self.source.len());
         let start = self.span.start.min(self.source.len().saturating_sub(1));
@@ -46,7 +46,27 @@ impl fmt::Display for Diagnostic {
         if let Some(help) = &self.help {
             group = group.element(Level::HELP.message(help));
         }
-        f.write_str(&Renderer::plain().render(&[group]))
+        let renderer = if looks.has_colors { Renderer::styled() } else { Renderer::plain() };
+        let renderer = match looks.columns {
+            Some(columns) => renderer.term_width(columns),
+            None => renderer,
+        };
+        renderer.render(&[group])
+    }
+}
+
+/// How a [`Diagnostic`] is displayed: plain by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Looks {
+    /// Whether there are colours.
+    pub has_colors: bool,
+    /// Columns of the terminal: of longer lines of the source the part with the mistake is shown.
+    pub columns: Option<usize>,
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.rendered(Looks::default()))
     }
 }
 

@@ -27,7 +27,7 @@ mod tensor;
 pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields};
-pub use diagnostic::{Diagnostic, nearest};
+pub use diagnostic::{Diagnostic, Looks, nearest};
 pub use read::{LONGEST_FILE, ReadError, read_text};
 pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};

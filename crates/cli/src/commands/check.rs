@@ -225,7 +225,7 @@ fn text(
         format!("{name}: {verdict} at {} points, {sets} set(s) of parameters\n", report.points);
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
-    let mut table = Table::new(3, header);
+    let mut table = Table::new(3, header).sparing(4..5).sparing(6..7);
     let mut places = String::new();
     for finding in &report.findings {
         let verdict = match finding.verdict {
@@ -241,7 +241,7 @@ fn text(
             verdict.to_owned(),
             table::error(finding.difference / unit),
             table::error(finding.own_error / unit),
-            table::error(finding.allowed / unit),
+            format!("{:.1e}", finding.allowed / unit),
             table::error(finding.scale),
         ]);
         if finding.verdict != Verdict::Passed {

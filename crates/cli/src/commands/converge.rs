@@ -145,14 +145,16 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         if has_range(&judged) || differences.as_ref().is_some_and(|(_, judged)| has_range(judged)) {
             notes += "Rows in parentheses are outside the asymptotic range.\n";
         }
+        notes += &on_range(&judged, study.rows.len());
         if has_rounding(&judged) {
-            notes +=
-                "A row at rounding has errors that rounding alone may cause; it judges nothing.\n";
+            notes += "A row at rounding has errors that rounding alone may cause; verdicts leave it out.\n";
         }
         let mut text = settled.choice() + &caption;
         for (title, table) in &sections {
             text += &format!("\n{title}\n{}", table.text());
         }
+        let has = "A wider terminal, --csv and --json have them.";
+        notes += &table::on_left_out(sections.iter().map(|(_, table)| table), has);
         terminal::say(&(text + &notes))?;
 
         if let Some(output) = output {
@@ -411,7 +413,8 @@ pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field
     let errors: Vec<_> = study.rows.iter().map(|row| &row.errors).collect();
     Field::ALL.map(|field| {
         let header = ["cells", "particles", "h", "CFL"].into_iter().chain(NORMS).chain(["status"]);
-        let mut table = Table::new(0, header);
+        let table = Table::new(0, header).sparing(8..10).sparing(1..2).sparing(3..4);
+        let mut table = table.sparing(6..8);
         for (index, row) in study.rows.iter().enumerate() {
             let mut cells = vec![
                 row.cells.to_string(),
@@ -437,7 +440,7 @@ pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field
 pub(super) fn difference_tables(temporal: &Temporal, judged: &Verdicts) -> [(Field, Table); 4] {
     Field::ALL.map(|field| {
         let header = ["dt", "CFL", "steps"].into_iter().chain(NORMS).chain(["status"]);
-        let mut table = Table::new(0, header);
+        let mut table = Table::new(0, header).sparing(7..9).sparing(2..3).sparing(5..7);
         for (index, row) in temporal.rows.iter().enumerate() {
             let mut cells =
                 vec![table::error(row.dt), format!("{:.4}", row.cfl), row.steps.to_string()];
@@ -487,10 +490,23 @@ fn has_range(judged: &Verdicts) -> bool {
     judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| !one.asymptotic_rows.is_empty()))
 }
 
+/// What it means that a field has no asymptotic range, where one has none.
+fn on_range(judged: &Verdicts, rows: usize) -> String {
+    let is_open = |one: &OrderVerdict| one.behaviour == Behaviour::NotSettled;
+    if !judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| is_open(one))) {
+        return String::new();
+    }
+    let remedy = match rows {
+        0..=2 => "Two runs have one order, which nothing can confirm: add a third.",
+        _ => "The orders of the last runs still differ: add a finer one.",
+    };
+    format!("No asymptotic range: it is open which order the errors tend to. {remedy}\n")
+}
+
 /// What each field and norm shows, a row each.
 pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
-    let header = ["field", "norm", "expected", "finest pair", "leading term", "verdict"];
-    let mut table = Table::new(2, header);
+    let header = ["field", "norm", "expected", "order", "leading term", "verdict"];
+    let mut table = Table::new(2, header).sparing(4..5).flowing(37);
     for (field, norms) in judged.iter() {
         for (norm, one) in norms.iter() {
             let term = one
@@ -502,8 +518,8 @@ pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
                 Behaviour::NotSettled => "no asymptotic range",
                 Behaviour::DoesNotConverge => "DOES NOT CONVERGE",
                 Behaviour::Stopped => "the finest run STOPPED",
-                Behaviour::NotJudged => "the finest run's errors say nothing",
-                Behaviour::AtRounding => "fewer than two errors above rounding",
+                Behaviour::NotJudged => "the finest run is not judged",
+                Behaviour::AtRounding => "too few errors above rounding",
                 Behaviour::NoOrder => "no order",
             };
             let verdict = match one.passed {

@@ -121,7 +121,8 @@ impl Entry {
             text += &format!("  {reference}\n");
         }
         text += &format!("  {}\n", origin.words());
-        let mut table = Table::new(5, ["parameter", "default", "unit", "admissible", ""]);
+        let mut table =
+            Table::new(5, ["parameter", "default", "unit", "admissible", ""]).flowing(20);
         for parameter in parameters {
             table.row([
                 parameter.name.clone(),

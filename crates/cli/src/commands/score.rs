@@ -99,7 +99,7 @@ fn agreements(
 /// Errors of the recording and of the run beside it.
 fn text_of_agreement(options: &ScoreOptions, row: &ScoreRow, agreement: &Agreement) -> String {
     let header = ["error", "linf", "mms", "digits", "l2", "mms", "digits", "l1", "mms", "digits"];
-    let mut table = Table::new(1, header);
+    let mut table = Table::new(1, header).sparing(7..10);
     for (field, digits) in &agreement.digits {
         let mut line = vec![field.to_string()];
         for (norm, digits) in digits.iter() {
@@ -374,7 +374,7 @@ fn tables(score: &Score) -> Vec<(Quantity, Table)> {
     let table = |(field, order): (&Quantity, &PerNorm<Order>)| {
         let header =
             ["cells", "particles", "h", "linf", "rate", "l2", "rate", "l1", "rate", "status"];
-        let mut table = Table::new(0, header);
+        let mut table = Table::new(0, header).sparing(7..9).sparing(1..2).sparing(5..7);
         for (index, row) in score.rows.iter().enumerate() {
             let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
             let mut line = vec![cells, row.particles.to_string(), table::error(row.h)];

@@ -20,7 +20,7 @@ use crate::keep::{Found, Keep, Order, Part};
 use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Limits, Map};
-use crate::table::Table;
+use crate::table::{self, Table};
 use crate::terminal;
 
 /// One point of a line or map: what is set, and the case that follows from it.
@@ -160,7 +160,11 @@ impl Survey<'_> {
         }
         text += &self.definition();
         text += &format!("\nlargest stable CFL number, to {} on P-waves\n", search.width);
-        text += &self.table().text();
+        let table = self.table();
+        text += &table.text();
+        text += LEGEND;
+        let has = "A wider terminal, --csv and --json have them.";
+        text += &table::on_left_out([&table], has);
         text += &self.notes();
         text
     }
@@ -301,13 +305,21 @@ fn without_threads(mut key: Value) -> Value {
 
 /// What 'unstable' means, in words.
 fn definition(criteria: &Criteria) -> String {
+    let Criteria { error_multiple, energy_rate } = criteria;
     format!(
-        "unstable: J <= 0, not finite, off the grid, or too large for the weights; an error of u above {} times that of a \
-         run at CFL 0.125 on P-waves; or more energy than the exact motion has, by what that run showed and {} of its largest for \
-         each period\n",
-        criteria.error_multiple, criteria.energy_rate
+        "A run is unstable if\n  a particle has J <= 0, leaves the grid, is too large for the weights, or is not finite;\n  the error \
+         of u exceeds {error_multiple} times that of the reference run, at CFL 0.125 on P-waves; or\n  the energy exceeds the exact \
+         one by more than the reference run's excess plus {energy_rate} times the largest exact energy per period.\n"
     )
 }
+
+/// What the columns of the table are.
+const LEGEND: &str = "\
+stable, unstable: CFL numbers on either side of the limit
+on P-waves: the stable number, on the speed of P-waves
+predicted: the number at which a P-wave crosses one cell in one step
+error, energy, momentum: largest error of u and drifts at the stable number
+";
 
 /// A number with three decimals, or a dash.
 fn three(value: Option<f64>) -> String {
@@ -336,17 +348,19 @@ fn told(failure: &Failure) -> String {
 
 fn table(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> Table {
     let header = names.iter().copied().chain([
-        "CFL",
-        "unstable at",
-        "P-wave CFL",
-        "CFL of P-waves",
+        "stable",
+        "unstable",
+        "on P-waves",
+        "predicted",
         "error",
-        "energy drift",
-        "momentum drift",
+        "energy",
+        "momentum",
         "runs",
         "failure",
     ]);
-    let mut table = Table::new(0, header);
+    let n = names.len();
+    let table = Table::new(0, header).sparing(n + 7..n + 8).sparing(n + 6..n + 7);
+    let mut table = table.sparing(n + 5..n + 6).sparing(n + 4..n + 5).flowing(13);
     for (point, row) in points.iter().zip(rows) {
         let scientific = |value: Option<f64>| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))

@@ -395,7 +395,8 @@ impl Report<'_> {
             "steps",
             "scheme",
         ];
-        let mut table = Table::new(0, header);
+        let table = Table::new(0, header).sparing(3..5).sparing(7..9);
+        let mut table = table.sparing(2..3).flowing(30);
         for &index in indices {
             let entry = &self.found.entries[index];
             table.row([
@@ -453,6 +454,8 @@ impl Report<'_> {
             self.front().text()
         );
         let (main, all) = (self.main_effects(), self.effects().len());
+        let has = "A wider terminal, --csv and --json have them.";
+        text += &table::on_left_out([&self.front()], has);
         text += "\nwhat each setting buys, the others being equal";
         if main.len() < all {
             text += &format!(": the {} of {all} that matter most (--json has all)", main.len());
