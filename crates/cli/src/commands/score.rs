@@ -142,7 +142,8 @@ fn suggestion(
     let (index, row) = score.rows.iter().enumerate().min_by_key(|(_, row)| size(row))?;
     let u = |row: &ScoreRow| row.errors[&Quantity::Displacement].l2;
     let relative = u(row) / row.exact_displacement;
-    let order = score.orders.as_ref().and_then(|orders| orders[&Quantity::Displacement].l2.fit);
+    let order =
+        score.orders.as_ref().and_then(|orders| orders.get(&Quantity::Displacement)?.l2.fit);
     if !(row.is_ok() && relative > SUSPICIOUS && size(row) <= MOST_TRIED)
         || order.is_some_and(|order| order > NO_ORDER)
     {

@@ -14,7 +14,8 @@ use crate::frames::FrameOutput;
 use crate::plan::plan;
 use crate::run::{Outputs, Row, Status, run};
 
-use super::{Input, Quantity, ScoreError, ScoreOptions, ScoreRow, TIME_SLACK, score};
+use super::times::TIME_SLACK;
+use super::{Input, Quantity, ScoreError, ScoreOptions, ScoreRow, score};
 
 /// More digits than these say nothing of doubles.
 const MOST_DIGITS: f64 = 16.0;

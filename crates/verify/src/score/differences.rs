@@ -15,7 +15,9 @@ use crate::order::Order;
 
 use super::findings::Remarks;
 use super::frame::FrameData;
-use super::{Input, Opened, Quantity, Remark, ScoreError, ScoreOptions, TIME_SLACK, open, orders};
+use super::recording::{Opened, status};
+use super::times::{TIME_SLACK, open};
+use super::{Input, Quantity, Remark, ScoreError, ScoreOptions, orders};
 
 /// Share of the first ratio of time steps by which others may differ.
 const SAME_RATIO: f64 = 1e-3;
@@ -154,15 +156,13 @@ fn compare<const D: usize>(
     findings.extend(of_other.list());
     findings.sort_by_key(|finding| !finding.is_problem);
     findings.dedup();
-    let problems = findings.iter().filter(|finding| finding.is_problem);
-    let problems: Vec<_> = problems.map(|finding| finding.message.as_str()).collect();
     Ok(DifferenceRow {
         file: one.path().display().to_string(),
         other: other.path().display().to_string(),
         dt,
         particles,
         frames,
-        status: if problems.is_empty() { "ok".into() } else { problems.join("; ") },
+        status: status(&findings),
         differences,
         findings,
     })

@@ -12,10 +12,11 @@ use crate::inverse::determinant;
 use crate::points;
 
 use super::arrays::{Chosen, Role, matrices, vectors};
+use super::error::ScoreError;
 use super::findings::Remarks;
+use super::options::ScoreOptions;
 use super::reference::{Scheme, Traced};
 use super::vectors::{count_not_finite, judged, place, positions};
-use super::{ScoreError, ScoreOptions};
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;

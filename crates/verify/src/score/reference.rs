@@ -9,9 +9,11 @@ use nalgebra::SVector;
 use crate::inverse::inverse;
 
 use super::arrays::{Chosen, Role, there};
+use super::error::ScoreError;
 use super::findings::Remarks;
+use super::options::{Points, ScoreOptions};
+use super::times::{Timed, open};
 use super::vectors::positions;
-use super::{Points, ScoreError, ScoreOptions, Timed, open};
 
 /// Steps of Newton's method from a position back to its reference position.
 const MOST_ITERATIONS: usize = 50;

@@ -1,0 +1,77 @@
+//! How recordings are to be read, and what they are.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mmsmith_vtk::Provenance;
+
+use super::arrays::Role;
+
+/// What the points of the files are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Points {
+    /// Reference positions if they stay where they are while displacements change, else current positions.
+    #[default]
+    Auto,
+    /// Current positions `x`, as particle methods write them.
+    Current,
+    /// Reference positions `X`, as many finite element codes write them.
+    Reference,
+}
+
+/// How to read the files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScoreOptions {
+    /// The names of arrays that have no usual name.
+    pub map: BTreeMap<Role, String>,
+    /// What the points are.
+    pub points: Points,
+    /// The time of recordings with a single frame, where the files do not tell it.
+    pub time: Option<f64>,
+    /// By how much velocities lag behind their frame's time, where the files do not tell it.
+    pub velocity_lag: f64,
+    /// The number of the solution's periods that frames may lie in, from time zero.
+    pub periods: f64,
+    /// The solution that the recordings are compared with; that a file tells another one is a remark.
+    pub provenance: Option<Provenance>,
+}
+
+impl Default for ScoreOptions {
+    fn default() -> Self {
+        Self {
+            map: BTreeMap::new(),
+            points: Points::Auto,
+            time: None,
+            velocity_lag: 0.0,
+            periods: 1.0,
+            provenance: None,
+        }
+    }
+}
+
+/// The resolution of a recording, with respect to which orders are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// Cells along the solution's cell length.
+    Cells(usize),
+    /// The length itself.
+    Length(f64),
+    /// From the number of particles and the space that they take.
+    Estimated,
+}
+
+/// One recording to be scored.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// A file, a `.pvd` list or a folder; or the files of the frames, one after the other.
+    pub paths: Vec<PathBuf>,
+    /// Its resolution.
+    pub resolution: Resolution,
+}
+
+impl Input {
+    /// What messages call it.
+    pub(super) fn path(&self) -> &Path {
+        self.paths.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+}

@@ -1,0 +1,307 @@
+//! One recording, frame after frame.
+
+use std::array;
+use std::collections::BTreeMap;
+
+use mmsmith_measure::norms::PerNorm;
+use mmsmith_runtime::Solution;
+use mmsmith_vtk::Provenance;
+use mmsmith_vtk::foreign::{Snapshot, frames};
+use nalgebra::SVector;
+
+use super::arrays::{Chosen, Role};
+use super::error::ScoreError;
+use super::findings::{Remark, Remarks};
+use super::frame::{FrameErrors, FrameReader, Identities};
+use super::options::{Input, Resolution, ScoreOptions};
+use super::quantity::Quantity;
+use super::reference::{Scheme, scheme};
+use super::row::{ScoreRow, Source};
+use super::times::{TIME_SLACK, Timed, any_velocity_time, open, times};
+
+/// A recording, and how its frames are read.
+pub(super) struct Opened<const D: usize> {
+    /// At least one.
+    pub(super) timed: Vec<Timed>,
+    first: Snapshot,
+    chosen: Chosen,
+    scheme: Scheme<D>,
+    has_velocity_times: bool,
+}
+
+impl<const D: usize> Opened<D> {
+    pub(super) fn new(
+        exact: &dyn Solution<f64, D>,
+        input: &Input,
+        options: &ScoreOptions,
+        remarks: &mut Remarks,
+    ) -> Result<Self, ScoreError> {
+        let mut files = vec![];
+        for path in &input.paths {
+            files.extend(frames(path)?);
+        }
+        let timed = times(exact, files, input.path(), options, remarks)?;
+        let first = open(&timed[0].file)?;
+        let chosen = Chosen::find::<D>(&first, &options.map, remarks)?;
+        let scheme = scheme(exact, &timed, &first, &chosen, options, remarks)?;
+        let has_velocity_times =
+            chosen.name(Role::Velocity).is_some() && any_velocity_time(&timed, &first)?;
+        Ok(Self { timed, first, chosen, scheme, has_velocity_times })
+    }
+
+    pub(super) fn reader<'a>(
+        &'a self,
+        exact: &'a dyn Solution<f64, D>,
+        options: &'a ScoreOptions,
+        remarks: &'a mut Remarks,
+    ) -> FrameReader<'a, D> {
+        FrameReader {
+            exact,
+            chosen: &self.chosen,
+            scheme: &self.scheme,
+            options,
+            has_velocity_times: self.has_velocity_times,
+            remarks,
+            first: Identities::default(),
+        }
+    }
+
+    /// Where reference positions and displacements are from.
+    fn sources(&self) -> (Source, Source) {
+        match &self.scheme {
+            Scheme::Given { displacement: true } => (Source::Array, Source::Array),
+            Scheme::Given { displacement: false } => {
+                (Source::Array, Source::PositionsMinusReference)
+            }
+            Scheme::PointsAtRest => (Source::Points, Source::Array),
+            Scheme::Recovered => (Source::PositionsMinusDisplacements, Source::Array),
+            Scheme::Traced(_) => (Source::FirstFrame, Source::PositionsMinusReference),
+        }
+    }
+
+    /// Tells of a file that names another solution or other parameters.
+    fn tell_provenance(&self, options: &ScoreOptions, remarks: &mut Remarks) {
+        if let (Some(asked), Some(told)) = (&options.provenance, self.first.provenance())
+            && let Some(what) = other_provenance(asked, &told)
+        {
+            remarks.note("other-provenance", false, what);
+        }
+    }
+
+    /// Tells where a single frame stands for the whole time `end`.
+    fn tell_single_frame(&self, end: f64, remarks: &mut Remarks) {
+        let later = self.timed.iter().filter(|frame| frame.time > TIME_SLACK * end).count();
+        if later == 1 {
+            let what = format!(
+                "one frame after t = 0 stands for the whole time: at t = {:?} errors may be much smaller than between. Ten frames, \
+                 evenly spread, tell more",
+                self.timed[self.timed.len() - 1].time
+            );
+            remarks.note("one-frame", false, what);
+        }
+    }
+}
+
+/// The largest norms over the frames.
+#[derive(Default)]
+struct Totals {
+    /// In the order of [`Quantity::ALL`].
+    errors: [PerNorm<f64>; 8],
+    /// Those of F and P if they were transposed.
+    transposed: [PerNorm<f64>; 2],
+    density_from_rest: PerNorm<f64>,
+    displacement: PerNorm<f64>,
+    /// The frames that have each field.
+    compared: [usize; 8],
+    h: f64,
+}
+
+impl Totals {
+    /// Reads and compares frame after frame.
+    fn of<const D: usize>(
+        opened: &Opened<D>,
+        exact: &dyn Solution<f64, D>,
+        resolution: Resolution,
+        reader: &mut FrameReader<'_, D>,
+    ) -> Result<Self, ScoreError> {
+        let mut totals = Self { h: f64::NAN, ..Self::default() };
+        for (index, frame) in opened.timed.iter().enumerate() {
+            let data = reader.frame(&open(&frame.file)?, frame.time, index)?;
+            if index == 0 {
+                totals.h = match resolution {
+                    Resolution::Cells(cells) => exact.cell_length() / cells as f64,
+                    Resolution::Length(length) => length,
+                    Resolution::Estimated => spacing(&data.X),
+                };
+            }
+            for (count, is_there) in totals.compared.iter_mut().zip(data.fields()) {
+                *count += usize::from(is_there);
+            }
+            totals.add(&data.errors(exact, frame.time));
+        }
+        Ok(totals)
+    }
+
+    fn add(&mut self, frame: &FrameErrors) {
+        self.errors = array::from_fn(|n| self.errors[n].larger(&frame.errors[n]));
+        self.transposed = array::from_fn(|n| self.transposed[n].larger(&frame.transposed[n]));
+        self.density_from_rest = self.density_from_rest.larger(&frame.density_from_rest);
+        self.displacement = self.displacement.larger(&frame.displacement);
+    }
+
+    /// The fields that any frame has.
+    fn fields(&self) -> Vec<Quantity> {
+        let there = Quantity::ALL.into_iter().zip(self.compared);
+        there.filter(|(_, count)| *count > 0).map(|(field, _)| field).collect()
+    }
+
+    /// The errors of those, and no numbers for other fields of runs.
+    fn errors(&self) -> BTreeMap<Quantity, PerNorm<f64>> {
+        let absent = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
+        let mut errors = BTreeMap::from(Quantity::OF_RUNS.map(|field| (field, absent)));
+        let all = Quantity::ALL.into_iter().zip(self.errors).zip(self.compared);
+        errors.extend(all.filter(|(_, count)| *count > 0).map(|(error, _)| error));
+        errors
+    }
+
+    /// Tells of arrays that some frames lack.
+    fn tell_missing(&self, chosen: &Chosen, frames: usize, remarks: &mut Remarks) {
+        for (field, count) in Quantity::ALL.into_iter().zip(self.compared) {
+            let role = field.role();
+            // Velocities without a time, as in the first state of a staggered scheme, are told of elsewhere.
+            let is_told = [Role::Displacement, Role::Velocity].contains(&role);
+            if count < frames && chosen.name(role).is_some() && !is_told {
+                let what =
+                    format!("{} of {frames} frames have no array for {role}", frames - count);
+                remarks.note("array-missing", true, what);
+            }
+        }
+    }
+
+    /// Tells of F and P whose transpose fits better.
+    fn tell_transposed(&self, remarks: &mut Remarks) {
+        let turning = [
+            (Quantity::DeformationGradient, self.errors[2].l2),
+            (Quantity::FirstPiolaKirchhoff, self.errors[3].l2),
+        ];
+        for ((field, given), turned) in turning.into_iter().zip(self.transposed) {
+            if turned.l2 < 0.5 * given {
+                let what = format!(
+                    "the transpose of {field} has the L2 error {:.3e} instead of {given:.3e}: is {field} written column by \
+                     column, or with its indices the other way round ([J][i])?",
+                    turned.l2
+                );
+                remarks.note("transposed", false, what);
+            }
+        }
+    }
+
+    /// Tells of a density that does not change with the volume.
+    fn tell_density(&self, remarks: &mut Remarks) {
+        let [.., of_density] = self.errors;
+        if self.density_from_rest.linf < 1e-6 * of_density.linf {
+            let what = "the density is that of the undeformed body throughout: it is compared with mass per current volume";
+            remarks.note("reference-density", false, what);
+        }
+    }
+
+    /// Tells of errors that no double holds.
+    fn tell_overflow(&self, remarks: &mut Remarks) {
+        // What is not finite in the files has been told.
+        if remarks.has("not-finite") {
+            return;
+        }
+        let errors = self.errors();
+        for field in self.fields() {
+            if errors[&field].iter().any(|(_, value)| !value.is_finite()) {
+                let what = format!(
+                    "the errors of {field} are too large for a double, though its values are finite: is the array damaged?"
+                );
+                remarks.note("overflow", true, what);
+            }
+        }
+    }
+}
+
+/// The errors of one recording.
+pub(super) fn recording<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    input: &Input,
+    options: &ScoreOptions,
+) -> Result<ScoreRow, ScoreError> {
+    let mut remarks = Remarks::default();
+    let opened = Opened::new(exact, input, options, &mut remarks)?;
+    let mut reader = opened.reader(exact, options, &mut remarks);
+    let totals = Totals::of(&opened, exact, input.resolution, &mut reader)?;
+    totals.tell_missing(&opened.chosen, opened.timed.len(), &mut remarks);
+    totals.tell_transposed(&mut remarks);
+    opened.tell_provenance(options, &mut remarks);
+    totals.tell_density(&mut remarks);
+    opened.tell_single_frame(options.periods * exact.period(), &mut remarks);
+    totals.tell_overflow(&mut remarks);
+    if input.resolution == Resolution::Estimated {
+        let what = "h is estimated, as the spacing of as many points spread evenly over their bounding box; --cells or \
+                    --h tells it";
+        remarks.note("estimated-h", false, what);
+    }
+    let findings = remarks.list();
+    let (reference_positions, displacements) = opened.sources();
+    let span = opened.timed.iter().map(|frame| frame.time);
+    Ok(ScoreRow {
+        file: input.path().display().to_string(),
+        cells: match input.resolution {
+            Resolution::Cells(cells) => Some(cells),
+            _ => None,
+        },
+        h: totals.h,
+        particles: opened.first.particles(),
+        frames: opened.timed.len(),
+        first_time: span.clone().fold(f64::INFINITY, f64::min),
+        last_time: span.fold(f64::NEG_INFINITY, f64::max),
+        reference_positions,
+        displacements,
+        fields: totals.fields(),
+        status: status(&findings),
+        errors: totals.errors(),
+        exact_displacement: totals.displacement.l2,
+        findings,
+    })
+}
+
+/// `ok`, or the problems.
+pub(super) fn status(findings: &[Remark]) -> String {
+    let problems = findings.iter().filter(|finding| finding.is_problem);
+    let problems: Vec<_> = problems.map(|finding| finding.message.as_str()).collect();
+    if problems.is_empty() { "ok".into() } else { problems.join("; ") }
+}
+
+/// In words, how the solution of a file differs from the one that it is compared with; a parameter that the file does not tell
+/// differs in nothing.
+fn other_provenance(asked: &Provenance, told: &Provenance) -> Option<String> {
+    if told.solution != asked.solution {
+        let (told, asked) = (&told.solution, &asked.solution);
+        return Some(format!("the file tells that it is of {told}, and is compared with {asked}"));
+    }
+    let other = |(name, value): (&String, &f64)| {
+        let told = told.parameters.get(name).filter(|told| *told != value)?;
+        Some(format!(" --set {name}={told:?}"))
+    };
+    let others: String = asked.parameters.iter().filter_map(other).collect();
+    let what = "the file tells other parameters than those that it is compared with; its own are";
+    (!others.is_empty()).then(|| format!("{what}{others}"))
+}
+
+/// The spacing of as many points spread evenly over their bounding box.
+fn spacing<const D: usize>(X: &[SVector<f64, D>]) -> f64 {
+    let mut lower = SVector::<f64, D>::repeat(f64::INFINITY);
+    let mut upper = SVector::<f64, D>::repeat(f64::NEG_INFINITY);
+    for X in X {
+        lower = lower.inf(X);
+        upper = upper.sup(X);
+    }
+    let sides: Vec<f64> = (upper - lower).iter().copied().filter(|side| *side > 0.0).collect();
+    if sides.is_empty() {
+        return f64::NAN;
+    }
+    (sides.iter().product::<f64>() / X.len() as f64).powf(1.0 / sides.len() as f64)
+}

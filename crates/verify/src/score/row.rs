@@ -1,0 +1,82 @@
+//! What a recording gave.
+
+use std::collections::BTreeMap;
+
+use mmsmith_measure::norms::PerNorm;
+use serde::Serialize;
+
+use super::findings::Remark;
+use super::quantity::Quantity;
+
+/// Where reference positions and displacements are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// An array of the files.
+    Array,
+    /// The points of the files.
+    Points,
+    /// Positions minus displacements.
+    PositionsMinusDisplacements,
+    /// Positions minus reference positions.
+    PositionsMinusReference,
+    /// The first frame's positions, traced back with the exact motion; particles found again by identity or order.
+    FirstFrame,
+}
+
+impl Source {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Array => "given as an array",
+            Self::Points => "the points of the files",
+            Self::PositionsMinusDisplacements => "positions minus displacements",
+            Self::PositionsMinusReference => "positions minus reference positions",
+            Self::FirstFrame => "the first frame's positions, traced back with the exact motion",
+        }
+    }
+}
+
+/// What one recording gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScoreRow {
+    /// What was read.
+    pub file: String,
+    /// Cells along the cell length, where they were told.
+    pub cells: Option<usize>,
+    /// The length that orders refer to.
+    pub h: f64,
+    /// Particles in the first frame.
+    pub particles: usize,
+    /// Frames that were compared.
+    pub frames: usize,
+    /// The earliest time.
+    pub first_time: f64,
+    /// The latest time.
+    pub last_time: f64,
+    /// Where reference positions are from.
+    pub reference_positions: Source,
+    /// Where displacements are from.
+    pub displacements: Source,
+    /// The fields that the files hold.
+    pub fields: Vec<Quantity>,
+    /// `ok`, or what is wrong with the recording.
+    pub status: String,
+    /// The errors of u, v, F and P, and of other fields that are there; not a number for those that are not, and where a
+    /// number of the files is none.
+    pub errors: BTreeMap<Quantity, PerNorm<f64>>,
+    /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
+    pub exact_displacement: f64,
+    /// Everything else that has to be known; problems first.
+    #[serde(skip)]
+    pub findings: Vec<Remark>,
+}
+
+impl ScoreRow {
+    /// Whether the recording is whole and sensible, so that its errors have a part in orders.
+    #[must_use]
+    pub fn is_ok(&self) -> bool {
+        self.status == "ok"
+    }
+}
