@@ -25,7 +25,7 @@ fn run_writes_exactly_the_promised_keys() {
     assert_eq!(called.stderr, "", "no progress bar where nobody sees it");
     assert_eq!(names(place.path()), ["row.json"]);
     let result = read_json(&place.path().join("row.json"));
-    assert_eq!(keys(&result), "result schema settings");
+    assert_eq!(keys(&result), "passed result schema settings");
     assert_eq!(result["schema"], "mmsmith.run/1");
     assert_eq!(result["settings"]["solution"], "axis-aligned");
     assert_eq!(result["settings"]["parameters"]["A"], 0.05);
@@ -42,7 +42,7 @@ fn a_history_is_written_on_request_as_csv_json_and_svg() {
     assert_eq!(mms(place, run).status, 0);
     assert_eq!(names(place), ["h.csv", "h.svg", "row.json"]);
     let row = read_json(&place.join("row.json"));
-    assert_eq!(keys(&row), "history result schema settings");
+    assert_eq!(keys(&row), "history passed result schema settings");
     let history = &row["history"];
     let expected = "exact_kinetic_energy exact_momentum exact_strain_energy kinetic_energy momentum step strain_energy \
                     time u_l1 u_l2 u_linf velocity_time";
@@ -85,9 +85,11 @@ fn run_writes_particle_files_on_request_only() {
 fn an_unstable_run_is_a_result_with_its_status() {
     let place = tempfile::tempdir().unwrap();
     let called = mms(place.path(), "run axis-aligned --cells 8 --cfl 2 --json row.json");
-    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert_eq!(called.status, 1, "{}", called.stderr);
     assert!(called.stdout.contains("STOPPED"), "{}", called.stdout);
-    let status = read_json(&place.path().join("row.json"))["result"]["status"].clone();
+    let document = read_json(&place.path().join("row.json"));
+    assert_eq!(document["passed"], false);
+    let status = document["result"]["status"].clone();
     let status = status.as_str().unwrap();
     assert!(status.contains("step") && status.contains("particle"), "{status}");
 }
@@ -99,7 +101,8 @@ fn converge_writes_rows_in_order_and_all_orders() {
     assert_eq!(called.status, 0, "{}", called.stderr);
     assert!(called.stdout.contains("rate"), "{}", called.stdout);
     let study = read_json(&place.path().join("study.json"));
-    assert_eq!(keys(&study), "orders rows schema settings verdicts");
+    assert_eq!(keys(&study), "orders passed rows schema settings verdicts");
+    assert_eq!(study["passed"], true);
     let verdict = &study["verdicts"]["u"]["linf"];
     assert_eq!(verdict["passed"], true);
     assert_eq!(verdict["expected"], 2.0);
@@ -124,7 +127,7 @@ fn converge_in_time_keeps_a_failed_case_as_a_row() {
     let place = tempfile::tempdir().unwrap();
     let call = "converge axis-aligned --cells 8 --cfls 0.2,0.4,2.0 --json study.json";
     let called = mms(place.path(), call);
-    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert_eq!(called.status, 1, "{}", called.stderr);
     assert!(called.stdout.contains("STOPPED"), "{}", called.stdout);
     let study = read_json(&place.path().join("study.json"));
     assert_eq!(study["rows"].as_array().unwrap().len(), 3);
@@ -155,7 +158,7 @@ fn a_difference_of_runs_that_fail_is_a_row_with_its_status() {
     let place = tempfile::tempdir().unwrap();
     let call =
         "converge axis-aligned --cells 8 --cfls 4.0,0.4,0.2 --json study.json --csv study.csv";
-    assert_eq!(mms(place.path(), call).status, 0);
+    assert_eq!(mms(place.path(), call).status, 1);
     let study = read_json(&place.path().join("study.json"));
     let rows = &study["temporal"]["rows"];
     assert!(rows[0]["status"].as_str().unwrap().contains("step"), "{rows}");
@@ -507,7 +510,7 @@ fn a_run_draws_its_particles_at_a_time_with_axes_and_units() {
     let stopped = "run axis-aligned --cells 8 --cfl 2 --threads 1 --picture p.svg";
     // What was measured until then is told all the same.
     let called = mms(place, stopped);
-    assert!(called.status == 2 && called.stdout.contains("STOPPED"), "{}", called.stderr);
+    assert!(called.status == 1 && called.stdout.contains("STOPPED"), "{}", called.stderr);
     for part in ["--picture", "did not come to 1 period(s)", "--at"] {
         assert!(called.stderr.contains(part), "{}", called.stderr);
     }

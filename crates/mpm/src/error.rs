@@ -8,10 +8,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum StepError {
     /// A deformation gradient lost its orientation.
-    #[error(
-        "step {step}, time {time:.6e}: particle {particle} is turned inside out (J = {J:.3e}); \
-         try a smaller time step, more particles per cell or smoother weights"
-    )]
+    #[error("step {step}, time {time:.6e}: particle {particle} is turned inside out (J = {J:.3e})")]
     Inverted {
         /// Number of the failed step, counted from 1; 0 for the initial state.
         step: usize,
@@ -25,7 +22,7 @@ pub enum StepError {
     /// A position or a deformation gradient overflowed or became NaN.
     #[error(
         "step {step}, time {time:.6e}: particle {particle} has a value that is not finite \
-         (x = {position:.6?}, J = {J:.3e}); the run is unstable, or the body force is not finite there"
+         (x = {position:.6?}, J = {J:.3e})"
     )]
     NotFinite {
         /// Number of the failed step, counted from 1; 0 for the initial state.
@@ -42,7 +39,7 @@ pub enum StepError {
     /// A particle's centre moved out of the grid.
     #[error(
         "step {step}, time {time:.6e}: particle {particle} left the grid at x = {position:.6?} \
-         (axis {axis}: {lower:.3e} to {upper:.3e}); make the grid larger or the time step smaller"
+         (axis {axis}: {lower:.3e} to {upper:.3e})"
     )]
     LeftGrid {
         /// Number of the failed step, counted from 1; 0 for the initial state.
@@ -63,7 +60,7 @@ pub enum StepError {
     /// A particle box grew wider than the weights support.
     #[error(
         "step {step}, time {time:.6e}: the box of particle {particle} has half-size {half_size:.3e} along axis {axis}, \
-         more than the supported {limit:.3e} (two cells); use more particles per cell"
+         more than the supported {limit:.3e} (two cells)"
     )]
     TooLarge {
         /// Number of the failed step, counted from 1; 0 for the initial state.

@@ -139,6 +139,10 @@ enum End {
     NotFiniteError {
         field: Field,
     },
+    Exceeds {
+        error: Exact,
+        displacement: Exact,
+    },
     Cut {
         step: u64,
         time: Exact,
@@ -189,6 +193,9 @@ impl From<&Status> for End {
                 resolution: Exact(resolution),
             },
             &Status::NotFinite { field } => Self::NotFiniteError { field },
+            &Status::Exceeds { error, displacement } => {
+                Self::Exceeds { error: Exact(error), displacement: Exact(displacement) }
+            }
             &Status::Cut { step, time } => Self::Cut { step, time: Exact(time) },
             Status::Stopped(error) => match *error {
                 StepError::Inverted { step, time, particle, J } => {
@@ -226,6 +233,9 @@ impl From<End> for Status {
                 return Self::Unresolved { displacement, resolution };
             }
             End::NotFiniteError { field } => return Self::NotFinite { field },
+            End::Exceeds { error, displacement } => {
+                return Self::Exceeds { error: error.0, displacement: displacement.0 };
+            }
             End::Cut { step, time } => return Self::Cut { step, time: time.0 },
             End::Inverted { step, time, particle, J } => {
                 StepError::Inverted { step, time: time.0, particle, J: J.0 }
@@ -342,6 +352,7 @@ mod tests {
             cut,
             unresolved,
             not_finite,
+            Status::Exceeds { error: 2.0, displacement: 0.1 },
         ]);
         let odd_nan = f64::from_bits(0xfff8_0000_0000_0123);
         for status in statuses {

@@ -146,6 +146,13 @@ pub enum Status {
         /// The field.
         field: Field,
     },
+    /// At the end time, with an error of `u` that is larger than the motion itself: a body at rest would have been nearer.
+    Exceeds {
+        /// The largest error of `u`, a length.
+        error: f64,
+        /// The largest displacement of the exact motion that was seen.
+        displacement: f64,
+    },
     /// The time that it was given was over.
     Cut {
         /// The last step done.
@@ -159,7 +166,18 @@ impl Status {
     /// Whether the run came to its end time, and its errors say nothing all the same.
     #[must_use]
     pub fn is_not_judged(&self) -> bool {
-        matches!(self, Self::Unresolved { .. } | Self::NotFinite { .. })
+        matches!(self, Self::Unresolved { .. } | Self::NotFinite { .. } | Self::Exceeds { .. })
+    }
+
+    /// Whether the run did what it was asked for: false where it stopped, or where its errors are larger than the motion or no numbers;
+    /// `None` where rounding hides the motion, so that nothing can be told.
+    #[must_use]
+    pub fn passed(&self) -> Option<bool> {
+        match self {
+            Self::Ok => Some(true),
+            Self::Unresolved { .. } => None,
+            _ => Some(false),
+        }
     }
 }
 
@@ -181,6 +199,10 @@ impl fmt::Display for Status {
             Self::NotFinite { field } => {
                 write!(f, "not judged: an error of {field} is not a finite number")
             }
+            Self::Exceeds { error, displacement } => write!(
+                f,
+                "error exceeds the motion: the largest error of u is {error:.3e}, the largest displacement {displacement:.3e}"
+            ),
             Self::Cut { step, time } => {
                 write!(f, "cut after step {step}, t = {time:.6e}: its time was over")
             }
@@ -278,9 +300,26 @@ where
     if row.status == Status::Ok {
         let unit = T::default_epsilon().to_f64() / 2.0;
         let end = steps.count as f64 * driven.dt;
-        row.status = judged(exact, &row.errors, end, unit * scene.reach());
+        let rounding = Rounding { of_position: unit * scene.reach(), steps: steps.count };
+        row.status = judged(exact, &row.errors, end, rounding);
     }
     Ok(row)
+}
+
+/// What rounding does to positions, in lengths.
+#[derive(Clone, Copy)]
+struct Rounding {
+    /// Half a unit in the last place.
+    of_position: f64,
+    /// Steps that add it up.
+    steps: u64,
+}
+
+impl Rounding {
+    /// After all steps, added up as a random walk.
+    fn in_the_end(self) -> f64 {
+        self.of_position * (self.steps as f64).sqrt()
+    }
 }
 
 /// The status of a run that came to its end: whether its errors say anything.
@@ -288,25 +327,46 @@ fn judged<const D: usize>(
     exact: &dyn Solution<f64, D>,
     errors: &PerField<PerNorm<f64>>,
     end: f64,
-    resolution: f64,
+    rounding: Rounding,
 ) -> Status {
-    const SAMPLES: usize = 64;
-    let domain = exact.domain();
     // Periodic motion repeats.
     let span = end.min(exact.period());
-    let seen = (0..SAMPLES).filter_map(|n| points::interior(&domain, span, n));
-    let displacement = seen
-        .flat_map(|(X, t)| [0.0, t].map(|t| exact.displacement(&X, t)))
-        .map(|u| magnitude(u.iter().copied()))
-        .fold(0.0, f64::max);
+    let displacement = largest_displacement(exact, span, 1);
     // A body at rest is at rest in every precision.
-    if displacement > 0.0 && displacement <= resolution {
-        return Status::Unresolved { displacement, resolution };
+    if displacement > 0.0 && displacement <= rounding.of_position {
+        return Status::Unresolved { displacement, resolution: rounding.of_position };
     }
-    errors
-        .iter()
-        .find(|(_, norms)| norms.iter().any(|(_, value)| !value.is_finite()))
-        .map_or(Status::Ok, |(field, _)| Status::NotFinite { field })
+    let is_finite = |norms: &PerNorm<f64>| norms.iter().all(|(_, value)| value.is_finite());
+    if let Some((field, _)) = errors.iter().find(|(_, norms)| !is_finite(norms)) {
+        return Status::NotFinite { field };
+    }
+    let error = errors.u.linf;
+    let exceeds = |displacement: f64| error > displacement.max(rounding.in_the_end());
+    // Few samples may miss the largest displacement; many are taken where it matters.
+    if exceeds(displacement) {
+        let displacement = largest_displacement(exact, span, 64);
+        if exceeds(displacement) {
+            return Status::Exceeds { error, displacement };
+        }
+    }
+    Status::Ok
+}
+
+/// The largest displacement at time zero and at sampled places and times until `span`, with so many times at each place.
+fn largest_displacement<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    span: f64,
+    times: usize,
+) -> f64 {
+    const PLACES: usize = 64;
+    let domain = exact.domain();
+    let seen = (0..PLACES).filter_map(|n| points::interior(&domain, span, n));
+    seen.flat_map(|(X, t)| {
+        let later = (1..=times).map(move |k| (t + span * k as f64 / times as f64) % span);
+        [0.0, t].into_iter().chain(later).map(move |t| (X, t))
+    })
+    .map(|(X, t)| magnitude(exact.displacement(&X, t).iter().copied()))
+    .fold(0.0, f64::max)
 }
 
 /// Steps to the end and measures the errors on the way.

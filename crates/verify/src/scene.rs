@@ -12,6 +12,8 @@ use crate::scheme::Placement;
 
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
+/// How much further particles may go than the exact motion, as a share of the size of a box.
+const OVERSHOOT: f64 = 0.05;
 
 /// A condition of `exact` that the total frame models and the updated one does not, if it has one.
 #[must_use]
@@ -58,6 +60,83 @@ fn are_multiples<const D: usize>(sides: &SVector<f64, D>, spacing: f64) -> bool 
         let count = side / spacing;
         count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0)
     })
+}
+
+/// How many cells fit along each side of a box whose `cell_length` has `cells` of them.
+fn fitted_cells<const D: usize>(
+    sides: &SVector<f64, D>,
+    cell_length: f64,
+    cells: usize,
+) -> Result<[usize; D], SceneError> {
+    let spacing = cell_length / cells as f64;
+    if are_multiples(sides, spacing) {
+        return Ok(std::array::from_fn(|axis| (sides[axis] / spacing).round() as usize));
+    }
+    let near = cells.saturating_sub(32).max(1)..=cells.saturating_add(32);
+    let mut fitting: Vec<_> =
+        near.filter(|count| are_multiples(sides, cell_length / *count as f64)).collect();
+    fitting.sort_by_key(|count| count.abs_diff(cells));
+    fitting.truncate(4);
+    fitting.sort_unstable();
+    Err(SceneError::Misfit { cells, spacing, sides: sides.iter().copied().collect(), fitting })
+}
+
+/// The lower corner and the cells of a grid that reaches beyond every face of a box that is no wall: as far as the exact motion goes
+/// until `end`, and [`OVERSHOOT`] further for particles that go beyond it. A box is given by its lower corner, its cells and their size.
+fn with_room<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    end: f64,
+    (mut lower, mut cells, spacing): (SVector<f64, D>, [usize; D], f64),
+    walls: &[[bool; 2]; D],
+) -> (SVector<f64, D>, [usize; D]) {
+    if walls.as_flattened().iter().all(|is_wall| *is_wall) {
+        return (lower, cells);
+    }
+    let upper = SVector::from_fn(|a, _| lower[a] + cells[a] as f64 * spacing);
+    let (furthest, corner) = (extremes(solution, end, &lower, &upper), lower);
+    let spare = MARGIN_CELLS + (OVERSHOOT * (upper - lower).norm() / spacing).ceil();
+    for a in 0..D {
+        let beyond = [corner[a] - furthest[0][a], furthest[1][a] - upper[a]];
+        let room = |end: usize| (beyond[end].max(0.0) / spacing).ceil() + spare;
+        let [below, above] = [0, 1].map(|end| if walls[a][end] { 0.0 } else { room(end) });
+        lower[a] -= below * spacing;
+        cells[a] += (below + above) as usize;
+    }
+    (lower, cells)
+}
+
+/// The least and the largest coordinates that places on the surface of a box have until `end`.
+fn extremes<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    end: f64,
+    lower: &SVector<f64, D>,
+    upper: &SVector<f64, D>,
+) -> [SVector<f64, D>; 2] {
+    // Places along each axis, corners included.
+    let count = [2_usize, 9, 5][D.clamp(1, 3) - 1];
+    let (mut least, mut largest) = (*lower, *upper);
+    for index in 0..count.pow(D as u32) {
+        let steps: [usize; D] = std::array::from_fn(|a| index / count.pow(a as u32) % count);
+        if !steps.iter().any(|step| [0, count - 1].contains(step)) {
+            continue;
+        }
+        let X = SVector::from_fn(|a, _| {
+            lower[a] + (upper[a] - lower[a]) * steps[a] as f64 / (count - 1) as f64
+        });
+        for t in moments(solution.period(), end) {
+            let x: SVector<f64, D> = X + solution.displacement(&X, t);
+            // What is not finite is found when the run begins.
+            (least, largest) = (least.zip_map(&x, f64::min), largest.zip_map(&x, f64::max));
+        }
+    }
+    [least, largest]
+}
+
+/// Times at which a motion is looked at: a fine raster of one period, which sees all of a periodic motion, and one of all the time, for
+/// others.
+fn moments(period: f64, end: f64) -> impl Iterator<Item = f64> {
+    let raster = |span: f64| (0..=128).map(move |moment| span * f64::from(moment) / 128.0);
+    raster(end.min(period)).chain((end > period).then(|| raster(end)).into_iter().flatten())
 }
 
 /// Whether the values of motion or traction come from the solution.
@@ -147,34 +226,11 @@ impl<const D: usize> Scene<D> {
         }
         let (lower, cells) = match &domain {
             Domain::Box { lower, upper } => {
-                let sides: SVector<f64, D> = upper - lower;
-                let fit = |side: f64, spacing: f64| {
-                    let count = side / spacing;
-                    (count.round() >= 1.0 && (count - count.round()).abs() <= 1e-9 * count.max(1.0))
-                        .then(|| count.round() as usize)
-                };
-                let fits = |cells: usize| {
-                    let spacing = solution.cell_length() / cells as f64;
-                    sides.iter().all(|side| fit(*side, spacing).is_some())
-                };
-                let mut cells = [0; D];
-                for axis in 0..D {
-                    cells[axis] = fit(sides[axis], spacing).ok_or_else(|| {
-                        let near =
-                            case.cells.saturating_sub(32).max(1)..=case.cells.saturating_add(32);
-                        let mut fitting: Vec<_> = near.filter(|count| fits(*count)).collect();
-                        fitting.sort_by_key(|count| count.abs_diff(case.cells));
-                        fitting.truncate(4);
-                        fitting.sort_unstable();
-                        SceneError::Misfit {
-                            cells: case.cells,
-                            spacing,
-                            sides: sides.iter().copied().collect(),
-                            fitting,
-                        }
-                    })?;
+                let fitted = fitted_cells(&(upper - lower), solution.cell_length(), case.cells)?;
+                match placement {
+                    Some(_) => with_room(solution, end, (*lower, fitted, spacing), &walls),
+                    None => (*lower, fitted),
                 }
-                (*lower, cells)
             }
             Domain::Annulus { outer, .. } => {
                 let furthest = outer + largest_displacement(solution, &[Surface::Outer], end);
@@ -325,7 +381,6 @@ impl<const D: usize> Scene<D> {
 
     /// About how many particles the body gets.
     pub(crate) fn particles_expected(&self, per_cell: usize) -> f64 {
-        let cells: f64 = self.cells.iter().map(|&cells| cells as f64).product();
         let body = match self.domain {
             Domain::Annulus { inner, outer } => {
                 let pi = std::f64::consts::PI;
@@ -338,7 +393,10 @@ impl<const D: usize> Scene<D> {
             Domain::Box { lower, upper } if !self.boundary.is_empty() => {
                 (upper - lower).iter().map(|side| side / self.spacing).product()
             }
-            _ => cells,
+            Domain::Box { lower, upper } => {
+                (upper - lower).iter().map(|side| (side / self.spacing).round()).product()
+            }
+            _ => self.cells.iter().map(|&cells| cells as f64).product(),
         };
         body * (per_cell as f64).powi(D as i32)
     }
@@ -362,8 +420,8 @@ impl<const D: usize> Scene<D> {
         body_force * scalar / size_of::<f64>() + solution.state_at(&[]).bytes_per_point()
     }
 
-    /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body once it is shifted
-    /// by `offset` of the particles' distance.
+    /// Whether a place of the lattice with `per_cell` particles in a cell and direction lies in the body: in a box before it is shifted
+    /// by `offset` of the particles' distance, so that all of the box is there, and in an annulus after that.
     pub(crate) fn inside<T: Real>(
         &self,
         per_cell: usize,
@@ -372,14 +430,20 @@ impl<const D: usize> Scene<D> {
         let distance = self.spacing / per_cell as f64;
         move |X| {
             // Decided on the exact centre, so that both precisions have the same particles.
-            let centre = SVector::<f64, D>::from_fn(|axis, _| {
-                let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();
-                self.lower[axis] + (index + 0.5 + offset) * distance
-            });
+            let centre = |offset: f64| {
+                SVector::<f64, D>::from_fn(|axis, _| {
+                    let index = ((X[axis].to_f64() - self.lower[axis]) / distance - 0.5).round();
+                    self.lower[axis] + (index + 0.5 + offset) * distance
+                })
+            };
             match self.domain {
                 Domain::Annulus { inner, outer } => {
-                    let squared = centre.norm_squared();
+                    let squared = centre(offset).norm_squared();
                     inner * inner <= squared && squared <= outer * outer
+                }
+                Domain::Box { lower, upper } => {
+                    let centre = centre(0.0);
+                    (0..D).all(|axis| lower[axis] < centre[axis] && centre[axis] < upper[axis])
                 }
                 _ => true,
             }
@@ -440,16 +504,13 @@ fn largest_displacement<const D: usize>(
     surfaces: &[Surface],
     end: f64,
 ) -> f64 {
-    // Periodic motion repeats, so one period on a fine raster of times sees it all.
-    let span = end.min(solution.period());
     let mut largest = 0.0_f64;
     let places = (0..16).flat_map(|place| surfaces.iter().map(move |surface| (place, *surface)));
     for (place, surface) in places {
         let Some((X, _)) = points::surface(&solution.domain(), surface, place) else {
             return largest;
         };
-        for moment in 0..=128 {
-            let t = span * f64::from(moment) / 128.0;
+        for t in moments(solution.period(), end) {
             largest = largest.max(solution.displacement(&X, t).norm());
         }
     }

@@ -157,12 +157,17 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         notes += &table::on_left_out(sections.iter().map(|(_, table)| table), has);
         terminal::say(&(text + &notes))?;
 
+        let decisive = differences.as_ref().map_or(&judged, |(_, judged)| judged);
+        let of_differences = differences.iter().flat_map(|(found, _)| &found.rows);
+        let ends = study.rows.iter().map(|row| &row.status);
+        let passed = passed(decisive, ends.chain(of_differences.map(|row| &row.status)));
         if let Some(output) = output {
             let mut document =
                 document(&selection, settled, extent, &base, &sweep, &study, &judged);
             if let Some((found, judged)) = &differences {
                 document["temporal"] = temporal_document(found, judged);
             }
+            document["passed"] = json!(passed);
             output.write(&document)?;
         }
         if let Some(file) = values {
@@ -191,15 +196,18 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             let found = differences.as_ref().map(|(found, _)| found);
             file.write_text(&picture(&title, &study, &sweep, found, floor))?;
         }
-        let decisive = match &differences {
-            Some((_, judged)) => judged,
-            None => &judged,
-        };
-        let failed = decisive
-            .iter()
-            .any(|(_, norms)| norms.iter().any(|(_, one)| one.passed == Some(false)));
-        Ok(!failed)
+        Ok(passed != Some(false))
     })
+}
+
+/// Whether a study did what it promised: false where an order was missed or a run stopped, and `None` where nothing was judged.
+fn passed<'a>(judged: &Verdicts, ends: impl IntoIterator<Item = &'a Status>) -> Option<bool> {
+    if ends.into_iter().any(|end| end.passed() == Some(false)) {
+        return Some(false);
+    }
+    let verdicts = || judged.iter().flat_map(|(_, norms)| norms.iter());
+    let is = |passed: bool| verdicts().any(|(_, one)| one.passed == Some(passed));
+    if is(false) { Some(false) } else { is(true).then_some(true) }
 }
 
 /// The work of each case, which is the same on every machine: particles times steps.
@@ -332,6 +340,7 @@ fn status(status: &Status, is_rounding: bool) -> String {
     match status {
         Status::Ok if is_rounding => "at rounding",
         Status::Ok => "ok",
+        Status::Exceeds { .. } => "error > u",
         other if other.is_not_judged() => "not judged",
         _ => "STOPPED",
     }

@@ -463,7 +463,10 @@ fn stopped(studies: &[&[Series]]) -> Option<Table> {
 fn end(status: &Status) -> Option<(u64, String)> {
     let short = |value: f64| number::rounded(value, 3);
     let told = match status {
-        Status::Ok | Status::Unresolved { .. } | Status::NotFinite { .. } => return None,
+        Status::Ok
+        | Status::Unresolved { .. }
+        | Status::NotFinite { .. }
+        | Status::Exceeds { .. } => return None,
         Status::Stopped(StepError::Inverted { step, time, particle, J }) => {
             let (time, J) = (short(*time), short(*J));
             (

@@ -119,6 +119,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
             let mut document = json!({
                 "schema": "mmsmith.run/1",
                 "settings": settings(),
+                "passed": row.status.passed(),
                 "result": row,
             });
             if let Some(moments) = &moments {
@@ -126,11 +127,15 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
             }
             output.write(&document)?;
         }
-        // Last, since a run that stopped has no picture.
+        // Last, since a run that stopped may have no picture.
         if let Some(picture) = picture {
-            picture.write(&selection, &row)?;
+            let written = picture.write(&selection, &row);
+            match written {
+                Err(error) if row.status.passed() == Some(false) => terminal::error(error),
+                written => written?,
+            }
         }
-        Ok(true)
+        Ok(row.status.passed() != Some(false))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::hand_coded;
 
-use hand_coded::{AxisAligned, Coded, Plane, Ring};
+use hand_coded::{AxisAligned, Coded, FreeSheet, Plane, Ring};
 use mmsmith_ranks::in_process;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
@@ -83,6 +83,18 @@ fn errors_and_histories_have_the_bits_of_one_process() {
         Case { scheme, cells: 64, periods: 0.1, extent: Some(Extent::Full), ..Case::default() };
     agrees(&Ring::default(), &case, &[1, 7]);
     agrees(&AxisAligned::default(), &Case { extent: None, ..case }, &[5]);
+}
+
+/// The grid reaches beyond the sides that move outward, and with it the rows that processes share out.
+#[test]
+fn a_body_with_free_sides_has_the_bits_of_one_process() {
+    for (n, shape) in Shape::ALL.into_iter().enumerate() {
+        let stepping = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl][n % 4];
+        let scheme = updated(shape, stepping, Transfer::Flip);
+        let case = Case { scheme, cells: 48, periods: 0.3, cfl: 0.3, ..Case::default() };
+        let row = agrees(&FreeSheet { A: 0.1 }, &case, &[2, 5]);
+        assert!(row.status == Status::Ok && row.errors.u.linf < 2e-2, "{row:?}");
+    }
 }
 
 #[test]

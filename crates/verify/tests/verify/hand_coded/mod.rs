@@ -185,6 +185,60 @@ impl Plane for AxisAligned {
     }
 }
 
+/// A sheet of density 1 that stretches between two walls and two free sides, one of which starts beyond its place at rest:
+/// `u = (A sin(pi X/2) sin(w t), -A cos(pi Y/2) cos(w t))`, without lateral contraction.
+#[derive(Clone)]
+pub(crate) struct FreeSheet {
+    pub(crate) A: f64,
+}
+
+impl FreeSheet {
+    const E: f64 = 1e4;
+    const SIDES: &'static [Boundary] = &[
+        boundary(Surface::Lower(0), Condition::Sliding),
+        boundary(Surface::Upper(0), Condition::TractionFree),
+        boundary(Surface::Lower(1), Condition::TractionFree),
+        boundary(Surface::Upper(1), Condition::Sliding),
+    ];
+
+    fn stretches(&self, X: &Vector, t: f64) -> Vector {
+        Vector::repeat(1.0) + self.gradient(X, t).diagonal()
+    }
+}
+
+impl Plane for FreeSheet {
+    fn motion(&self, X: &Vector, t: f64) -> [Vector; 3] {
+        let w = PI / 2.0 * Self::E.sqrt();
+        let (sin, cos) = (w * t).sin_cos();
+        let amplitude = vector![(PI / 2.0 * X[0]).sin(), -(PI / 2.0 * X[1]).cos()] * self.A;
+        let u = amplitude.component_mul(&vector![sin, cos]);
+        [u, amplitude.component_mul(&vector![w * cos, -w * sin]), u * (-w * w)]
+    }
+    fn gradient(&self, X: &Vector, t: f64) -> Tensor {
+        let (sin, cos) = (PI / 2.0 * Self::E.sqrt() * t).sin_cos();
+        let slope = vector![(PI / 2.0 * X[0]).cos(), (PI / 2.0 * X[1]).sin()];
+        Tensor::from_diagonal(&(slope.component_mul(&vector![sin, cos]) * (self.A * PI / 2.0)))
+    }
+    fn stress(&self, X: &Vector, t: f64) -> Tensor {
+        Tensor::from_diagonal(&self.stretches(X, t).map(|f| Self::E / 2.0 * (f - 1.0 / f)))
+    }
+    fn force(&self, X: &Vector, t: f64) -> Vector {
+        let [u, _, a] = self.motion(X, t);
+        let curvature = u * (-PI * PI / 4.0);
+        let slope = self.stretches(X, t).map(|f| Self::E / 2.0 * (1.0 + f.powi(-2)));
+        a - slope.component_mul(&curvature)
+    }
+    fn shape(&self) -> Domain<f64, 2> {
+        square()
+    }
+    fn conditions(&self) -> &'static [Boundary] {
+        Self::SIDES
+    }
+    fn constants(&self) -> [f64; 3] {
+        [Self::E, 0.0, 1.0]
+    }
+}
+
 /// Two shears across each other, `u = (g sin(pi Y) cos(w t), k sin(pi X) sin(w t))`: `F` and `P` are not symmetric.
 #[derive(Clone)]
 pub(crate) struct CrossedShear {
