@@ -8,22 +8,22 @@ use super::values::{positive_count, positive_number, range};
 
 #[derive(Args)]
 pub(crate) struct CertifyOptions {
-    /// The solution, by name, or a specification file (SPEC.toml)
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) solution: String,
-    /// Prove it where an input is in this range, instead of the usual one; repeatable
+    /// Range of an input in place of its usual one; repeatable
     #[arg(long = "range", value_name = "NAME=FROM:TO", value_parser = range)]
     pub(crate) ranges: Vec<(String, f64, f64)>,
-    /// The factor K that is to hold, up to 13; certificates are accepted up to 8
+    /// Factor K of the bound to prove, at most 13; a certificate is accepted up to 8
     #[arg(long, value_name = "K", default_value = "8", value_parser = positive_number)]
     pub(crate) factor: f64,
-    /// Give a field up after so many boxes
+    /// Largest number of boxes for each field
     #[arg(long, value_name = "N", default_value = "20000", value_parser = positive_count)]
     pub(crate) boxes: usize,
     /// Write the certificate to this JSON file; - is standard output, which then has nothing else
     #[arg(long, value_name = "FILE", conflicts_with = "check")]
     pub(crate) out: Option<PathBuf>,
-    /// Check the certificate in this file instead, and that it is about the present program of the solution
+    /// Check the certificate in this file, and that its program is the present one of the solution
     #[arg(long, value_name = "FILE", conflicts_with_all = ["ranges", "factor", "boxes"])]
     pub(crate) check: Option<PathBuf>,
 }

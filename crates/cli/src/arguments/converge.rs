@@ -10,21 +10,20 @@ use super::values::{positive_count, positive_number};
 
 #[derive(Args)]
 pub(crate) struct ConvergeOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Cell counts, separated by commas; one of them with --cfls
+    /// Numbers of cells, separated by commas: at least two for an order, three for a verdict on it; one with --cfls
     #[arg(long, value_name = "N,...", required = true, value_delimiter = ',', value_parser = positive_count)]
     pub(crate) cells: Vec<usize>,
-    /// CFL numbers, separated by commas, for orders in time on one grid
+    /// CFL numbers, separated by commas: orders in time on one grid
     #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "cfl")]
     pub(crate) cfls: Vec<f64>,
-    /// Orders to be met in place of those that theory promises: a number for u, or by field and norm, such as
-    /// u=2,F=1,P.l1=1. With --cfls they are orders in time, of the differences on one grid. A missed order, promised or asked
-    /// for, gives exit status 1
+    /// Expected orders: a number for u, or by field and norm, such as u=2,F=1,P.l1=1; with --cfls orders in time, of the
+    /// differences on one grid. A missed order gives exit status 1. Default: the orders of theory
     #[arg(long, value_name = "ORDERS")]
     pub(crate) expect: Option<String>,
-    /// How far the order on the finest pair may be from the expected one; 0.1 when left out
+    /// Largest distance of the order on the finest pair of grids from the expected order. Default: 0.1
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
     #[command(flatten)]

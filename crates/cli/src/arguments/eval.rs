@@ -8,7 +8,7 @@ use super::shared::ParameterOptions;
 
 #[derive(Args)]
 pub(crate) struct EvalOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// The points: [ { "X": [0.1, 0.2], "t": 0.3, "par": { "A": 0.05 } }, ... ]; "par" may be left out, other keys

@@ -10,18 +10,18 @@ use super::shared::ParameterOptions;
 
 #[derive(Args)]
 pub(crate) struct GenerateOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// The language or the host; the file's head says how it is used
+    /// Language or host; the head of the file says how to use it
     #[arg(long, value_parser = hosts())]
     pub(crate) target: &'static Host,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Write the file into this folder, which is made where there is none
+    /// Folder of the file; made if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Plant this mistake in the fields, so that you can see whether your tests find it
+    /// Plant this mistake in the fields, to see whether your tests find it
     #[arg(long, value_name = "NAME", value_parser = faults())]
     pub(crate) fault: Option<Fault>,
 }

@@ -8,7 +8,7 @@ use super::values::{seconds, thread_count};
 
 #[derive(Args)]
 pub(crate) struct ReproduceOptions {
-    /// Write everything to this folder
+    /// Folder of all files
     #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
     pub(crate) out: PathBuf,
     /// Time for the comparison of schemes by error and cost, for each problem, such as 8s or 2m
@@ -17,7 +17,7 @@ pub(crate) struct ReproduceOptions {
     /// Draw nothing but the picture of the README to this SVG file: the ring's stress beside its orders
     #[arg(long, value_name = "FILE", hide = true)]
     pub(crate) hero: Option<PathBuf>,
-    /// Number of threads; all cores when left out
+    /// Number of threads. Default: all cores
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
 }

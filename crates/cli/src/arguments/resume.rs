@@ -8,10 +8,10 @@ use super::values::thread_count;
 
 #[derive(Args)]
 pub(crate) struct ResumeOptions {
-    /// The folder that the run was given with --checkpoint
+    /// Folder that the run had as --checkpoint
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
-    /// Number of threads; as the run was started with when left out
+    /// Number of threads. Default: that of the run
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
 }

@@ -9,11 +9,11 @@ use super::values::{positive_count, time};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Number of cells along the solution's cell length; where nothing is said 32, and 16 for a solid in three dimensions in a
-    /// total frame that is not given either
+    /// Number of cells along the solution's cell length. Default: 32; 16 in 3D if mms chose the total Lagrangian formulation
+    /// itself
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) cells: Option<usize>,
     #[command(flatten)]
@@ -24,17 +24,17 @@ pub(crate) struct RunOptions {
     /// Number of particle files, spread evenly from the first state to the last
     #[arg(long, value_name = "N", default_value_t = 20, requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
     pub(crate) frames: u64,
-    /// Write all that the next step needs to this folder every so often; after a kill, `mms resume DIR` goes on from there
+    /// Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one
     #[arg(long, value_name = "DIR")]
     pub(crate) checkpoint: Option<PathBuf>,
     /// Steps between checkpoints
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "checkpoint", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) every: u64,
-    /// Write errors of u, energies and momentum of the particles and of the exact motion over time to this file as
-    /// comma-separated values, at up to 1000 evenly spread steps; --json then has them too
+    /// Write errors of u, energies and momentum over time to this CSV file, of the particles and of the exact motion, at up
+    /// to 1000 evenly spread steps; --json then has them too
     #[arg(long, value_name = "FILE")]
     pub(crate) history: Option<PathBuf>,
-    /// Draw the energy gained and lost against the exact motion over time to this SVG file
+    /// Draw the difference of the energy from the exact one over time to this SVG file
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
     #[command(flatten)]
@@ -44,13 +44,13 @@ pub(crate) struct RunOptions {
 /// A picture of the particles.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Draw the particles, coloured by their Cauchy stress, to this SVG file; those in space as they are seen along the third axis
+    /// Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis
     #[arg(long = "picture", value_name = "FILE", conflicts_with = "checkpoint")]
     pub(crate) file: Option<PathBuf>,
-    /// The time of the picture in periods of the solution, at most --periods; the end when left out
+    /// Time of the picture in periods of the solution, at most --periods. Default: the end of the run
     #[arg(long, value_name = "PERIODS", requires = "file", allow_negative_numbers = true, value_parser = time)]
     pub(crate) at: Option<f64>,
-    /// The stress that gives the particles of the picture their colours
+    /// Stress that the colours of the picture show
     #[arg(long, value_enum, default_value_t = Stress::VonMises, requires = "file")]
     pub(crate) stress: Stress,
 }

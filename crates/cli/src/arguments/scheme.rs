@@ -14,62 +14,64 @@ use super::values::{finite_number, positive_count, positive_number, thread_count
 /// How to simulate; what every measuring command shares.
 #[derive(Args, Clone)]
 pub(crate) struct SchemeOptions {
-    /// Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation
+    /// Shape functions: the weights between particles and grid. Default: gimp; bspline3 in the total Lagrangian formulation
     #[arg(long, value_parser = weights())]
     pub(crate) shape: Option<Weights>,
-    /// Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total
-    /// Lagrangian, with those of the reference configuration throughout. Where nothing is said the updated one, and the
-    /// total one for a solution with a condition that only that one models
+    /// Formulation: updated Lagrangian evaluates the shape functions in the current configuration in every step, total
+    /// Lagrangian once in the reference configuration. Default: updated-lagrangian; total-lagrangian if only this formulation
+    /// can model a boundary condition of the solution
     #[arg(long = "formulation", alias = "frame", value_enum, value_name = "FORMULATION")]
     pub(crate) frame: Option<Frame>,
-    /// Mass matrix of the total Lagrangian formulation; consistent where nothing is said
+    /// Mass matrix of the total Lagrangian formulation. Default: consistent
     #[arg(long, value_enum)]
     pub(crate) mass: Option<Mass>,
-    /// Order of the symmetric composition of leapfrog in the total Lagrangian formulation; where nothing is
-    /// said 4, and 6 for splines of degree 4 and 5
+    /// Order of time stepping in the total Lagrangian formulation, by a symmetric composition of leapfrog steps. Default: 4;
+    /// 6 for splines of degree 4 and 5
     #[arg(long, value_enum)]
     pub(crate) composition: Option<Composition>,
-    /// Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted and clipped ones in the updated one
-    /// only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held between sliding walls
+    /// Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian
+    /// formulation only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls
     #[arg(long, value_enum)]
     pub(crate) layout: Option<Layout>,
-    /// Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total Lagrangian
-    /// formulation
+    /// Coordinates of the background grid. Default: cartesian; in the total Lagrangian formulation polar for rings and
+    /// spherical for shells
     #[arg(long, value_enum)]
     pub(crate) grid: Option<Grid>,
-    /// Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
-    /// total Lagrangian formulation that is not
+    /// Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL
+    /// number itself
     #[arg(long, value_enum)]
     pub(crate) cfl_speed: Option<CflSpeed>,
     /// Time integrator
     #[arg(long, value_parser = integrators(), default_value_t = verify::Integrator::Cd)]
     pub(crate) integrator: verify::Integrator,
-    /// Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order
+    /// Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order)
     #[arg(long, value_name = "NAME", default_value_t = verify::Transfer::Flip, value_parser = str::parse::<verify::Transfer>)]
     pub(crate) transfer: verify::Transfer,
-    /// First velocity of the cd integrator; others ignore it
+    /// First velocity of the integrator cd
     #[arg(long, value_enum, default_value_t = Start::Halved)]
     pub(crate) start: Start,
-    /// Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points
+    /// Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
-    /// Time step times wave speed over grid spacing; where nothing is said 0.4, and one that suits the splines in a total
-    /// frame that is not given either
+    /// CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation
+    /// itself, a number that suits the splines
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) cfl: Option<f64>,
-    /// End time in periods of the solution
+    /// End time, in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
-    /// How much of a ring or a shell is modelled; the part between planes of symmetry where there are such
+    /// Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any
     #[arg(long, value_enum)]
     pub(crate) extent: Option<Extent>,
-    /// Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5
+    /// Shift of the lattice of particles along every axis, in particle distances, from -0.5 to 0.5
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) offset: f64,
-    /// Angle of the background grid against the body in degrees, counter-clockwise; particles are then clipped with its boundary
+    /// Angle from the body to the background grid in degrees, counter-clockwise. Particles are then clipped at the boundary of
+    /// the body
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) grid_angle: f64,
-    /// Shift of the background grid against the body along each axis, in cells from -1 to 1; particles are then clipped with its boundary
+    /// Shift of the background grid along each axis, in cells, from -1 to 1. Particles are then clipped at the boundary of the
+    /// body
     #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) grid_shift: f64,
     /// Precision of the solver; errors are always measured in f64
@@ -77,7 +79,7 @@ pub(crate) struct SchemeOptions {
     pub(crate) precision: Precision,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Number of threads; all cores when left out
+    /// Number of threads. Default: all cores
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
     /// Write the result to this JSON file; - is standard output, which then has nothing else
@@ -241,9 +243,9 @@ choices!(
 choices!(
     /// Speeds of CFL numbers.
     CflSpeed => verify::CflSpeed {
-        /// That of waves in a bar, sqrt(E/rho0), unless the solution has its own
+        /// Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed
         Bar,
-        /// That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)
+        /// Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)
         PWave,
     }
 );

@@ -12,7 +12,7 @@ use super::values::{finite_number, peer, positive_count, positive_number, role, 
 /// Where another solver's output is, and how it is to be read.
 #[derive(Args)]
 pub(crate) struct ScoreOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or .vtu, .vtp, .vtk
@@ -22,41 +22,41 @@ pub(crate) struct ScoreOptions {
     /// Each file is a recording of its own
     #[arg(long)]
     pub(crate) each: bool,
-    /// What an array is that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
+    /// Role of an array that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
     /// first_piola_kirchhoff, cauchy, kirchhoff, J, density, reference_position, id
     #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
     pub(crate) map: Vec<(verify::Role, String)>,
-    /// What the points of the files are
+    /// Meaning of the points in the files
     #[arg(long, value_enum, default_value_t = Points::Auto)]
     pub(crate) points: Points,
-    /// The time of single frames that do not tell it
+    /// Time of a single frame that does not state it
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) time: Option<f64>,
-    /// By how much velocities lag behind their frame's time: half a time step for staggered schemes
+    /// Time by which velocities lag behind their frame: half a time step in staggered schemes
     #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) velocity_lag: f64,
-    /// The time in which frames are expected, in periods of the solution
+    /// Time in which frames are expected, in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
     /// Cell counts along the solution's cell length, one for each recording
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "h")]
     pub(crate) cells: Vec<usize>,
-    /// Mesh sizes, one for each recording; estimated from the particles when neither is given
+    /// Mesh sizes, one for each recording. Default: estimated from the particles
     #[arg(long, value_name = "H,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) h: Vec<f64>,
-    /// Compare each recording with the next one instead of the exact solution, for orders in time: they differ in nothing but
-    /// the time steps, which these are, each the same part of the one before
+    /// Orders in time: compare each recording with the next one in place of the exact solution. The recordings differ in their
+    /// time steps only; the values are these steps, in a constant ratio
     #[arg(long, value_name = "DT,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with_all = ["cells", "h", "against"])]
     pub(crate) differences: Vec<f64>,
-    /// Run mms itself with this shape function and integrator on the same grids, and compare the errors digit by digit
+    /// Run mms with this shape function and integrator on the same grids, and compare the errors digit by digit
     #[arg(long, value_name = "mms:SHAPE,INTEGRATOR", value_parser = peer, requires = "cells")]
     pub(crate) against: Option<(verify::Shape, verify::Integrator)>,
-    /// Time step times wave speed over grid spacing of those runs, as of the recordings
+    /// CFL number of the runs for --against
     #[arg(long, value_name = "X", default_value_t = 0.4, allow_negative_numbers = true, value_parser = positive_number, requires = "against")]
     pub(crate) cfl: f64,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
-    /// Number of threads; all cores when left out
+    /// Number of threads. Default: all cores
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
     /// Write the result to this JSON file; - is standard output, which then has nothing else

@@ -10,12 +10,12 @@ use super::values::{assignment, shard};
 /// Where finished cases are kept.
 #[derive(Args)]
 pub(crate) struct KeepOptions {
-    /// Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it
-    /// stopped, and several processes may share one
+    /// Keep every finished case in this folder, and read finished cases from it: a study that was killed continues where it
+    /// stopped, and several processes may share the folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Compute those cases alone that fall to shard I of N, by predicted cost, and write no table: the shards of a study run on as
-    /// many machines, in any order, and the same command without this option prints the table. mms batch writes the script
+    /// Compute only the cases of shard I of N, of about equal predicted cost, and write no table. The shards of a study run
+    /// on as many machines, in any order; the same command without this option prints the table. mms batch writes the script
     #[arg(long, value_name = "I/N", requires = "out", value_parser = shard)]
     pub(crate) shard: Option<ShardName>,
 }
@@ -23,7 +23,7 @@ pub(crate) struct KeepOptions {
 /// Values for parameters of a solution.
 #[derive(Args, Clone)]
 pub(crate) struct ParameterOptions {
-    /// Give a parameter another value than its default; repeatable
+    /// Value of a parameter, in place of its default; repeatable
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
     pub(crate) set: Vec<(String, f64)>,
 }

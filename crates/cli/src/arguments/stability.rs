@@ -11,36 +11,39 @@ use super::values::{positive_count, positive_number, sample_count, variation};
 
 #[derive(Args)]
 pub(crate) struct StabilityOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
     /// Number of cells along the solution's cell length
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
     pub(crate) cells: usize,
-    /// What to vary, one or two of them: NAME=VALUE,VALUE,... with the name amplitude, units (mass, length where L is one,
-    /// and time change by powers of two), a parameter of the solution, or cells, ppc, offset, periods, precision, shape,
-    /// integrator, start
+    /// Setting to vary, as NAME=VALUE,VALUE,...; at most two. Names: amplitude; units (mass, length if the solution has a
+    /// length L, and time change by powers of two); a parameter of the solution; cells, ppc, offset, periods, precision,
+    /// shape, integrator, start
     #[arg(long, value_name = "NAME=VALUE,...", value_parser = variation, conflicts_with_all = ["at", "search"])]
     pub(crate) over: Vec<(String, Vec<String>)>,
-    /// How close the stable and the unstable CFL number come, on P-waves, whose number is the larger one
+    /// Largest distance between the stable and the unstable CFL number, on the speed of P-waves
     #[arg(long, value_name = "X", default_value_t = 0.01, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) width: f64,
-    /// CFL number to start from; an eighth of P-waves' when left out. It is halved until it is stable
+    /// CFL number to start from; halved until a run is stable. Default: 1/8 of the number at which a P-wave crosses one cell
+    /// in one step
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) lower: Option<f64>,
-    /// CFL number that is thought unstable; P-waves' own when left out. It is raised until it is unstable
+    /// CFL number that is expected to be unstable; raised until a run is. Default: the number at which a P-wave crosses one
+    /// cell in one step
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) upper: Option<f64>,
-    /// A run is unstable with an error of u above this multiple of a reference run's, at an eighth of P-waves' time step
+    /// A run is unstable if its error of u exceeds this multiple of the error of the reference run, at CFL 0.125 on P-waves
     #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().error_multiple, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) error_multiple: f64,
-    /// A run is unstable if it gains, in a period, more than this multiple of the exact motion's largest energy
+    /// A run is unstable if its energy, in excess of the exact energy and of the reference run's excess, grows faster than this
+    /// multiple of the largest exact energy per period
     #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().energy_rate, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) energy_rate: f64,
-    /// Judge the run at this CFL number alone; exit status 1 if it is unstable
+    /// Run at this CFL number only; exit status 1 if the run is unstable
     #[arg(long, value_name = "CFL", allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "search")]
     pub(crate) at: Option<f64>,
-    /// Look for failures among random settings with CFL numbers up to --cfl on P-waves, which are believed stable; exit
+    /// Look for unstable runs among random settings with CFL numbers up to --cfl on P-waves, which should be stable; exit
     /// status 1 if there are any
     #[arg(long, value_enum)]
     pub(crate) search: Option<SearchKind>,

@@ -7,14 +7,14 @@ use clap_complete::Shell;
 
 #[derive(Args)]
 pub(crate) struct CompletionsOptions {
-    /// The shell that is to complete commands
+    /// Shell that completes the commands
     #[arg(value_enum, value_name = "SHELL")]
     pub(crate) shell: Shell,
 }
 
 #[derive(Args)]
 pub(crate) struct ManOptions {
-    /// Write mms.1 and a page for each command to this folder
+    /// Folder of mms.1 and a page for each command
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
 }

@@ -11,39 +11,39 @@ use super::values::{positive_count, positive_number, seconds, thread_count};
 
 #[derive(Args)]
 pub(crate) struct TradeoffOptions {
-    /// The solution, by name, or a specification file (SPEC.toml); mms --help says where names are looked for
+    /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better
+    /// Time of the whole command, such as 90s, 2m or 1h; what is left is used to repeat timings
     #[arg(long, value_name = "TIME", default_value = "2m", value_parser = seconds)]
     pub(crate) budget: f64,
-    /// Run every scheme that fits on these cell counts, whatever that takes, in place of a sweep within a budget; cases so stated
-    /// can be shared out with --shard
+    /// Run every scheme that fits on these numbers of cells, in place of a sweep within a budget; such cases can be
+    /// distributed with --shard
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive_count, conflicts_with = "budget")]
     pub(crate) cells: Vec<usize>,
     /// CFL numbers for --cells
     #[arg(long, value_name = "X,...", value_delimiter = ',', default_value = "0.4", allow_negative_numbers = true, value_parser = positive_number, requires = "cells")]
     pub(crate) cfls: Vec<f64>,
-    /// Name the cheapest setting with at most this error, and run it once more to confirm it; exit status 1 if there is none
+    /// Name the cheapest setting with at most this error, and run it once more to confirm; exit status 1 if there is none
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) tolerance: Option<f64>,
-    /// Name the most accurate setting whose steps take at most this time, and run it once more to confirm it; exit status 1
-    /// if there is none
+    /// Name the most accurate setting whose steps take at most this time, and run it once more to confirm; exit status 1 if
+    /// there is none
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub(crate) time: Option<f64>,
-    /// Field whose error counts. Errors of u are divided by the amplitude A where the solution has one
+    /// Field whose error is compared. Errors of u are divided by the amplitude A, if the solution has this parameter
     #[arg(long, value_enum, default_value_t = Field::U, ignore_case = true)]
     pub(crate) field: Field,
     /// Norm of the error
     #[arg(long, value_enum, default_value_t = Norm::Linf)]
     pub(crate) norm: Norm,
-    /// Cost that the error is held against
+    /// Cost
     #[arg(long, value_enum, default_value_t = Against::Wall)]
     pub(crate) against: Against,
-    /// End time in periods of the solution
+    /// End time, in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
-    /// Number of threads; 1 when left out, and all cores for comparison
+    /// Number of threads. Default: 1, and all cores for comparison
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
