@@ -24,6 +24,7 @@ mod coverage;
 mod eval;
 mod explain;
 mod generate;
+mod help;
 mod list;
 mod reproduce;
 mod resume;
@@ -52,6 +53,7 @@ pub(crate) use coverage::CoverageOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
 pub(crate) use generate::GenerateOptions;
+pub(crate) use help::examples;
 pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
@@ -120,39 +122,39 @@ pub(crate) fn color_of(arguments: &[OsString]) -> Color {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// List the solutions and their parameters
+    /// List the solutions: dimension, law, boundary conditions
     List(ListOptions),
-    /// Compare every field of a solution with the field below it; all solutions when none is named
-    Check(CheckOptions),
-    /// Prove the accuracy of every field over a whole range of inputs, with a certificate; or check one (--check FILE)
-    Certify(CertifyOptions),
-    /// Tell what a solution models, what it exercises, and what its body force costs
+    /// Describe a solution: its formulas, the terms of the momentum balance that it tests, the cost of a run
     Explain(ExplainOptions),
-    /// Measure which terms of the momentum balance each solution exercises, and name the fewest that test them all
+    /// Tabulate the terms of the momentum balance that each solution tests, and name the fewest solutions that test all
     Coverage(CoverageOptions),
-    /// Write a solution in the language of a host, anywhere
+    /// Check every field by numerical differentiation: v against du/dt, F against du/dX, b against a - Div P/rho0
+    Check(CheckOptions),
+    /// Prove bounds of the rounding errors of every field over a range of inputs, or check such a certificate (--check FILE)
+    Certify(CertifyOptions),
+    /// Write the fields of a solution in the language of a host code
     Gen(GenerateOptions),
-    /// Evaluate the exact fields at points of your own
+    /// Evaluate the exact fields at given points
     Eval(EvalOptions),
     /// Run one simulation and measure its errors
     Run(RunOptions),
-    /// Go on with a run that wrote checkpoints and was stopped or killed, to the same bits
+    /// Continue a run that was stopped or killed from its last checkpoint, to the same bits
     Resume(ResumeOptions),
     /// Measure orders of accuracy over grids (--cells 16,32,64) or time steps (--cells 32 --cfls 0.1,0.2,0.4)
     Converge(ConvergeOptions),
     /// Find the largest stable CFL number by bisection, over one or two settings or parameters
     Stability(StabilityOptions),
-    /// Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each setting buys
+    /// Measure error against cost over all schemes that fit, and name the cheapest setting for an error
     Tradeoff(TradeoffOptions),
+    /// Measure errors and orders of another solver from its output files
+    Score(ScoreOptions),
     /// Write the script that runs a study in shards, or a run, on a cluster
     Batch(BatchOptions),
-    /// Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv)
-    Score(ScoreOptions),
-    /// Repeat the original study on both of its problems, with a report, tables, data and particle files
+    /// Repeat the study of Wallstedt and Guilkey on both of its problems, with a report, tables, data and particle files
     Reproduce(ReproduceOptions),
-    /// Write the script that lets a shell complete commands and options
+    /// Write the script that completes commands, options and names of solutions in a shell
     Completions(CompletionsOptions),
-    /// Write the pages of the manual
+    /// Write the manual pages
     Man(ManOptions),
     /// Write the whole command line as Markdown
     #[command(hide = true)]
@@ -161,13 +163,11 @@ pub(crate) enum Command {
 
 /// Where solutions are found, for the help and the book.
 const WHERE: &str = "\
-A solution is named, or given as a path. A path ends in .toml or has a separator, and is the
-specification in that file. A name is looked for, in this order: as NAME.toml in mms-specs of
-the working folder, then of each folder above it; in the folders that the variable MMSMITH_SPECS
-lists, as PATH lists those of programs; among the solutions built in. Where the first file found
-is the text that a built-in solution was generated from, the generated code serves. Any other
-file is interpreted, and a file that differs from the built-in solution of its name is told on
-standard error. mms list says where each solution comes from.";
+A solution is given by its name or by a path. A path ends in .toml or has a separator: the solution is the specification in this file. A \
+name is looked for in this order: as NAME.toml in mms-specs of the working folder, then of each folder above it; in the folders of the \
+variable MMSMITH_SPECS, which has the form of PATH; among the built-in solutions. A file with the text of a built-in solution uses the \
+generated code. Any other file is interpreted, and mms says on standard error if it differs from the built-in solution of its name. mms \
+list says where each solution comes from.";
 
 /// The command line as it is read.
 ///
@@ -188,9 +188,11 @@ pub(crate) fn line() -> clap::Command {
             argument.allow_negative_numbers(true)
         }
     };
-    Arguments::command()
+    let line = Arguments::command()
         .after_long_help(WHERE)
         .mut_subcommands(|command| command.mut_args(with_hyphens))
+        .mut_subcommands(help::with_examples);
+    help::with_groups(line)
 }
 
 #[cfg(test)]

@@ -49,13 +49,15 @@ fn a_file_in_the_folder_is_usable_by_name_at_once() {
     let called = mms(&deep, "check of-ones-own --points 20");
     assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
     let called = mms(&deep, "list");
+    assert!(called.stdout.contains("of-ones-own: ../../mms-specs/of-ones-own.toml\n"));
+    let called = mms(&deep, "list --long");
     assert!(called.stdout.contains("of-ones-own (1D, cartesian)"), "{}", called.stdout);
     assert!(called.stdout.contains("../../mms-specs/of-ones-own.toml"), "{}", called.stdout);
     // The nearest folder wins.
     fs::create_dir(deep.join("mms-specs")).expect("a folder");
     let nearer = of_ones_own().replacen("title = '", "title = 'Nearer: ", 1);
     put(&deep, "of-ones-own", &nearer);
-    assert!(mms(&deep, "list").stdout.contains("cartesian): Nearer: "));
+    assert!(mms(&deep, "list --long").stdout.contains("cartesian): Nearer: "));
 }
 
 #[test]

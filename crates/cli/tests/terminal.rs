@@ -122,6 +122,7 @@ fn tables_fit_every_terminal() {
     }
     for arguments in [
         "list",
+        "list --long",
         "explain ring",
         "check ring axis-aligned-3d",
         "check ring --thorough --points 4",

@@ -1,8 +1,7 @@
 //! `mms list`: what there is.
 
 use anyhow::Result;
-use mmsmith_solutions::Description;
-use mmsmith_spec::{Diagnostic, Spec};
+use mmsmith_spec::{Condition, Diagnostic};
 use serde_json::{Value, json};
 
 use crate::arguments::ListOptions;
@@ -13,15 +12,11 @@ use crate::{number, terminal};
 
 pub(crate) fn list(options: &ListOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
-    let mut text = String::new();
-    let mut rows = Vec::new();
+    let mut entries = Vec::new();
     let mut unreadable = Vec::new();
     for name in names() {
         match entry(&name) {
-            Ok(entry) => {
-                text += &entry.text();
-                rows.push(entry.document());
-            }
+            Ok(entry) => entries.push(entry),
             // One mistake in a file does not hide the others.
             Err(error) => {
                 let problem = match error.downcast_ref::<Diagnostic>() {
@@ -35,7 +30,11 @@ pub(crate) fn list(options: &ListOptions) -> Result<bool> {
             }
         }
     }
-    terminal::say(&text)?;
+    terminal::say(&match options.long {
+        true => entries.iter().map(Entry::text).collect(),
+        false => short(&entries),
+    })?;
+    let rows: Vec<Value> = entries.iter().map(Entry::document).collect();
     if let Some(output) = output {
         let settings = json!({ "version": env!("CARGO_PKG_VERSION") });
         let mut document =
@@ -56,6 +55,8 @@ struct Entry {
     reference: String,
     coordinates: String,
     dimension: usize,
+    law: &'static str,
+    boundaries: Vec<&'static str>,
     parameters: Vec<Parameter>,
 }
 
@@ -69,32 +70,10 @@ struct Parameter {
 
 fn entry(name: &str) -> Result<Entry> {
     let origin = locate(name)?;
-    Ok(match origin {
-        Origin::BuiltIn(description) => of_description(description, origin),
-        Origin::File { .. } => of_specification(name, origin.specification()?, origin),
-    })
-}
-
-fn of_description(description: &Description, origin: Origin) -> Entry {
-    let parameters = description.parameters.iter().map(|parameter| Parameter {
-        name: parameter.name.to_owned(),
-        default: parameter.default,
-        unit: parameter.unit.to_owned(),
-        admissible: parameter.admissible.to_owned(),
-        description: parameter.description.to_owned(),
-    });
-    Entry {
-        name: description.name.to_owned(),
-        origin,
-        title: description.title.to_owned(),
-        reference: description.reference.to_owned(),
-        coordinates: description.coordinates.to_owned(),
-        dimension: description.dimension,
-        parameters: parameters.collect(),
-    }
-}
-
-fn of_specification(name: &str, spec: Spec, origin: Origin) -> Entry {
+    let spec = origin.specification()?;
+    let mut boundaries: Vec<_> = spec.boundaries.iter().filter_map(|b| word(b.condition)).collect();
+    boundaries.sort_unstable();
+    boundaries.dedup();
     let parameters = spec.parameters.into_iter().map(|parameter| Parameter {
         name: parameter.name,
         default: parameter.default,
@@ -102,20 +81,52 @@ fn of_specification(name: &str, spec: Spec, origin: Origin) -> Entry {
         admissible: parameter.range,
         description: parameter.description,
     });
-    Entry {
+    Ok(Entry {
         name: name.to_owned(),
         origin,
         title: spec.title,
         reference: spec.reference,
         coordinates: spec.coordinates.name().to_owned(),
         dimension: spec.dimension,
+        law: spec.material.name(),
+        boundaries,
         parameters: parameters.collect(),
+    })
+}
+
+/// A boundary condition in one word; planes of symmetry cut the body and are no boundary of it.
+fn word(condition: Condition) -> Option<&'static str> {
+    match condition {
+        Condition::Sliding => Some("sliding"),
+        Condition::Symmetry => None,
+        Condition::TractionFree => Some("free"),
+        Condition::PrescribedTraction => Some("loaded"),
+        Condition::PrescribedMotion => Some("moved"),
     }
 }
 
+/// A line for each solution, and the files of those that have one.
+fn short(entries: &[Entry]) -> String {
+    let mut table = Table::new(5, ["name", "", "law", "sides", ""]).flowing(24);
+    let mut files = String::new();
+    for Entry { name, origin, title, dimension, law, boundaries, .. } in entries {
+        let sides = boundaries.join(", ");
+        table.row([name.clone(), format!("{dimension}D"), (*law).to_owned(), sides, title.clone()]);
+        if matches!(origin, Origin::File { .. }) {
+            files += &format!("{name}: {}\n", origin.words());
+        }
+    }
+    format!("{}{files}{LEGEND}", table.text())
+}
+
+const LEGEND: &str = "\
+sides: moved = given displacement, loaded = given traction, free, sliding
+mms list --long: parameters and references; mms explain NAME: formulas
+";
+
 impl Entry {
     fn text(&self) -> String {
-        let Self { name, origin, title, reference, coordinates, dimension, parameters } = self;
+        let Self { name, origin, title, reference, coordinates, dimension, parameters, .. } = self;
         let mut text = format!("{name} ({dimension}D, {coordinates}): {title}\n");
         if !reference.is_empty() {
             text += &format!("  {reference}\n");

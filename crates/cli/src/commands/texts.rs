@@ -3,18 +3,31 @@
 use std::fs;
 
 use anyhow::{Context, Result};
+use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
+use mmsmith_solutions::CATALOGUE;
 
-use crate::arguments::{CompletionsOptions, ManOptions, line};
+use crate::arguments::{CompletionsOptions, ManOptions, examples, line};
 use crate::json::Output;
 use crate::terminal;
 
 /// Says the script that lets a shell complete commands.
 pub(crate) fn completions(options: &CompletionsOptions) -> Result<bool> {
     let mut script = Vec::new();
-    clap_complete::generate(options.shell, &mut line(), "mms", &mut script);
+    let mut line = line().mut_subcommands(|command| command.mut_args(with_names));
+    clap_complete::generate(options.shell, &mut line, "mms", &mut script);
     terminal::print(&script)?;
     Ok(true)
+}
+
+/// An argument that names solutions, with the names of those built in.
+fn with_names(argument: Arg) -> Arg {
+    let names = argument.get_value_names().unwrap_or_default();
+    match names.iter().any(|name| *name == "NAME|SPEC.toml") {
+        true => argument
+            .value_parser(PossibleValuesParser::new(CATALOGUE.iter().map(|known| known.name))),
+        false => argument,
+    }
 }
 
 /// Writes the pages of the manual, one for each command.
@@ -73,6 +86,13 @@ fn described(command: &Command) -> String {
     }
     for argument in own {
         text += &item(argument);
+    }
+    let examples = examples(command.get_name());
+    if !examples.is_empty() {
+        text += "\nExamples:\n\n";
+    }
+    for (line, purpose) in examples {
+        text += &format!("- `{line}`: {purpose}\n");
     }
     if let Some(more) = command.get_after_long_help() {
         text += &format!("\n{more}\n");
