@@ -44,9 +44,16 @@ pub(crate) struct ScoreOptions {
     /// Mesh sizes, one for each recording. Default: estimated from the particles
     #[arg(long, value_name = "H,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) h: Vec<f64>,
+    /// Orders to be met: a number for u, or by field and norm, such as u=2,v=1,cauchy.l2=1. A missed order gives exit
+    /// status 1. Default: the error of every recorded field must fall, with an L2 order of at least 0.5
+    #[arg(long, value_name = "ORDERS")]
+    pub(crate) expect: Option<String>,
+    /// How far the order on the finest pair may be from the expected one. Default: 0.1
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) tolerance: Option<f64>,
     /// Orders in time: compare each recording with the next one in place of the exact solution. The recordings differ in their
     /// time steps only; the values are these steps, in a constant ratio
-    #[arg(long, value_name = "DT,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with_all = ["cells", "h", "against"])]
+    #[arg(long, value_name = "DT,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = positive_number, conflicts_with_all = ["cells", "h", "against", "expect", "tolerance"])]
     pub(crate) differences: Vec<f64>,
     /// Run mms with this shape function and integrator on the same grids, and compare the errors digit by digit
     #[arg(long, value_name = "mms:SHAPE,INTEGRATOR", value_parser = peer, requires = "cells")]

@@ -256,15 +256,19 @@ impl Chosen {
         Ok(Self(chosen))
     }
 
+    pub(super) fn head(&self, role: Role) -> Option<&ArrayHead> {
+        self.0.get(&role)
+    }
+
     pub(super) fn name(&self, role: Role) -> Option<&str> {
-        self.0.get(&role).map(|array| array.name.as_str())
+        self.head(role).map(|array| array.name.as_str())
     }
 }
 
 /// The name of the positions among the arrays of a table.
 const POINTS: &str = "Points";
 /// Text of so many digits gives a double in most cases; 17 always do.
-const DIGITS_OF_A_DOUBLE: usize = 15;
+pub(super) const DIGITS_OF_A_DOUBLE: usize = 15;
 
 /// The names of a frame's arrays, for messages.
 pub(super) fn there(snapshot: &Snapshot) -> String {

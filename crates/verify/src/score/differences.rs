@@ -11,10 +11,12 @@ use mmsmith_measure::{RUNS, Row, over_particles};
 use mmsmith_runtime::{AnySolution, BLOCK, Solution};
 use serde::Serialize;
 
+use crate::dimension::in_dimension;
 use crate::order::Order;
 
 use super::findings::Remarks;
 use super::frame::FrameData;
+use super::points::{Taken, decide};
 use super::recording::{Opened, status};
 use super::times::{TIME_SLACK, open};
 use super::{Input, Quantity, Remark, ScoreError, ScoreOptions, orders};
@@ -77,28 +79,38 @@ pub fn compare_recordings(
             return Err(ScoreError::Ratio { coarse: pair[0], fine: pair[1], ratio });
         }
     }
-    let row = |(pair, dt): (&[Input], &f64)| match exact {
-        AnySolution::One(exact) => compare(exact.as_ref(), &pair[0], &pair[1], *dt, options),
-        AnySolution::Two(exact) => compare(exact.as_ref(), &pair[0], &pair[1], *dt, options),
-        AnySolution::Three(exact) => compare(exact.as_ref(), &pair[0], &pair[1], *dt, options),
-        _ => Err(ScoreError::Dimension),
-    };
-    let rows = inputs.windows(2).zip(steps).map(row).collect::<Result<Vec<_>, _>>()?;
+    let rows = in_dimension!(
+        exact,
+        |exact| compare_all(exact, inputs, steps, options),
+        else Err(ScoreError::Dimension)
+    )?;
     let values = rows.iter().map(|row| (row.dt, (row.status == "ok").then_some(&row.differences)));
     Ok(Differences { orders: orders(&values.collect::<Vec<_>>()), rows })
 }
 
+fn compare_all<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    inputs: &[Input],
+    steps: &[f64],
+    options: &ScoreOptions,
+) -> Result<Vec<DifferenceRow>, ScoreError> {
+    let taken = decide(exact, inputs, options)?.taken;
+    let both: Vec<_> = inputs.iter().zip(&taken).collect();
+    let pairs = both.windows(2).zip(steps);
+    pairs.map(|(pair, dt)| compare(exact, pair[0], pair[1], *dt, options)).collect()
+}
+
 fn compare<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    one: &Input,
-    other: &Input,
+    (one, one_taken): (&Input, &Taken),
+    (other, other_taken): (&Input, &Taken),
     dt: f64,
     options: &ScoreOptions,
 ) -> Result<DifferenceRow, ScoreError> {
     let mut remarks = Remarks::default();
     let mut of_other = Remarks::default();
-    let coarse = Opened::new(exact, one, options, &mut remarks)?;
-    let fine = Opened::new(exact, other, options, &mut of_other)?;
+    let coarse = Opened::new(exact, one, options, one_taken, &mut remarks)?;
+    let fine = Opened::new(exact, other, options, other_taken, &mut of_other)?;
     let slack = TIME_SLACK * options.periods * exact.period();
     let mut frames = 0;
     let mut particles = 0;
@@ -106,10 +118,10 @@ fn compare<const D: usize>(
     let mut velocities_apart = false;
     let mut of_coarse = coarse.reader(exact, options, &mut remarks);
     let mut of_fine = fine.reader(exact, options, &mut of_other);
-    for frame in &coarse.timed {
-        let same = fine.timed.iter().position(|fine| (fine.time - frame.time).abs() <= slack);
+    for frame in &coarse.found.timed {
+        let same = fine.found.timed.iter().position(|fine| (fine.time - frame.time).abs() <= slack);
         let Some(place) = same else { continue };
-        let twin = &fine.timed[place];
+        let twin = &fine.found.timed[place];
         let a = of_coarse.frame(&open(&frame.file)?, frame.time, frames)?;
         let b = of_fine.frame(&open(&twin.file)?, twin.time, frames)?;
         let pairs = pairs(&a, &b).ok_or_else(|| ScoreError::Apart {
@@ -139,11 +151,11 @@ fn compare<const D: usize>(
             other: other.path().to_owned(),
         });
     }
-    let left_out = coarse.timed.len() - frames;
+    let left_out = coarse.found.timed.len() - frames;
     if left_out > 0 {
         let what = format!(
             "{left_out} of {} frames have no frame of {} at their time",
-            coarse.timed.len(),
+            coarse.found.timed.len(),
             other.path().display()
         );
         remarks.note("not-common", false, what);

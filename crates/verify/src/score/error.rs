@@ -86,7 +86,7 @@ pub enum ScoreError {
     /// Particles of two frames cannot be told apart.
     #[error(
         "{}: it holds {found} particles, the first frame {expected}, and there is no array of identities \
-         (--map id=NAME) to find them by", path.display()
+         (--map id=NAME) to find them by; if each file is a recording of its own: --each", path.display()
     )]
     Unmatched {
         /// The file.

@@ -7,7 +7,8 @@ use serde::Serialize;
 pub struct Remark {
     /// What it is about, such as `not-finite` or `single-precision`.
     pub kind: &'static str,
-    /// Whether the errors are not those of the whole recording, or of nothing sensible. Such a row has no part in orders.
+    /// Whether the errors are not those of the whole recording, or of nothing sensible. Such a row has no part in
+    /// orders, unless the problem is the size of its errors alone.
     pub is_problem: bool,
     /// How many particles, frames or files it concerns; over all frames.
     pub count: usize,

@@ -9,12 +9,16 @@ mod arrays;
 mod differences;
 mod error;
 mod findings;
+mod found;
 mod frame;
+mod judgement;
 mod options;
+mod points;
 mod quantity;
 mod recording;
 mod reference;
 mod row;
+mod scales;
 mod times;
 mod vectors;
 
@@ -23,6 +27,7 @@ pub use arrays::Role;
 pub use differences::{DifferenceRow, Differences, compare_recordings};
 pub use error::ScoreError;
 pub use findings::Remark;
+pub use judgement::{Convergence, Judgement};
 pub use options::{Input, Points, Resolution, ScoreOptions};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
@@ -30,10 +35,12 @@ pub use row::{ScoreRow, Source};
 use std::collections::{BTreeMap, BTreeSet};
 
 use mmsmith_measure::norms::PerNorm;
-use mmsmith_runtime::AnySolution;
+use mmsmith_runtime::{AnySolution, Solution};
+use points::decide;
 use recording::recording;
 use serde::Serialize;
 
+use crate::dimension::in_dimension;
 use crate::order::Order;
 
 /// What all recordings gave.
@@ -43,9 +50,11 @@ pub struct Score {
     pub rows: Vec<ScoreRow>,
     /// The orders with respect to `h`, where there are several rows.
     pub orders: Option<BTreeMap<Quantity, PerNorm<Order>>>,
+    /// Whether they converge.
+    pub verdict: Judgement,
 }
 
-/// Scores recordings against the exact solution, with the orders over them.
+/// Scores recordings against the exact solution, with the orders over them and the verdict.
 ///
 /// # Errors
 ///
@@ -59,15 +68,27 @@ pub fn score(
         let (what, value) = ("periods", options.periods);
         return Err(ScoreError::Setting { what, value, admissible: "a positive number" });
     }
-    let row = |input| match exact {
-        AnySolution::One(exact) => recording(exact.as_ref(), input, options),
-        AnySolution::Two(exact) => recording(exact.as_ref(), input, options),
-        AnySolution::Three(exact) => recording(exact.as_ref(), input, options),
-        _ => Err(ScoreError::Dimension),
-    };
-    let rows = inputs.iter().map(row).collect::<Result<Vec<_>, _>>()?;
-    let errors = rows.iter().map(|row| (row.h, row.is_ok().then_some(&row.errors)));
-    Ok(Score { orders: orders(&errors.collect::<Vec<_>>()), rows })
+    in_dimension!(exact, |exact| score_in(exact, inputs, options), else Err(ScoreError::Dimension))
+}
+
+fn score_in<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    inputs: &[Input],
+    options: &ScoreOptions,
+) -> Result<Score, ScoreError> {
+    let decision = decide(exact, inputs, options)?;
+    let row = |(input, taken)| recording(exact, input, options, taken);
+    let rows = inputs.iter().zip(&decision.taken).map(row).collect::<Result<Vec<_>, _>>()?;
+    let errors = rows.iter().map(|row| (row.h, row.is_whole().then_some(&row.errors)));
+    let orders = orders(&errors.collect::<Vec<_>>());
+    let mut verdict = Judgement::of(&rows, options);
+    if let Some(points) = decision.other {
+        let other = score_in(exact, inputs, &ScoreOptions { points, ..options.clone() })?.verdict;
+        if (other.kind, other.passed) != (verdict.kind, verdict.passed) {
+            verdict.doubt("it depends on whether points are reference or current positions; --points tells it");
+        }
+    }
+    Ok(Score { rows, orders, verdict })
 }
 
 /// The errors of a recording, by quantity and norm.

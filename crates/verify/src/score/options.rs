@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mmsmith_measure::norms::PerNorm;
 use mmsmith_vtk::Provenance;
 
 use super::arrays::Role;
+use super::quantity::Quantity;
+use crate::verdict::ORDER_TOLERANCE;
 
 /// What the points of the files are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,6 +37,10 @@ pub struct ScoreOptions {
     pub periods: f64,
     /// The solution that the recordings are compared with; that a file tells another one is a remark.
     pub provenance: Option<Provenance>,
+    /// Orders that are expected, field by field and norm by norm.
+    pub expected: BTreeMap<Quantity, PerNorm<Option<f64>>>,
+    /// How far from them the order on the finest pair may be.
+    pub tolerance: f64,
 }
 
 impl Default for ScoreOptions {
@@ -45,6 +52,8 @@ impl Default for ScoreOptions {
             velocity_lag: 0.0,
             periods: 1.0,
             provenance: None,
+            expected: BTreeMap::new(),
+            tolerance: ORDER_TOLERANCE,
         }
     }
 }

@@ -2,29 +2,30 @@
 
 use std::array;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use mmsmith_measure::norms::PerNorm;
 use mmsmith_runtime::Solution;
 use mmsmith_vtk::Provenance;
-use mmsmith_vtk::foreign::{Snapshot, frames};
+use mmsmith_vtk::foreign::ArrayHead;
 use nalgebra::SVector;
 
-use super::arrays::{Chosen, Role};
+use super::arrays::{Chosen, DIGITS_OF_A_DOUBLE, Role};
 use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
+use super::found::Found;
 use super::frame::{FrameErrors, FrameReader, Identities};
 use super::options::{Input, Resolution, ScoreOptions};
+use super::points::Taken;
 use super::quantity::Quantity;
 use super::reference::{Scheme, scheme};
-use super::row::{ScoreRow, Source};
-use super::times::{TIME_SLACK, Timed, any_velocity_time, open, times};
+use super::row::{EXCEEDS_MOTION, ScoreRow, Source};
+use super::scales::{Grain, Scales};
+use super::times::{TIME_SLACK, any_velocity_time, open};
 
 /// A recording, and how its frames are read.
 pub(super) struct Opened<const D: usize> {
-    /// At least one.
-    pub(super) timed: Vec<Timed>,
-    first: Snapshot,
-    chosen: Chosen,
+    pub(super) found: Found,
     scheme: Scheme<D>,
     has_velocity_times: bool,
 }
@@ -34,19 +35,17 @@ impl<const D: usize> Opened<D> {
         exact: &dyn Solution<f64, D>,
         input: &Input,
         options: &ScoreOptions,
+        taken: &Taken,
         remarks: &mut Remarks,
     ) -> Result<Self, ScoreError> {
-        let mut files = vec![];
-        for path in &input.paths {
-            files.extend(frames(path)?);
+        let found = Found::new(exact, input, options, remarks)?;
+        let scheme = scheme(exact, &found, taken.at_rest, remarks)?;
+        if let Some(Remark { kind, is_problem, message, .. }) = &taken.told {
+            remarks.note(kind, *is_problem, message);
         }
-        let timed = times(exact, files, input.path(), options, remarks)?;
-        let first = open(&timed[0].file)?;
-        let chosen = Chosen::find::<D>(&first, &options.map, remarks)?;
-        let scheme = scheme(exact, &timed, &first, &chosen, options, remarks)?;
-        let has_velocity_times =
-            chosen.name(Role::Velocity).is_some() && any_velocity_time(&timed, &first)?;
-        Ok(Self { timed, first, chosen, scheme, has_velocity_times })
+        let has_velocity_times = found.chosen.name(Role::Velocity).is_some()
+            && any_velocity_time(&found.timed, &found.first)?;
+        Ok(Self { found, scheme, has_velocity_times })
     }
 
     pub(super) fn reader<'a>(
@@ -57,7 +56,7 @@ impl<const D: usize> Opened<D> {
     ) -> FrameReader<'a, D> {
         FrameReader {
             exact,
-            chosen: &self.chosen,
+            chosen: &self.found.chosen,
             scheme: &self.scheme,
             options,
             has_velocity_times: self.has_velocity_times,
@@ -79,9 +78,22 @@ impl<const D: usize> Opened<D> {
         }
     }
 
+    /// How finely the numbers of the files are written.
+    fn grain(&self) -> Grain {
+        let Found { first, chosen, .. } = &self.found;
+        Grain {
+            points: first.points().filter(|points| points.is_single).map_or(0.0, |_| SINGLE),
+            fields: Quantity::ALL.map(|field| chosen.head(field.role()).map_or(0.0, grain_of)),
+            u_is_difference: matches!(
+                self.scheme,
+                Scheme::Given { displacement: false } | Scheme::Traced(_)
+            ),
+        }
+    }
+
     /// Tells of a file that names another solution or other parameters.
     fn tell_provenance(&self, options: &ScoreOptions, remarks: &mut Remarks) {
-        if let (Some(asked), Some(told)) = (&options.provenance, self.first.provenance())
+        if let (Some(asked), Some(told)) = (&options.provenance, self.found.first.provenance())
             && let Some(what) = other_provenance(asked, &told)
         {
             remarks.note("other-provenance", false, what);
@@ -90,17 +102,35 @@ impl<const D: usize> Opened<D> {
 
     /// Tells where a single frame stands for the whole time `end`.
     fn tell_single_frame(&self, end: f64, remarks: &mut Remarks) {
-        let later = self.timed.iter().filter(|frame| frame.time > TIME_SLACK * end).count();
+        let timed = &self.found.timed;
+        let later = timed.iter().filter(|frame| frame.time > TIME_SLACK * end).count();
         if later == 1 {
             let what = format!(
                 "one frame after t = 0 stands for the whole time: at t = {:?} errors may be much smaller than between. Ten frames, \
                  evenly spread, tell more",
-                self.timed[self.timed.len() - 1].time
+                timed[timed.len() - 1].time
             );
             remarks.note("one-frame", false, what);
         }
     }
 }
+
+/// The share of a number that 32 bits cut off.
+const SINGLE: f64 = f32::EPSILON as f64 / 2.0;
+
+/// The share of an array's values that the file cuts off.
+fn grain_of(head: &ArrayHead) -> f64 {
+    if head.is_single {
+        return SINGLE;
+    }
+    match head.digits {
+        Some(digits) if digits < DIGITS_OF_A_DOUBLE => 10.0_f64.powi(-(digits as i32)),
+        _ => 0.0,
+    }
+}
+
+/// An error of this share of the motion is as large as the motion.
+const AS_LARGE: f64 = 0.99;
 
 /// The largest norms over the frames.
 #[derive(Default)]
@@ -111,6 +141,7 @@ struct Totals {
     transposed: [PerNorm<f64>; 2],
     density_from_rest: PerNorm<f64>,
     displacement: PerNorm<f64>,
+    scales: Scales,
     /// The frames that have each field.
     compared: [usize; 8],
     h: f64,
@@ -125,7 +156,7 @@ impl Totals {
         reader: &mut FrameReader<'_, D>,
     ) -> Result<Self, ScoreError> {
         let mut totals = Self { h: f64::NAN, ..Self::default() };
-        for (index, frame) in opened.timed.iter().enumerate() {
+        for (index, frame) in opened.found.timed.iter().enumerate() {
             let data = reader.frame(&open(&frame.file)?, frame.time, index)?;
             if index == 0 {
                 totals.h = match resolution {
@@ -137,6 +168,7 @@ impl Totals {
             for (count, is_there) in totals.compared.iter_mut().zip(data.fields()) {
                 *count += usize::from(is_there);
             }
+            totals.scales.add(exact, &data.X, frame.time);
             totals.add(&data.errors(exact, frame.time));
         }
         Ok(totals)
@@ -221,6 +253,18 @@ impl Totals {
             }
         }
     }
+
+    /// Tells where the body moves less than the error of its displacement.
+    fn tell_excess(&self, remarks: &mut Remarks) {
+        let (error, motion) = (self.errors[0].l2, self.displacement.l2);
+        if error >= AS_LARGE * motion && self.scales.is_motion(motion) {
+            let exceeds = if error > motion { "exceeds" } else { "is as large as" };
+            let what = format!(
+                "the error of u {exceeds} the motion itself: {error:.2e} for displacements of {motion:.2e} (L2)"
+            );
+            remarks.note(EXCEEDS_MOTION, true, what);
+        }
+    }
 }
 
 /// The errors of one recording.
@@ -228,17 +272,20 @@ pub(super) fn recording<const D: usize>(
     exact: &dyn Solution<f64, D>,
     input: &Input,
     options: &ScoreOptions,
+    taken: &Taken,
 ) -> Result<ScoreRow, ScoreError> {
     let mut remarks = Remarks::default();
-    let opened = Opened::new(exact, input, options, &mut remarks)?;
+    let opened = Opened::new(exact, input, options, taken, &mut remarks)?;
     let mut reader = opened.reader(exact, options, &mut remarks);
     let totals = Totals::of(&opened, exact, input.resolution, &mut reader)?;
-    totals.tell_missing(&opened.chosen, opened.timed.len(), &mut remarks);
+    totals.tell_missing(&opened.found.chosen, opened.found.timed.len(), &mut remarks);
     totals.tell_transposed(&mut remarks);
     opened.tell_provenance(options, &mut remarks);
     totals.tell_density(&mut remarks);
     opened.tell_single_frame(options.periods * exact.period(), &mut remarks);
     totals.tell_overflow(&mut remarks);
+    totals.tell_excess(&mut remarks);
+    tell_several(&input.paths, &mut remarks);
     if input.resolution == Resolution::Estimated {
         let what = "h is estimated, as the spacing of as many points spread evenly over their bounding box; --cells or \
                     --h tells it";
@@ -246,7 +293,7 @@ pub(super) fn recording<const D: usize>(
     }
     let findings = remarks.list();
     let (reference_positions, displacements) = opened.sources();
-    let span = opened.timed.iter().map(|frame| frame.time);
+    let span = opened.found.timed.iter().map(|frame| frame.time);
     Ok(ScoreRow {
         file: input.path().display().to_string(),
         cells: match input.resolution {
@@ -254,8 +301,8 @@ pub(super) fn recording<const D: usize>(
             _ => None,
         },
         h: totals.h,
-        particles: opened.first.particles(),
-        frames: opened.timed.len(),
+        particles: opened.found.first.particles(),
+        frames: opened.found.timed.len(),
         first_time: span.clone().fold(f64::INFINITY, f64::min),
         last_time: span.fold(f64::NEG_INFINITY, f64::max),
         reference_positions,
@@ -264,8 +311,30 @@ pub(super) fn recording<const D: usize>(
         status: status(&findings),
         errors: totals.errors(),
         exact_displacement: totals.displacement.l2,
+        floors: totals.scales.floors(exact, &opened.grain()),
         findings,
     })
+}
+
+/// Tells of frames that may be recordings of their own.
+fn tell_several(paths: &[PathBuf], remarks: &mut Remarks) {
+    if paths.len() < 2 || !remarks.has("unequal-particles") {
+        return;
+    }
+    let numbers: Option<Vec<&str>> = paths.iter().map(|path| last_number(path)).collect();
+    let is_series = |numbers: &Vec<&str>| numbers.windows(2).all(|pair| pair[0] != pair[1]);
+    let cells = numbers.filter(is_series).map_or("N,...".into(), |numbers| numbers.join(","));
+    let what = format!(
+        "the {} files are taken as frames of one recording; if each is a recording of its own: --each --cells {cells}",
+        paths.len()
+    );
+    remarks.note("several-recordings", false, what);
+}
+
+/// The last whole number in a file's name.
+fn last_number(path: &Path) -> Option<&str> {
+    let stem = path.file_stem()?.to_str()?;
+    stem.rsplit(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty())
 }
 
 /// `ok`, or the problems.

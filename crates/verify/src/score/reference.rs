@@ -11,8 +11,8 @@ use crate::inverse::inverse;
 use super::arrays::{Chosen, Role, there};
 use super::error::ScoreError;
 use super::findings::Remarks;
-use super::options::{Points, ScoreOptions};
-use super::times::{Timed, open};
+use super::found::Found;
+use super::times::Timed;
 use super::vectors::positions;
 
 /// Steps of Newton's method from a position back to its reference position.
@@ -37,32 +37,19 @@ pub(super) struct Traced<const D: usize> {
     pub(super) places: Option<HashMap<i64, usize>>,
 }
 
-/// Decides how reference positions and displacements come about.
+/// Decides how reference positions and displacements come about; `is_at_rest` tells whether points are reference positions.
 pub(super) fn scheme<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    timed: &[Timed],
-    first: &Snapshot,
-    chosen: &Chosen,
-    options: &ScoreOptions,
+    found: &Found,
+    is_at_rest: bool,
     remarks: &mut Remarks,
 ) -> Result<Scheme<D>, ScoreError> {
+    let Found { timed, first, chosen } = found;
     let displacement = chosen.name(Role::Displacement);
     if chosen.name(Role::ReferencePosition).is_some() {
         return Ok(Scheme::Given { displacement: displacement.is_some() });
     }
     if displacement.is_some() {
-        let is_at_rest = match options.points {
-            Points::Reference => true,
-            Points::Current => false,
-            Points::Auto => points_are_at_rest(timed, first, chosen)?,
-        };
-        if is_at_rest && options.points == Points::Auto {
-            remarks.note(
-                "points-at-rest",
-                false,
-                "the points do not move while displacements change: they are taken as reference positions",
-            );
-        }
         return Ok(if is_at_rest { Scheme::PointsAtRest } else { Scheme::Recovered });
     }
     if timed.len() < 2 {
@@ -72,24 +59,6 @@ pub(super) fn scheme<const D: usize>(
         });
     }
     trace(exact, &timed[0], first, chosen, remarks)
-}
-
-/// Whether points stay where they are, to the bit, while displacements change.
-fn points_are_at_rest(
-    timed: &[Timed],
-    first: &Snapshot,
-    chosen: &Chosen,
-) -> Result<bool, ScoreError> {
-    let Some(name) = chosen.name(Role::Displacement) else { return Ok(false) };
-    let positions = first.positions()?;
-    let displacement = first.floats(name)?;
-    for frame in &timed[1..] {
-        let snapshot = open(&frame.file)?;
-        if snapshot.floats(name)? != displacement {
-            return Ok(snapshot.positions()? == positions);
-        }
-    }
-    Ok(false)
 }
 
 /// Finds the reference positions behind the positions of the first frame.

@@ -68,15 +68,28 @@ pub struct ScoreRow {
     pub errors: BTreeMap<Quantity, PerNorm<f64>>,
     /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
     pub exact_displacement: f64,
+    /// For each field the error that rounding alone may cause, of the files' numbers too.
+    #[serde(skip)]
+    pub floors: BTreeMap<Quantity, f64>,
     /// Everything else that has to be known; problems first.
     #[serde(skip)]
     pub findings: Vec<Remark>,
 }
 
+/// The kind of the problem that the error of u is larger than u.
+pub(super) const EXCEEDS_MOTION: &str = "exceeds-motion";
+
 impl ScoreRow {
-    /// Whether the recording is whole and sensible, so that its errors have a part in orders.
+    /// Whether nothing is wrong with the recording.
     #[must_use]
     pub fn is_ok(&self) -> bool {
         self.status == "ok"
+    }
+
+    /// Whether the recording is whole, so that its errors, however large, have a part in orders.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        let is_of_size = |finding: &Remark| !finding.is_problem || finding.kind == EXCEEDS_MOTION;
+        self.findings.iter().all(is_of_size)
     }
 }

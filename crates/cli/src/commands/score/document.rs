@@ -1,0 +1,69 @@
+//! The JSON document of a comparison.
+
+use std::collections::BTreeMap;
+
+use mmsmith_verify::{Remark, Score};
+use serde_json::{Value, json};
+
+use crate::arguments::ScoreOptions;
+use crate::library::Selection;
+
+/// What every document of the command says.
+pub(super) fn settings(selection: &Selection, options: &ScoreOptions) -> Value {
+    let map: BTreeMap<_, _> = options.map.iter().map(|(role, name)| (role.name(), name)).collect();
+    let mut document = json!({
+        "schema": "mmsmith.score/1",
+        "settings": {
+            "version": env!("CARGO_PKG_VERSION"),
+            "solution": selection.name(),
+            "parameters": selection.parameters(),
+            "files": options.files,
+            "each": options.each,
+            "map": map,
+            "points": options.points,
+            "time": options.time,
+            "velocity_lag": options.velocity_lag,
+            "periods": options.periods,
+        },
+    });
+    if options.expect.is_some() || options.tolerance.is_some() {
+        document["settings"]["expect"] = json!(options.expect);
+        document["settings"]["tolerance"] = json!(options.tolerance);
+    }
+    if let Some((shape, integrator)) = options.against {
+        document["settings"]["against"] =
+            json!({ "shape": shape.name(), "integrator": integrator.name(), "cfl": options.cfl });
+    }
+    document
+}
+
+/// What has to be known of each row.
+pub(super) fn findings<'a>(rows: impl Iterator<Item = (&'a String, &'a [Remark])>) -> Value {
+    let mut all = vec![];
+    for (index, (file, findings)) in rows.enumerate() {
+        for finding in findings {
+            all.push(json!({
+                "row": index,
+                "file": file,
+                "kind": finding.kind,
+                "problem": finding.is_problem,
+                "count": finding.count,
+                "frames": finding.frames,
+                "message": finding.message,
+            }));
+        }
+    }
+    all.into()
+}
+
+pub(super) fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Value {
+    let mut document = settings(selection, options);
+    document["rows"] = json!(score.rows);
+    document["findings"] = findings(score.rows.iter().map(|row| (&row.file, &row.findings[..])));
+    if let Some(orders) = &score.orders {
+        document["orders"] = json!(orders);
+    }
+    document["verdict"] = json!(score.verdict);
+    document["passed"] = json!(score.verdict.passed);
+    document
+}

@@ -1,0 +1,159 @@
+//! A comparison in words and tables.
+
+use mmsmith_verify::{Agreement, Differences, Order, PerNorm, Quantity, Remark, Score, ScoreRow};
+
+use crate::arguments::ScoreOptions;
+use crate::library::Selection;
+use crate::number;
+use crate::table::{self, Table};
+
+/// Recordings compared with each other.
+pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> String {
+    let mut text = format!("{} ({})\n", selection.name(), selection.told_parameters());
+    for row in &compared.rows {
+        text += &format!(
+            "{} and {}: {} particles, {} frame(s) at the same times\n",
+            row.file, row.other, row.particles, row.frames
+        );
+        text += &told(&row.findings);
+    }
+    let mut fields: Vec<_> =
+        compared.rows.iter().flat_map(|row| row.differences.keys().copied()).collect();
+    fields.sort_unstable();
+    fields.dedup();
+    for field in fields {
+        let mut table = Table::new(0, ["dt", "linf", "rate", "l2", "rate", "l1", "rate", "status"]);
+        for (index, row) in compared.rows.iter().enumerate() {
+            let mut line = vec![table::error(row.dt)];
+            for norm in mmsmith_verify::Norm::ALL {
+                let value = row.differences.get(&field).map_or(f64::NAN, |norms| norms[norm]);
+                let order = compared.orders.as_ref().and_then(|orders| orders.get(&field));
+                let local = order.zip(index.checked_sub(1));
+                let local = local.and_then(|(order, pair)| order[norm].local[pair]);
+                line.extend([table::error(value), table::rate(local)]);
+            }
+            line.push(if row.status == "ok" { "ok" } else { "PROBLEM" }.into());
+            table.row(line);
+        }
+        text += &format!("\ndifference of {field}\n{}", table.text());
+    }
+    text
+}
+
+pub(super) fn text(selection: &Selection, score: &Score) -> String {
+    let mut text = format!("{} ({})\n", selection.name(), selection.told_parameters());
+    for row in &score.rows {
+        text += &heading(row);
+    }
+    match &score.orders {
+        None => text += &score.rows.iter().map(errors).collect::<String>(),
+        Some(_) => {
+            for (field, table) in tables(score) {
+                text += &format!("\nerror of {field}\n{}", table.text());
+            }
+        }
+    }
+    text
+}
+
+/// What was read, and what is to be said about it.
+fn heading(row: &ScoreRow) -> String {
+    let mut text = format!(
+        "{}: {} particles, {} frame(s) from t = {:?} to {:?}, h = {:?}\n",
+        row.file, row.particles, row.frames, row.first_time, row.last_time, row.h
+    );
+    text += &format!("  reference positions: {}\n", row.reference_positions.words());
+    text += &format!("  displacements: {}\n", row.displacements.words());
+    if row.is_ok() {
+        text += "  status: ok\n";
+    }
+    text + &told(&row.findings)
+}
+
+fn told(findings: &[Remark]) -> String {
+    let line = |finding: &Remark| {
+        let label = if finding.is_problem { "PROBLEM" } else { "note" };
+        format!("  {label}: {}\n", finding.message)
+    };
+    findings.iter().map(line).collect()
+}
+
+/// The errors of one recording.
+fn errors(row: &ScoreRow) -> String {
+    let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
+    for (field, norms) in &row.errors {
+        if row.fields.contains(field) {
+            let mut cells = vec![field.to_string()];
+            cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
+            table.row(cells);
+        }
+    }
+    table.text()
+}
+
+/// One table for each field that any recording has: a row a recording, and the rate right of each norm.
+fn tables(score: &Score) -> Vec<(Quantity, Table)> {
+    let Some(orders) = &score.orders else { return vec![] };
+    let known =
+        orders.iter().filter(|(field, _)| score.rows.iter().any(|row| row.fields.contains(field)));
+    let table = |(field, order): (&Quantity, &PerNorm<Order>)| {
+        let header =
+            ["cells", "particles", "h", "linf", "rate", "l2", "rate", "l1", "rate", "status"];
+        let mut table = Table::new(0, header).sparing(7..9).sparing(1..2).sparing(5..7);
+        for (index, row) in score.rows.iter().enumerate() {
+            let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
+            let mut line = vec![cells, row.particles.to_string(), table::error(row.h)];
+            for (norm, order) in order.iter() {
+                let value = row.errors.get(field).map_or(f64::NAN, |norms| norms[norm]);
+                let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
+                line.extend([table::error(value), table::rate(local)]);
+            }
+            line.push(if row.is_ok() { "ok" } else { "PROBLEM" }.into());
+            table.row(line);
+        }
+        let mut fit = vec!["fit in h".to_owned(), String::new(), String::new()];
+        for (_, order) in order.iter() {
+            fit.extend([String::new(), table::rate(order.fit)]);
+        }
+        table.row(fit);
+        (*field, table)
+    };
+    known.map(table).collect()
+}
+
+/// Whether the recordings converge, and whether they passed.
+pub(super) fn verdict(score: &Score) -> String {
+    let passed = match score.verdict.passed {
+        Some(true) => "passed: ",
+        Some(false) => "FAILED: ",
+        None => "",
+    };
+    format!("\nverdict: {passed}{}\n", score.verdict.message)
+}
+
+/// Errors of the recording and of the run beside it.
+pub(super) fn of_agreement(
+    options: &ScoreOptions,
+    row: &ScoreRow,
+    agreement: &Agreement,
+) -> String {
+    let header = ["error", "linf", "mms", "digits", "l2", "mms", "digits", "l1", "mms", "digits"];
+    let mut table = Table::new(1, header).sparing(7..10);
+    for (field, digits) in &agreement.digits {
+        let mut line = vec![field.to_string()];
+        for (norm, digits) in digits.iter() {
+            let (theirs, ours) = (row.errors[field][norm], agreement.errors[field][norm]);
+            line.extend([table::error(theirs), table::error(ours), format!("{digits:.1}")]);
+        }
+        table.row(line);
+    }
+    let scheme = options.against.map(|(shape, integrator)| format!("{shape} + {integrator}"));
+    format!(
+        "\n{} beside mms, {}, {} steps of dt = {}\n{}",
+        row.file,
+        scheme.unwrap_or_default(),
+        agreement.run.steps,
+        number::exact(agreement.run.dt),
+        table.text()
+    )
+}
