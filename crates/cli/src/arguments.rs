@@ -175,6 +175,8 @@ list says where each solution comes from.";
 /// without that, clap takes them for options that do not exist.
 pub(crate) fn line() -> clap::Command {
     let with_hyphens = |argument: Arg| {
+        let takes_values = argument.get_action().takes_values();
+        let argument = argument.ignore_case(takes_values);
         let is_option = argument.get_long().is_some() && argument.get_action().takes_values();
         let is_path = argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
         if !is_option || is_path {

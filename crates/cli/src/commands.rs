@@ -150,17 +150,21 @@ fn settings(
 
 /// One line that says what was simulated.
 fn caption(selection: &Selection, settled: &Settled, extent: Option<Extent>) -> String {
+    let threads = number::counted(rayon::current_num_threads(), "thread");
+    format!("{} {}, {threads}\n", selection.name(), setting(selection, settled, extent))
+}
+
+/// Parameters and scheme in words, for pictures too.
+fn setting(selection: &Selection, settled: &Settled, extent: Option<Extent>) -> String {
     let Case { scheme, per_cell, periods, .. } = settled.case;
     let Parts { shape, integrator, .. } = scheme.parts();
     let extent = extent.map(|extent| format!(", {extent}")).unwrap_or_default();
     format!(
-        "{} ({}){extent}: {shape} + {integrator}{}, {per_cell} particles per cell and direction, {} period(s), {}, {} thread(s)\n",
-        selection.name(),
+        "({}){extent}: {shape} + {integrator}{}, {per_cell} particles per cell and direction, {}, {}",
         selection.told_parameters(),
         scheme::words(&scheme),
-        number::exact(periods),
+        number::of_periods(periods),
         word(settled.precision),
-        rayon::current_num_threads(),
     )
 }
 

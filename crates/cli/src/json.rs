@@ -15,7 +15,11 @@ use crate::terminal;
 const ROOM: usize = 1 << 20;
 
 /// A document that will be written at the end of some work, to a place found to be writable before it.
-pub(crate) struct Output(Place);
+pub(crate) struct Output {
+    place: Place,
+    /// The file as the user called it, where users are to be told that it is written.
+    told: Option<String>,
+}
 
 enum Place {
     /// A file that replaces what has its name, once it is complete.
@@ -32,7 +36,7 @@ impl Output {
     pub(crate) fn prepare(path: &Path) -> Result<Self> {
         if path == Path::new("-") {
             terminal::reserve()?;
-            return Ok(Self(Place::Standard));
+            return Ok(Self::at(Place::Standard));
         }
         // A link stays a link; what it points to is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -41,17 +45,23 @@ impl Output {
             bail!("cannot write {shown}: it is a folder");
         }
         if path.exists() && !path.is_file() {
-            return Ok(Self(Place::Device(path)));
+            return Ok(Self::at(Place::Device(path)));
         }
         WholeFile::sweep(&path);
         let mut file = WholeFile::create(&path).with_context(|| format!("cannot write {shown}"))?;
         file.probe_room(ROOM).with_context(|| format!("no room for {shown}"))?;
-        Ok(Self(Place::File { path, file }))
+        Ok(Self::at(Place::File { path, file }))
     }
 
-    /// [`Output::prepare`] where a file was asked for. Of several processes the first one writes what all have done.
+    /// [`Output::prepare`] where a file was asked for; once it is written, standard output says so. Of several processes the first
+    /// one writes what all have done.
     pub(crate) fn prepare_if(path: Option<&PathBuf>) -> Result<Option<Self>> {
-        path.filter(|_| processes::is_first()).map(|path| Self::prepare(path)).transpose()
+        let Some(path) = path.filter(|_| processes::is_first()) else { return Ok(None) };
+        Ok(Some(Self { told: Some(path.display().to_string()), ..Self::prepare(path)? }))
+    }
+
+    fn at(place: Place) -> Self {
+        Self { place, told: None }
     }
 
     /// Writes `value` and gives the file its name.
@@ -67,14 +77,15 @@ impl Output {
 
     /// Writes `bytes` and gives the file its name.
     pub(crate) fn write_bytes(self, bytes: &[u8]) -> Result<()> {
-        let (written, path) = match self.0 {
+        let (written, path) = match self.place {
             Place::Standard => return terminal::print(bytes),
             Place::Device(path) => (fs::write(&path, bytes), path),
             Place::File { path, mut file } => {
                 (file.write_all(bytes).and_then(|()| file.finish()), path)
             }
         };
-        written.with_context(|| format!("cannot write {}", path.display()))
+        written.with_context(|| format!("cannot write {}", path.display()))?;
+        self.told.map_or(Ok(()), |file| terminal::say_written(&file))
     }
 }
 

@@ -29,6 +29,7 @@ mod progress;
 mod svg;
 mod table;
 mod terminal;
+mod units;
 
 use std::ffi::OsString;
 

@@ -297,6 +297,14 @@ impl Selection {
         }
     }
 
+    /// The number of space dimensions.
+    pub(crate) fn dimension(&self) -> usize {
+        match &self.source {
+            Source::Library(description) => description.dimension,
+            Source::File(source) => source.0.dimension,
+        }
+    }
+
     /// The solution in double precision.
     pub(crate) fn build(&self) -> Result<AnySolution<f64>> {
         match &self.source {

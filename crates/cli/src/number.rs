@@ -19,6 +19,16 @@ pub(crate) fn rounded(value: f64, digits: usize) -> String {
     text.parse().map_or(text, exact)
 }
 
+/// A count and what is counted: `1 thread`, `2 threads`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+}
+
+/// A number of periods: `1 period`, `0.5 periods`.
+pub(crate) fn of_periods(count: f64) -> String {
+    if count == 1.0 { "1 period".into() } else { format!("{} periods", exact(count)) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

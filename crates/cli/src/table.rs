@@ -44,8 +44,13 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The same with the unit of what the columns `named` hold, as `h [m]`.
-    pub(crate) fn with_unit(mut self, named: &[&str], unit: &str) -> Self {
+    /// The same with the unit of what the columns `named` hold, as `h [m]`, where it is known.
+    pub(crate) fn with_unit<'a>(
+        mut self,
+        named: &[&str],
+        unit: impl Into<Option<&'a str>>,
+    ) -> Self {
+        let Some(unit) = unit.into() else { return self };
         for cell in self.rows.first_mut().into_iter().flatten() {
             if named.contains(&cell.as_str()) {
                 *cell = format!("{cell} [{unit}]");

@@ -160,6 +160,11 @@ pub(crate) fn say(text: &str) -> Result<()> {
     print(text.as_bytes())
 }
 
+/// Says that a file is written, unless the user wants results alone.
+pub(crate) fn say_written(file: &str) -> Result<()> {
+    if is_quiet() { Ok(()) } else { say(&format!("wrote {file}\n")) }
+}
+
 /// Writes to standard output; a reader that went away, such as `head`, is no error.
 pub(crate) fn print(bytes: &[u8]) -> Result<()> {
     let mut output = io::stdout().lock();

@@ -8,7 +8,7 @@ use std::fs;
 #[test]
 fn list_names_every_solution_and_its_parameters() {
     let place = tempfile::tempdir().unwrap();
-    let called = mms(place.path(), "list --json list.json");
+    let called = mms(place.path(), "list --long --json list.json");
     assert_eq!(called.status, 0, "{}", called.stderr);
     for word in ["axis-aligned", "ring", "rho0", "Young"] {
         assert!(called.stdout.contains(word), "{}", called.stdout);
@@ -80,8 +80,8 @@ fn the_search_for_rounding_errors_goes_on_from_its_state() {
     assert!(called.stdout.contains("searched"), "{}", called.stdout);
     let worst: Vec<&str> =
         called.stdout.lines().skip_while(|line| *line != "The worst of all:").collect();
-    // Four lines, each with every input, and the meaning of K.
-    assert_eq!(worst.len(), 6, "{}", called.stdout);
+    // Four lines, each with every input, the meaning of K, and the file.
+    assert_eq!(worst.len(), 7, "{}", called.stdout);
     assert!(worst[1..5].iter().all(|line| line.contains("found by ") && line.contains(" rho0 = ")));
     let read = |name: &str| read_json(&place.join(name));
     let rows = read("out.json")["results"][0]["accuracy"].as_array().unwrap().clone();
@@ -148,7 +148,7 @@ fn eval_gives_all_fields_at_each_point() {
     assert_eq!(rows[1]["u"][0], 0.05);
     assert_eq!(rows[0]["P"][1].as_array().unwrap().len(), 2);
     let written = mms(place.path(), "eval axis-aligned --points in.json --json out.json");
-    assert_eq!((written.status, written.stdout.as_str()), (0, ""));
+    assert_eq!((written.status, written.stdout.as_str()), (0, "wrote out.json\n"));
     assert_eq!(read_json(&place.path().join("out.json")), fields);
 }
 
@@ -183,22 +183,50 @@ fn eval_writes_tables_and_arrays() {
         &[],
         points,
     );
-    assert_eq!((called.status, called.stdout.as_str()), (0, ""), "{}", called.stderr);
+    let wrote = "wrote out.csv\nwrote arrays\nwrote out.json\n";
+    assert_eq!((called.status, called.stdout.as_str()), (0, wrote), "{}", called.stderr);
     let rows = read_json(&place.join("out.json"))["rows"].clone();
     let table = fs::read_to_string(place.join("out.csv")).unwrap();
     let lines: Vec<_> = table.lines().collect();
     assert_eq!(lines.len(), 3);
     assert_eq!(
         lines[0],
-        "u1,u2,v1,v2,a1,a2,H11,H12,H21,H22,F11,F12,F21,F22,J,P11,P12,P21,P22,b1,b2"
+        "X,Y,t,u1,u2,v1,v2,a1,a2,H11,H12,H21,H22,F11,F12,F21,F22,J,P11,P12,P21,P22,b1,b2"
     );
     let second: Vec<f64> = lines[2].split(',').map(|number| number.parse().unwrap()).collect();
-    assert_eq!(rows[1]["P"][0][1], second[16]);
+    assert_eq!(rows[1]["P"][0][1], second[19]);
     let P = fs::read(place.join("arrays/P.npy")).unwrap();
     let numbers: Vec<f64> =
         P[128..].chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
-    assert_eq!(numbers[4..], second[15..19]);
+    assert_eq!(numbers[4..], second[18..22]);
     assert!(place.join("arrays/J.npy").is_file());
+}
+
+#[test]
+fn eval_reads_tables_as_it_writes_them() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    fs::write(place.join("in.csv"), "id, x, y, T\n7, 0.6, 0.3, 0.01\n8, 5e-1, 0.1, 0.02\n")
+        .unwrap();
+    assert_eq!(mms(place, "eval ring --points in.csv --csv one.csv").status, 0);
+    assert_eq!(mms(place, "eval ring --points one.csv --csv two.csv").status, 0);
+    let read = |name: &str| fs::read_to_string(place.join(name)).unwrap();
+    assert!(read("one.csv").lines().nth(2).unwrap().starts_with("0.5,0.1,0.02,"));
+    assert_eq!(read("one.csv"), read("two.csv"));
+    // The same numbers as from JSON, and from standard input.
+    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0.5, 0.1], "t": 0.02 } ]"#;
+    let called = mms_with(place, "eval ring --points - --csv -", &[], points);
+    assert_eq!(called.stdout, read("one.csv"), "{}", called.stderr);
+    for (text, expected) in [
+        ("X,t\n0.6,0\n", &["columns X,Y,t", "no column Y among X,t"][..]),
+        ("X,Y\n0.6,0\n", &["no column t"]),
+        ("X,Y,t\n0.6,0.3,0\n0.6,three,0\n", &["row 2", "'three' in column Y"]),
+        ("X,Y,t\n0.6,0.3,nan\n", &["row 1", "no finite number"]),
+        ("X,Y,t\n0.6,0.3\n", &["row 1"]),
+    ] {
+        fs::write(place.join("in.csv"), text).unwrap();
+        refuses(place, "eval ring --points in.csv", &[&["in.csv"], expected].concat());
+    }
 }
 
 #[test]

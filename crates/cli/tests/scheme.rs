@@ -196,7 +196,7 @@ fn the_steps_of_every_scheme_are_shared_among_threads() {
         let call = format!("run axis-aligned-1d --cells 8 {scheme} --threads 2 --json row.json");
         let called = mms(place, &call);
         assert_eq!(called.status, 0, "{}", called.stderr);
-        assert!(called.stdout.contains(", 2 thread(s)\n"), "{scheme}: {}", called.stdout);
+        assert!(called.stdout.contains(", 2 threads\n"), "{scheme}: {}", called.stdout);
         assert_eq!(read_json(&place.join("row.json"))["settings"]["threads"], 2, "{scheme}");
     }
 }

@@ -137,12 +137,53 @@ fn converge_in_time_keeps_a_failed_case_as_a_row() {
 }
 
 #[test]
+fn grids_that_are_too_few_or_too_many_are_answered_with_the_command_that_was_meant() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "converge axis-aligned-1d --cells 8");
+    assert!(called.stderr.contains("at least two, such as --cells 8,16"), "{}", called.stderr);
+    let called = mms(place.path(), "converge axis-aligned-1d --cells 8,16");
+    assert_eq!(called.stderr, "");
+    let several = ["mms converge takes several, as --cells 8,16"];
+    refuses(place.path(), "run axis-aligned --cells 8,16", &several);
+    // Letters of any case.
+    let called = mms(place.path(), "run axis-aligned-1d --cells 4 --shape GIMP --integrator CD");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+}
+
+/// What a run and a study write is named, with the units of the solution in it.
+#[test]
+fn files_are_named_and_pictures_tell_units_and_scheme() {
+    let place = tempfile::tempdir().unwrap();
+    let call =
+        "run axis-aligned --cells 4 --plot drift.svg --picture p.svg --history h.csv --json r.json";
+    let called = mms(place.path(), call);
+    for file in ["drift.svg", "p.svg", "h.csv", "r.json"] {
+        assert!(called.stdout.contains(&format!("wrote {file}\n")), "{}", called.stdout);
+    }
+    assert!(called.stdout.contains(" steps of dt = 0.001 s, CFL 0.4\n"), "{}", called.stdout);
+    for field in ["  u [m] ", "  v [m/s] ", "  F ", "  P [Pa] "] {
+        assert!(called.stdout.contains(field), "{}", called.stdout);
+    }
+    let called = mms(place.path(), "converge axis-aligned --cells 4,8 --plot study.svg");
+    assert!(called.stdout.ends_with("wrote study.svg\n"), "{}", called.stdout);
+    let read = |name: &str| std::fs::read_to_string(place.path().join(name)).unwrap();
+    for (name, told) in
+        [("p.svg", "x [m]"), ("study.svg", "grid spacing h [m]"), ("study.svg", "error of u [m]")]
+    {
+        assert!(read(name).contains(told), "{name}: {told}");
+    }
+    for name in ["p.svg", "study.svg"] {
+        assert!(read(name).contains("gimp + cd") && read(name).contains("E = 10000"), "{name}");
+    }
+}
+
+#[test]
 fn differences_on_one_grid_show_the_order_in_time_that_total_errors_hide() {
     let place = tempfile::tempdir().unwrap();
     let call = "converge axis-aligned --integrator usl --cells 8 --cfls 0.2,0.1,0.05 --expect 1 --json study.json";
     let called = mms(place.path(), call);
     assert_eq!(called.status, 0, "{}", called.stdout);
-    assert!(called.stdout.contains("difference of u on this grid"), "{}", called.stdout);
+    assert!(called.stdout.contains("difference of u [m] on this grid"), "{}", called.stdout);
     let study = read_json(&place.path().join("study.json"));
     assert_eq!(keys(&study["temporal"]), "orders rows times verdicts");
     assert_eq!(study["temporal"]["times"].as_array().unwrap().len(), 5);
@@ -511,7 +552,7 @@ fn a_run_draws_its_particles_at_a_time_with_axes_and_units() {
     // What was measured until then is told all the same.
     let called = mms(place, stopped);
     assert!(called.status == 1 && called.stdout.contains("STOPPED"), "{}", called.stderr);
-    for part in ["--picture", "did not come to 1 period(s)", "--at"] {
+    for part in ["--picture", "did not come to 1 period,", "--at"] {
         assert!(called.stderr.contains(part), "{}", called.stderr);
     }
 }

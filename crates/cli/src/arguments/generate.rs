@@ -29,11 +29,11 @@ pub(crate) struct GenerateOptions {
 /// Hosts, with a line about each.
 fn hosts() -> impl TypedValueParser<Value = &'static Host> {
     let values = HOSTS.iter().map(|own| PossibleValue::new(own.name).help(own.about));
-    PossibleValuesParser::new(values).try_map(|name| Host::named(&name).ok_or(name))
+    PossibleValuesParser::new(values).try_map(|name| Host::named(&name.to_lowercase()).ok_or(name))
 }
 
 /// Faults, with a line about each.
 fn faults() -> impl TypedValueParser<Value = Fault> {
     let values = Fault::ALL.map(|own| PossibleValue::new(own.name()).help(own.about()));
-    PossibleValuesParser::new(values).try_map(|name| name.parse::<Fault>())
+    PossibleValuesParser::new(values).try_map(|name| name.to_lowercase().parse::<Fault>())
 }

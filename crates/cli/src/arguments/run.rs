@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::scheme::SchemeOptions;
-use super::values::{positive_count, time};
+use super::values::{cell_count, time};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
@@ -14,7 +14,7 @@ pub(crate) struct RunOptions {
     pub(crate) name: String,
     /// Number of cells along the solution's cell length. Default: 32; 16 in 3D if mms chose the total Lagrangian formulation
     /// itself
-    #[arg(long, value_name = "N", value_parser = positive_count)]
+    #[arg(long, value_name = "N", value_parser = cell_count)]
     pub(crate) cells: Option<usize>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,

@@ -158,13 +158,14 @@ impl FromStr for Weights {
 
 fn weights() -> impl TypedValueParser<Value = Weights> {
     let values = Weights::all().map(|own| PossibleValue::new(own.name()).help(own.about()));
-    PossibleValuesParser::new(values).try_map(|name| name.parse::<Weights>())
+    PossibleValuesParser::new(values).try_map(|name| name.to_lowercase().parse::<Weights>())
 }
 
 fn integrators() -> impl TypedValueParser<Value = verify::Integrator> {
     let all = verify::Integrator::ALL;
     let values = all.map(|own| PossibleValue::new(own.name()).help(own.about()));
-    PossibleValuesParser::new(values).try_map(|name| name.parse::<verify::Integrator>())
+    PossibleValuesParser::new(values)
+        .try_map(|name| name.to_lowercase().parse::<verify::Integrator>())
 }
 
 /// Formulations.

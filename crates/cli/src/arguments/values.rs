@@ -24,6 +24,14 @@ pub(super) fn thread_count(text: &str) -> Result<usize, String> {
         .ok_or_else(|| "it must be a whole number from 1 to 1024".into())
 }
 
+/// A number of cells of one run.
+pub(super) fn cell_count(text: &str) -> Result<usize, String> {
+    positive_count(text).map_err(|error| match text.split(',').count() {
+        0 | 1 => error,
+        _ => format!("it must be one whole number; mms converge takes several, as --cells {text}"),
+    })
+}
+
 /// A shard of a study, as `3/8`.
 pub(super) fn shard(text: &str) -> Result<ShardName, String> {
     let parts = text.trim().split_once('/').and_then(|(index, count)| {

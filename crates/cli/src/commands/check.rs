@@ -220,9 +220,8 @@ fn text(
     claims: &Claims,
 ) -> String {
     let verdict = if passed { "passed" } else { "FAILED" };
-    let sets = parameters.len();
-    let mut text =
-        format!("{name}: {verdict} at {} points, {sets} set(s) of parameters\n", report.points);
+    let sets = number::counted(parameters.len(), "set");
+    let mut text = format!("{name}: {verdict} at {} points, {sets} of parameters\n", report.points);
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
     let mut table = Table::new(3, header).sparing(4..5).sparing(6..7);

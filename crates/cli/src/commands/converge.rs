@@ -19,6 +19,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
+use crate::units::{self, Units, with_unit};
 use crate::{csv, expect, terminal};
 
 /// Orders of every field and norm, judged.
@@ -38,6 +39,12 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let settled = &Settled::settle(&said, &model.exact)?;
     let base = Case { cells: options.cells[0], ..settled.case };
     let extent = model.admit(&sweep.cases(&base))?;
+    if let (Sweep::Cells(_), [only]) = (&sweep, options.cells.as_slice()) {
+        terminal::warn(format_args!(
+            "one grid has errors and no order: give at least two, such as --cells {only},{}; three show whether the order holds",
+            2 * only
+        ));
+    }
     let keep = Keep::open(
         &options.kept,
         &options.name,
@@ -127,14 +134,18 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         });
 
         let caption = caption(&selection, settled, extent);
+        let units = Units::of(&selection);
+        let (length, time) = (units.map(Units::length), units.map(Units::time));
         let mut sections: Vec<(String, Table)> = Vec::new();
         for (field, table) in tables(&study, &sweep, &judged) {
-            sections.push((format!("error of {field}"), table));
+            let table = table.with_unit(&["h"], length);
+            sections.push((format!("error of {}", units::named(field, units)), table));
         }
         let mut notes = stops(&study);
         if let Some((found, judged)) = &differences {
             for (field, table) in difference_tables(found, judged) {
-                sections.push((format!("difference of {field} on this grid"), table));
+                let title = format!("difference of {} on this grid", units::named(field, units));
+                sections.push((title, table.with_unit(&["dt"], time)));
             }
             sections.push(("verdicts on the differences".into(), verdict_table(judged, "dt")));
             notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
@@ -193,8 +204,10 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         if let Some(file) = plot {
             let floor = round_off(&model, &base, &sweep)?;
             let title = format!("{}: error of u", selection.name());
+            let note = super::setting(&selection, settled, extent);
             let found = differences.as_ref().map(|(found, _)| found);
-            file.write_text(&picture(&title, &study, &sweep, found, floor))?;
+            let told = Told { title: &title, note: &note, units };
+            file.write_text(&picture(&told, &study, &sweep, found, floor))?;
         }
         Ok(passed != Some(false))
     })
@@ -588,18 +601,28 @@ fn round_off(model: &Model, base: &Case, sweep: &Sweep) -> Result<f64> {
     Ok(largest)
 }
 
+/// What a picture says of its study.
+struct Told<'a> {
+    title: &'a str,
+    note: &'a str,
+    units: Option<Units>,
+}
+
 /// The displacement error of one study in all norms, and in time the largest difference.
 fn picture(
-    title: &str,
+    told: &Told<'_>,
     study: &Study,
     sweep: &Sweep,
     differences: Option<&Temporal>,
     floor: f64,
 ) -> String {
-    let (x, orders) = match sweep {
-        Sweep::Cells(_) => ("grid spacing h", &study.orders.u),
-        Sweep::Cfls(_) => ("time step dt", &study.orders.u),
+    let Told { title, note, units } = *told;
+    let orders = &study.orders.u;
+    let x = match sweep {
+        Sweep::Cells(_) => with_unit("grid spacing h", units.map(Units::length)),
+        Sweep::Cfls(_) => with_unit("time step dt", units.map(Units::time)),
     };
+    let y = with_unit("error of u", units.map(Units::length));
     let curve = |norm: Norm| {
         let cases = study.rows.iter().map(|row| {
             let step = if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt };
@@ -612,7 +635,8 @@ fn picture(
     if let Some(found) = differences {
         curves.push(difference_curve("L_inf of the difference", found));
     }
-    Plot { title, x, y: "error of u", curves, orders: &[1, 2], floor: Some(floor) }.svg()
+    let floor = Some(floor);
+    Plot { title, x: &x, y: &y, curves, note, orders: &[1, 2], floor }.svg()
 }
 
 /// The largest difference of `u` over the time step.

@@ -1,13 +1,15 @@
 //! `mms eval`: exact fields at the caller's points.
 
+mod points;
+
 use std::iter;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{FieldRow, evaluate};
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use crate::arguments::EvalOptions;
 use crate::input::Source;
@@ -16,11 +18,8 @@ use crate::library::Selection;
 use crate::npy;
 use crate::progress::Bar;
 use crate::terminal;
+use points::Point;
 
-const FORM: &str = r#"{ "X": [numbers], "t": number, "par": { "NAME": number, ... } }"#;
-
-/// More bytes of points than memory has room for, once each of them is a tree of values.
-const LONGEST: u64 = 1 << 30;
 /// So many points are evaluated between two looks at the bar.
 const PORTION: usize = 4096;
 /// So many points that are not right are named; of the others the number is told.
@@ -29,7 +28,7 @@ const MOST_NAMED: usize = 5;
 pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let file = Source::of(&options.points);
-    let entries = read(file)?;
+    let points = points::read(file, &selection)?;
     let json_file = Output::prepare_if(options.json.as_ref())?;
     let csv_file = Output::prepare_if(options.csv.as_ref())?;
     if let Some(folder) = &options.npy {
@@ -38,27 +37,27 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
 
     let solution = selection.build()?;
     let bar = Bar::new("points");
-    let mut rows = Vec::with_capacity(entries.len());
-    for portion in entries.chunks(PORTION) {
+    let mut rows = Vec::with_capacity(points.len());
+    for portion in points.chunks(PORTION) {
         let first = rows.len();
         let evaluated: Vec<Result<FieldRow>> =
-            portion.par_iter().map(|entry| evaluate_entry(&selection, &solution, entry)).collect();
+            portion.par_iter().map(|point| fields_at(&selection, &solution, point)).collect();
         for (index, row) in evaluated.into_iter().enumerate() {
-            let place = || format!("{file}, entry {} (counted from 0)", first + index);
-            rows.push(row.with_context(place)?);
+            rows.push(row.with_context(|| points::place(file, first + index))?);
         }
         bar.show_share(
-            || format!("{} of {} points", rows.len(), entries.len()),
-            rows.len() as f64 / entries.len() as f64,
+            || format!("{} of {} points", rows.len(), points.len()),
+            rows.len() as f64 / points.len() as f64,
         );
     }
     drop(bar);
 
     if let Some(file) = csv_file {
-        file.write_text(&csv(&rows))?;
+        file.write_text(&csv(&points, &rows))?;
     }
     if let Some(folder) = &options.npy {
         write_arrays(folder, &rows)?;
+        terminal::say_written(&folder.display().to_string())?;
     }
     let only_elsewhere = options.csv.is_some() || options.npy.is_some();
     if json_file.is_some() || !only_elsewhere {
@@ -106,12 +105,17 @@ fn judge(file: Source, rows: &[FieldRow]) -> bool {
     bad == 0
 }
 
-/// A header and a line for each point, entries of matrices row by row; numbers in shortest round-trip form.
-fn csv(rows: &[FieldRow]) -> String {
+/// A header and a line for each point: its place and time, then the fields, entries of matrices row by row; numbers in shortest
+/// round-trip form.
+fn csv(points: &[Point], rows: &[FieldRow]) -> String {
     let mut text = String::new();
-    for (index, row) in rows.iter().enumerate() {
+    for (index, (Point { X, t, .. }, row)) in points.iter().zip(rows).enumerate() {
         let fields = row.named();
         if index == 0 {
+            for name in &points::AXES[..X.len().min(points::AXES.len())] {
+                text += &format!("{name},");
+            }
+            text += "t,";
             let names = fields.iter().flat_map(|(name, shape, values)| {
                 (0..values.len()).map(move |entry| match shape[..] {
                     [] => (*name).to_owned(),
@@ -122,9 +126,9 @@ fn csv(rows: &[FieldRow]) -> String {
             text.push_str(&names.collect::<Vec<_>>().join(","));
             text.push('\n');
         }
-        let values =
-            fields.iter().flat_map(|(.., values)| values).map(|value| format!("{value:?}"));
-        text.push_str(&values.collect::<Vec<_>>().join(","));
+        let place = X.iter().chain([t]);
+        let values = place.chain(fields.iter().flat_map(|(.., values)| values));
+        text.push_str(&values.map(|value| format!("{value:?}")).collect::<Vec<_>>().join(","));
         text.push('\n');
     }
     text
@@ -143,59 +147,15 @@ fn write_arrays(folder: &Path, rows: &[FieldRow]) -> Result<()> {
     Ok(())
 }
 
-/// The list of points; their form is judged one by one.
-fn read(file: Source) -> Result<Vec<Value>> {
-    let value: Value = serde_json::from_str(&file.short_text(LONGEST)?)
-        .with_context(|| format!("{file} is not valid JSON"))?;
-    match value {
-        Value::Array(entries) => Ok(entries),
-        _ => bail!("{file}: expected a list of points, [ {FORM}, ... ]"),
-    }
-}
-
-/// The fields at an entry's point, with its own parameters where it has some.
-fn evaluate_entry(
+/// The fields at a point, with its own parameters where it has some.
+fn fields_at(
     selection: &Selection,
     solution: &AnySolution<f64>,
-    entry: &Value,
+    point: &Point,
 ) -> Result<FieldRow> {
-    let Value::Object(entry) = entry else { bail!("expected {FORM}") };
-    if let Some(key) = entry.keys().find(|key| is_misspelt(key)) {
-        bail!("unknown key '{key}'; the keys are X, t and par");
+    let Point { X, t, parameters } = point;
+    if parameters.is_empty() {
+        return Ok(evaluate(solution, X, *t)?);
     }
-    let X = match entry.get("X") {
-        Some(Value::Array(list)) => {
-            list.iter().map(|x| number(x, "a coordinate in X")).collect::<Result<Vec<_>>>()?
-        }
-        Some(other) => bail!("X is {other}; it must be a list of numbers"),
-        None => bail!("X is missing; expected {FORM}"),
-    };
-    let t = number(entry.get("t").ok_or_else(|| anyhow!("t is missing; expected {FORM}"))?, "t")?;
-    let none = Map::new();
-    let parameters = match entry.get("par") {
-        None => &none,
-        Some(Value::Object(parameters)) => parameters,
-        Some(other) => bail!("par is {other}; it must be an object, {{ \"NAME\": number, ... }}"),
-    };
-    let given = parameters
-        .iter()
-        .map(|(name, value)| Ok((name.clone(), number(value, &format!("parameter {name}"))?)))
-        .collect::<Result<Vec<_>>>()?;
-    if given.is_empty() {
-        return Ok(evaluate(solution, &X, t)?);
-    }
-    Ok(evaluate(&selection.with(&given)?.build()?, &X, t)?)
-}
-
-/// Whether a key must have been meant for one of X, t and par. Other keys are the caller's notes.
-fn is_misspelt(key: &str) -> bool {
-    let lower = key.to_lowercase();
-    !["X", "t", "par"].contains(&key)
-        && (["x", "t", "time", "point", "position"].contains(&lower.as_str())
-            || lower.starts_with("par"))
-}
-
-/// A number of JSON, which is always finite.
-fn number(value: &Value, what: &str) -> Result<f64> {
-    value.as_f64().ok_or_else(|| anyhow!("{what} is {value}; it must be a number"))
+    Ok(evaluate(&selection.with(parameters)?.build()?, X, *t)?)
 }

@@ -17,7 +17,7 @@ use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
 use crate::table::Table;
-use crate::terminal;
+use crate::{number, terminal};
 use compare::Comparison;
 
 pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
@@ -205,7 +205,7 @@ type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
 fn runs(predicted: &Predicted, choice: &str) -> String {
     let rows = match predicted {
         Ok(rows) => rows,
-        Err(reason) => return format!("\nnot simulated in the usual scheme: {reason}\n"),
+        Err(reason) => return format!("\nnot simulated with the default scheme: {reason}\n"),
     };
     let header = ["cells", "particles", "steps", "stepping", "in all", "memory"];
     let mut table = Table::new(0, header);
@@ -220,8 +220,8 @@ fn runs(predicted: &Predicted, choice: &str) -> String {
         ]);
     }
     format!(
-        "\na run with the usual scheme on {} thread(s), predicted from a few steps made just now\n{choice}{}",
-        rayon::current_num_threads(),
+        "\na run with the default scheme on {}, predicted from a few steps made just now\n{choice}{}",
+        number::counted(rayon::current_num_threads(), "thread"),
         table.text()
     )
 }

@@ -9,6 +9,7 @@ use crate::json::Output;
 use crate::library::Selection;
 use crate::number;
 use crate::svg::Particles;
+use crate::units::{Units, with_unit};
 
 impl Stress {
     /// Its name.
@@ -62,44 +63,13 @@ impl Stress {
     }
 }
 
-/// The units of a solution's fields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Units {
-    /// Those of the SI: a parameter in Pa with others that fit it has lengths in metres.
-    Si,
-    /// Not known.
-    Unknown,
-}
-
-impl Units {
-    pub(super) fn of(selection: &Selection) -> Self {
-        if selection.units().values().any(|unit| unit == "Pa") { Self::Si } else { Self::Unknown }
-    }
-
-    /// The unit of stress, empty where it is not known.
-    pub(super) fn stress(self) -> &'static str {
-        match self {
-            Self::Si => "Pa",
-            Self::Unknown => "",
-        }
-    }
-
-    /// The names of the axes.
-    pub(super) fn axes(self) -> [&'static str; 2] {
-        match self {
-            Self::Si => ["x [m]", "y [m]"],
-            Self::Unknown => ["x", "y"],
-        }
-    }
-}
-
 /// The particles of a frame with a value each, and a note below them. In space those nearest to a viewer on the third axis are drawn last.
 pub(super) fn draw(
     title: &str,
     frame: &Frame,
     values: &[f64],
     range: (f64, f64),
-    units: Units,
+    units: Option<Units>,
     note: &str,
 ) -> String {
     let mut order: Vec<usize> = (0..frame.points.len()).collect();
@@ -107,7 +77,9 @@ pub(super) fn draw(
     let points: Vec<[f64; 2]> =
         order.iter().map(|&p| [frame.points[p][0], frame.points[p][1]]).collect();
     let values: Vec<f64> = order.iter().map(|&p| values[p]).collect();
-    let (unit, axes) = (units.stress(), units.axes());
+    let unit = units.map_or("", Units::stress);
+    let axes = ["x", "y"].map(|axis| with_unit(axis, units.map(Units::length)));
+    let axes = [axes[0].as_str(), axes[1].as_str()];
     Particles { title, points: &points, values: &values, range, unit, axes, note }.svg()
 }
 
@@ -140,10 +112,8 @@ impl Picture {
         let output = Output::prepare_if(options.file.as_ref())?;
         let at = options.at.unwrap_or(periods);
         if at > periods {
-            let (at, periods) = (number::exact(at), number::exact(periods));
-            bail!(
-                "--at {at}: the run ends after {periods} period(s); write --periods {at} as well"
-            );
+            let (at, ends) = (number::exact(at), number::of_periods(periods));
+            bail!("--at {at}: the run ends after {ends}; write --periods {at} as well");
         }
         let snapshot = Snapshot { share: at / periods, frame: None };
         Ok(Some(Self { stress: options.stress, at, output, snapshot }))
@@ -153,32 +123,31 @@ impl Picture {
         &mut self.snapshot
     }
 
-    /// Draws what the run left.
-    pub(super) fn write(self, selection: &Selection, row: &Row) -> Result<()> {
+    /// Draws what the run left, with a note on the run.
+    pub(super) fn write(self, selection: &Selection, row: &Row, note: &str) -> Result<()> {
         let Some(output) = self.output else { return Ok(()) };
         let Some(frame) = &self.snapshot.frame else {
             match &row.status {
                 Status::Ok => bail!(
-                    "--picture: a particle is turned inside out at {} period(s) and has no stress",
-                    number::exact(self.at)
+                    "--picture: a particle is turned inside out at {} and has no stress",
+                    number::of_periods(self.at)
                 ),
                 status => bail!(
-                    "--picture: the run did not come to {} period(s), and nothing is drawn: {status}; --at TIME draws an \
-                     earlier moment",
-                    number::exact(self.at)
+                    "--picture: the run did not come to {}, and nothing is drawn: {status}; --at TIME draws an earlier moment",
+                    number::of_periods(self.at)
                 ),
             }
         };
         let values = self.stress.values(frame)?;
         let units = Units::of(selection);
-        let second = if units == Units::Si { " s" } else { "" };
+        let second = units.map_or_else(String::new, |units| format!(" {}", units.time()));
         let title = format!(
             "{}: {}, t = {}{second}",
             selection.name(),
             self.stress.words(),
             number::rounded(frame.time, 4)
         );
-        output.write_text(&draw(&title, frame, &values, range(&values), units, ""))
+        output.write_text(&draw(&title, frame, &values, range(&values), units, note))
     }
 }
 

@@ -370,6 +370,7 @@ fn difference_plot(title: &str, differences: &[Differences]) -> String {
         x: "time step dt [s]",
         y: "L_inf difference of u [m]",
         curves: curves.collect(),
+        note: "",
         orders: &[1, 2],
         floor: None,
     }
@@ -377,7 +378,8 @@ fn difference_plot(title: &str, differences: &[Differences]) -> String {
 }
 
 fn plot(title: &str, x: &str, curves: Vec<Curve>) -> String {
-    Plot { title, x, y: "L_inf error of u [m]", curves, orders: &[1, 2], floor: None }.svg()
+    Plot { title, x, y: "L_inf error of u [m]", curves, note: "", orders: &[1, 2], floor: None }
+        .svg()
 }
 
 fn introduction() -> String {

@@ -21,6 +21,7 @@ use crate::library::Selection;
 use crate::progress::Bar;
 use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
+use crate::units::{self, Units};
 use crate::{csv, number, processes, terminal};
 
 /// A run, by the words of its command line.
@@ -97,7 +98,11 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
             }
         };
         processes::tell_traffic(&traffic);
-        terminal::say(&(settled.choice() + &caption(&selection, settled, extent) + &text(&row)))?;
+        terminal::say(
+            &(settled.choice()
+                + &caption(&selection, settled, extent)
+                + &text(&row, Units::of(&selection))),
+        )?;
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
             terminal::say(&format!("particle files: {}\n", list.display()))?;
@@ -129,7 +134,8 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
         }
         // Last, since a run that stopped may have no picture.
         if let Some(picture) = picture {
-            let written = picture.write(&selection, &row);
+            let note = super::setting(&selection, settled, extent);
+            let written = picture.write(&selection, &row, &format!("{note}, {cells} cells"));
             match written {
                 Err(error) if row.status.passed() == Some(false) => terminal::error(error),
                 written => written?,
@@ -177,15 +183,20 @@ pub(super) fn drift_plot(title: &str, curves: Vec<Course>) -> String {
     Drift { title, x: "periods", y, curves }.svg()
 }
 
-fn text(row: &Row) -> String {
+/// Digits of a time step and of a CFL number; --json has all.
+const DIGITS: usize = 4;
+
+fn text(row: &Row, units: Option<Units>) -> String {
+    let [m, s] = [units.map(Units::length), units.map(Units::time)]
+        .map(|unit| unit.map_or_else(String::new, |unit| format!(" {unit}")));
     let mut text = format!(
-        "{} cells, h = {}, {} particles, {} steps of dt = {}, CFL {}\n",
+        "{} cells, h = {}{m}, {} particles, {} steps of dt = {}{s}, CFL {}\n",
         row.cells,
-        number::exact(row.h),
+        number::rounded(row.h, DIGITS),
         row.particles,
         row.steps,
-        number::exact(row.dt),
-        number::exact(row.cfl)
+        number::rounded(row.dt, DIGITS),
+        number::rounded(row.cfl, DIGITS)
     );
     if row.status == Status::Ok || row.status.is_not_judged() {
         text += &format!("status: {}\n", row.status);
@@ -194,7 +205,7 @@ fn text(row: &Row) -> String {
     }
     let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
     for (field, norms) in row.errors.iter() {
-        let mut cells = vec![field.to_string()];
+        let mut cells = vec![units::named(field, units)];
         cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
         table.row(cells);
     }

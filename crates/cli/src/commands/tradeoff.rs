@@ -318,15 +318,14 @@ pub(super) struct Report<'a> {
 fn reason(skip: Skip) -> String {
     match skip {
         Skip::Dominated => format!(
-            "expected to be {MARGIN} times less accurate than one measured at no higher cost with the same weights, or, where \
-             dear, with any"
+            "expected to be {MARGIN} times less accurate than a measured setting of the same cost"
         ),
         Skip::NoGain => "error no longer falls on finer grids".into(),
         Skip::Cfl => "another CFL number gains nothing".into(),
-        Skip::Stopped => "the run stopped, finer ones were not tried".into(),
-        Skip::Budget => "would take longer than the budget leaves to one run".into(),
+        Skip::Stopped => "the run stopped; finer grids were not tried".into(),
+        Skip::Budget => "would take longer than the budget allows for one run".into(),
         Skip::Refused => "refused by the solver, such as for too few particles".into(),
-        Skip::Memory => "would need more memory than there is".into(),
+        Skip::Memory => "would need more memory than available".into(),
     }
 }
 
@@ -428,11 +427,11 @@ impl Report<'_> {
     fn text(&self) -> String {
         let runs = self.found.entries.len();
         let mut text = format!(
-            "{} ({}), {} period(s), {} thread(s) for schemes that use several, where nothing else is said\n{}\n{runs} settings of {} schemes{}\n",
+            "{} ({}), {}, {} unless a scheme says otherwise\n{}\n{runs} settings of {} schemes{}\n",
             self.selection.name(),
             self.selection.told_parameters(),
-            self.options.periods,
-            self.threads,
+            number::of_periods(self.options.periods),
+            number::counted(self.threads, "thread"),
             self.definition(),
             self.found.families,
             match self.options.cells.is_empty() {
@@ -456,9 +455,9 @@ impl Report<'_> {
         let (main, all) = (self.main_effects(), self.effects().len());
         let has = "A wider terminal, --csv and --json have them.";
         text += &table::on_left_out([&self.front()], has);
-        text += "\nwhat each setting buys, the others being equal";
+        text += "\neffect of each setting, with all others equal";
         if main.len() < all {
-            text += &format!(": the {} of {all} that matter most (--json has all)", main.len());
+            text += &format!(": the {} largest of {all} (--json has all)", main.len());
         }
         text.push('\n');
         for line in main {

@@ -12,11 +12,11 @@ const CELL: (f64, f64) = (62.0, 38.0);
 const MAP: f64 = 76.0;
 /// Of the line's frame.
 const HEIGHT: f64 = 300.0;
-/// Eight greys-with-a-hue from light to dark, which keep their order in black and white (from the map viridis, reversed).
+/// Eight steps of the map viridis from dark to light, which keep their order in black and white.
 const COLOURS: [&str; 8] =
-    ["#fde725", "#a0da39", "#4ac16d", "#1fa187", "#277f8e", "#365c8d", "#46327e", "#440154"];
-/// From here on a colour is dark, and text on it white.
-const DARK: usize = 4;
+    ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
+/// Below this a colour is dark, and text on it white.
+const LIGHT: usize = 4;
 
 /// A heat map. The values come with the second setting changing fastest.
 pub(crate) struct Map<'a> {
@@ -42,7 +42,7 @@ impl Map<'_> {
             Some(_) => format!("limits from {low:.3} to {high:.3}"),
         };
         let description = format!(
-            "{range} over {} and {}; a darker cell is a larger limit, a dash none found. \
+            "{range} over {} and {}; a lighter cell is a larger limit, a dash none found. \
              The heavy line divides limits above and below 0.8 of the CFL number of P-waves.",
             self.x.0, self.y.0
         );
@@ -51,7 +51,7 @@ impl Map<'_> {
             text,
             r##"<text x="16" y="22" font-size="15" font-weight="bold">{}</text>
 <text x="16" y="44" font-size="13">{range}; below each: its share of P-waves' limit</text>
-<text x="16" y="62" font-size="13">Heavy line: between shares above and below 0.8. Darker: larger.</text>"##,
+<text x="16" y="62" font-size="13">Heavy line: between shares above and below 0.8. Lighter: larger.</text>"##,
             escape(self.title)
         );
         let at = |column: usize, line: usize| {
@@ -67,7 +67,7 @@ impl Map<'_> {
                         let share = if high > low { (value - low) / (high - low) } else { 1.0 };
                         let last = COLOURS.len() - 1;
                         let step = ((share * COLOURS.len() as f64) as usize).min(last);
-                        let ink = if step >= DARK { "#fff" } else { "#111" };
+                        let ink = if step < LIGHT { "#fff" } else { "#111" };
                         let analytic = value / self.analytic[index];
                         (COLOURS[step], ink, format!("{value:.3}"), format!("{analytic:.2}"))
                     }
@@ -233,13 +233,17 @@ impl Limits<'_> {
                 _ => parts.push(Vec::new()),
             }
         }
+        // Between names there is nothing that a line could stand for.
+        let is_numeric = self.values.iter().all(|value| value.parse::<f64>().is_ok());
         for part in parts.iter().filter(|part| !part.is_empty()) {
             let points: Vec<_> = part.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-            let _ = writeln!(
-                text,
-                r##"<polyline class="measured" points="{}" fill="none" stroke="#0072b2" stroke-width="2"/>"##,
-                points.join(" ")
-            );
+            if is_numeric {
+                let _ = writeln!(
+                    text,
+                    r##"<polyline class="measured" points="{}" fill="none" stroke="#0072b2" stroke-width="2"/>"##,
+                    points.join(" ")
+                );
+            }
             for (x, y) in part {
                 let _ =
                     writeln!(text, r##"<circle cx="{x:.1}" cy="{y:.1}" r="5" fill="#0072b2"/>"##);

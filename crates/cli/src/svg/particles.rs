@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{escape, number, open, round_values, rounded};
+use crate::terminal;
 
 const WIDTH: f64 = 480.0;
 const LEFT: f64 = 62.0;
@@ -12,21 +13,25 @@ const SIDE: f64 = 332.0;
 /// The least height of the frame: that of a body in one dimension.
 const LOW: f64 = 90.0;
 /// Room between the particles and the frame.
-const ROOM: f64 = 8.0;
+const ROOM: f64 = 12.0;
 /// Below the frame: values and the name of the axis.
 const BELOW: f64 = 54.0;
-/// Below that: a note.
-const NOTE: f64 = 24.0;
+/// Below that: the lines of a note.
+const NOTE: f64 = 17.0;
 /// The colour bar.
 const BAR: f64 = 406.0;
 const BAR_WIDTH: f64 = 14.0;
 /// Least distance of values along an axis.
 const APART: f64 = 48.0;
-/// Ten steps of the map viridis, reversed: it darkens evenly, so that it reads the same in grey.
+/// Ten steps of the map viridis, whose lightness rises evenly, so that it reads the same in grey.
 const COLOURS: [&str; 10] = [
-    "#fde725", "#b5de2b", "#6ece58", "#35b779", "#1f9e89", "#26828e", "#31688e", "#3e4989",
-    "#482878", "#440154",
+    "#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58",
+    "#b5de2b", "#fde725",
 ];
+/// Behind the particles: yellow shows on it.
+const GROUND: &str = "#d8d8d8";
+/// Characters of a note that a line has room for.
+const NOTE_LENGTH: usize = 66;
 
 /// Particles with a value each.
 pub(crate) struct Particles<'a> {
@@ -40,7 +45,7 @@ pub(crate) struct Particles<'a> {
     pub(crate) unit: &'a str,
     /// The names of the axes, with the unit of lengths.
     pub(crate) axes: [&'a str; 2],
-    /// A line below; none where it is empty.
+    /// Words below, in as many lines as they need; none where it is empty.
     pub(crate) note: &'a str,
 }
 
@@ -98,13 +103,15 @@ impl Particles<'_> {
         let (least, most) = extremes(self.values.iter().copied());
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         let description = format!(
-            "{} particles, values from {} to {}{unit}; darker is larger.",
+            "{} particles, values from {} to {}{unit}; lighter is larger.",
             self.points.len(),
             rounded(least, 4),
             rounded(most, 4),
         );
         let (place, extent) = Place::of(self.points);
-        let height = place.bottom + BELOW + if self.note.is_empty() { 0.0 } else { NOTE };
+        let note = terminal::wrapped(self.note, NOTE_LENGTH);
+        let note: Vec<_> = note.iter().filter(|line| !line.is_empty()).collect();
+        let height = place.bottom + BELOW + NOTE * note.len() as f64;
         let mut text = open("particles", WIDTH, height, self.title, &description);
         let _ = writeln!(
             text,
@@ -134,13 +141,13 @@ impl Particles<'_> {
             );
         }
         self.bar(&mut text, &place);
-        if !self.note.is_empty() {
+        for (index, line) in note.iter().enumerate() {
             let _ = writeln!(
                 text,
-                r##"<text x="{}" y="{:.1}" text-anchor="middle">{}</text>"##,
+                r##"<text x="{}" y="{:.1}" text-anchor="middle" font-size="12">{}</text>"##,
                 LEFT + SIDE / 2.0,
-                height - 10.0,
-                escape(self.note)
+                place.bottom + BELOW + NOTE * index as f64 + 6.0,
+                escape(line)
             );
         }
         text.push_str("</svg>\n");
@@ -169,7 +176,7 @@ impl Particles<'_> {
         }
         let _ = writeln!(
             text,
-            r##"<rect class="frame" x="{LEFT}" y="{TOP}" width="{SIDE}" height="{:.1}" fill="none" stroke="#333"/>
+            r##"<rect class="frame" x="{LEFT}" y="{TOP}" width="{SIDE}" height="{:.1}" fill="{GROUND}" stroke="#333"/>
 <text x="{}" y="{:.1}" text-anchor="middle">{}</text>
 <text transform="translate(16 {:.1}) rotate(-90)" text-anchor="middle">{}</text>"##,
             bottom - TOP,

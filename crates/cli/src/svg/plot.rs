@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{escape, number, open};
+use crate::terminal;
 
 pub(super) const WIDTH: f64 = 480.0;
 pub(super) const LEFT: f64 = 72.0;
@@ -30,6 +31,9 @@ pub(super) fn style(index: usize) -> (&'static str, &'static str) {
 
 /// Room for a triangle below the lowest curve, with its number.
 const TRIANGLE: f64 = 20.0;
+/// The height of a line of a note, and the characters that it has room for.
+const NOTE: f64 = 17.0;
+const NOTE_LENGTH: usize = 62;
 /// Errors within this factor of the round-off floor are near it.
 const NEAR: f64 = 100.0;
 
@@ -41,6 +45,8 @@ pub(crate) struct Plot<'a> {
     /// What the error is, with its unit.
     pub(crate) y: &'a str,
     pub(crate) curves: Vec<Curve>,
+    /// Words below the legend, in as many lines as they need; none where it is empty.
+    pub(crate) note: &'a str,
     /// Slopes to draw for comparison.
     pub(crate) orders: &'a [i32],
     /// The error that rounding alone may cause.
@@ -144,7 +150,12 @@ impl Plot<'_> {
     /// The height of the picture.
     pub(crate) fn height(&self) -> f64 {
         let lines = self.curves.len() + usize::from(self.floor.is_some());
-        LEGEND + LINE * lines as f64
+        LEGEND + LINE * lines as f64 + NOTE * self.note().len() as f64
+    }
+
+    fn note(&self) -> Vec<String> {
+        let lines = terminal::wrapped(self.note, NOTE_LENGTH);
+        lines.into_iter().filter(|line| !line.is_empty()).collect()
     }
 
     pub(crate) fn svg(&self) -> String {
@@ -210,6 +221,15 @@ impl Plot<'_> {
                 r##"<text x="{}" y="{}" fill="#444">round-off floor about {floor:.1e}</text>"##,
                 LEFT + 54.0,
                 line + 5.0
+            );
+        }
+        let note = self.note();
+        for (index, line) in note.iter().enumerate() {
+            let _ = writeln!(
+                text,
+                r##"<text x="{LEFT}" y="{:.1}" font-size="12" fill="#444">{}</text>"##,
+                height - NOTE * (note.len() - index) as f64 - 2.0,
+                escape(line)
             );
         }
         text.push_str("</svg>\n");
@@ -341,7 +361,7 @@ mod tests {
     use super::*;
 
     fn plot(curves: Vec<Curve>, floor: Option<f64>) -> String {
-        Plot { title: "a < b", x: "h", y: "error", curves, orders: &[1, 2], floor }.svg()
+        Plot { title: "a < b", x: "h", y: "error", curves, note: "", orders: &[1, 2], floor }.svg()
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::arguments::{Frame, HighDegree, Mass, SchemeOptions, Weights};
 use crate::commands::scheme::Settled;
 use crate::commands::{Model, predict};
 use crate::memory;
+use crate::number;
 use crate::table::Table;
 
 /// Cell counts that schemes are run with.
@@ -104,8 +105,8 @@ impl Comparison {
             ]);
         }
         let mut text = format!(
-            "\nstepping, predicted and taken, for a part of a period on {} thread(s)\n{}",
-            rayon::current_num_threads(),
+            "\nstepping, predicted and taken, for a part of a period on {}\n{}",
+            number::counted(rayon::current_num_threads(), "thread"),
             table.text()
         );
         match self.median_ratio.zip(self.median_deviation) {

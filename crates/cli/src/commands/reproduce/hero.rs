@@ -9,9 +9,10 @@ use mmsmith_verify::{
 use super::GRID;
 use crate::arguments::{Precision, Stress};
 use crate::commands::Model;
-use crate::commands::picture::{Units, draw, range};
+use crate::commands::picture::{draw, range};
 use crate::library::Selection;
 use crate::svg::{Curve, Plot, beside};
+use crate::units::Units;
 
 const PROBLEM: &str = "ring";
 /// The grid of the particles that are shown: fine enough for a smooth picture, coarse enough for a small file.
@@ -83,6 +84,7 @@ pub(super) fn svg() -> Result<String> {
         x: "grid spacing h [m]",
         y: "L_inf error of u [m]",
         curves,
+        note: "",
         orders: &[],
         floor: None,
     };

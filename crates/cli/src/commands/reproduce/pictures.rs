@@ -9,11 +9,12 @@ use mmsmith_vtk::{Frame, read};
 use super::{CD, FRAMES, GRID, PROBLEMS};
 use crate::arguments::Stress;
 use crate::commands::Model;
-use crate::commands::picture::{Units, draw, range};
+use crate::commands::picture::{draw, range};
 use crate::commands::scheme::usual;
 use crate::library::Selection;
 use crate::number;
 use crate::svg::extremes;
+use crate::units::Units;
 
 /// The frame of the square's picture: five eighths of the period, where both directions move.
 const MOMENT: u64 = 5 * (FRAMES - 1) / 8;
@@ -94,7 +95,7 @@ fn capitalized(text: &str) -> String {
 }
 
 fn picture(title: &str, frame: &Frame, values: &[f64], range: (f64, f64), said: &str) -> Picture {
-    let svg = draw(title, frame, values, range, Units::Si, "");
+    let svg = draw(title, frame, values, range, Some(Units::SI), "");
     let (least, most) = extremes(values.iter().copied());
     let caption = format!(
         "{title}, at t = {} s: {} particles at their current positions, from {} to {} Pa. The colour bar spans 98 % of the \

@@ -3,15 +3,15 @@
 use mmsmith_verify::{Entry, TOLERANCES};
 
 use super::{Report, words};
-use crate::machine;
 use crate::table::Table;
+use crate::{machine, number};
 
 impl Report<'_> {
     /// The page, in Markdown.
     pub(in crate::commands) fn advice(&self) -> String {
         let mut text = format!(
             "# {}: which scheme for which need\n\nMade by `mms tradeoff {} --budget {}s --advice FILE.md` on {} ({} core(s)). \
-             {}.\n\n## What accuracy costs\n\nSeconds of stepping on {} thread(s) to each error, by the cheapest setting of \
+             {}.\n\n## What accuracy costs\n\nSeconds of stepping on {} to each error, by the cheapest setting of \
              each kind; `-` where none within the budget gets there.\n\n{}\n",
             self.selection.name(),
             self.options.name,
@@ -19,7 +19,7 @@ impl Report<'_> {
             machine::processor(),
             machine::cores(),
             self.definition(),
-            self.threads,
+            number::counted(self.threads, "thread"),
             self.costs().markdown()
         );
         text += "## Advice\n\n";

@@ -6,6 +6,8 @@ use mmsmith_verify::{
 };
 use serde_json::{Value, json};
 
+use crate::number;
+
 fn parts(setting: &Setting) -> Parts {
     setting.case.scheme.parts()
 }
@@ -138,7 +140,7 @@ pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
         SettingName::Layout => parts(setting).layout.to_owned(),
         SettingName::Mass => format!("{} mass", parts(setting).mass),
         SettingName::Precision => precision(setting).to_owned(),
-        SettingName::Threads => format!("{} thread(s)", setting.threads),
+        SettingName::Threads => number::counted(setting.threads, "thread"),
     };
     // Where runs are too short, or scatter by as much as they differ, their time says nothing, and neither does this.
     let time = match effect.time {

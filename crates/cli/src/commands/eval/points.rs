@@ -1,0 +1,117 @@
+//! The points of `mms eval`, as CSV or as JSON.
+
+use anyhow::{Context, Result, anyhow, bail};
+use csv::{ReaderBuilder, Trim};
+use serde_json::{Map, Value};
+
+use crate::input::Source;
+use crate::library::Selection;
+
+const FORM: &str = r#"{ "X": [numbers], "t": number, "par": { "NAME": number, ... } }"#;
+
+/// The columns of coordinates.
+pub(super) const AXES: [&str; 3] = ["X", "Y", "Z"];
+
+/// More bytes of points than memory has room for, once each of them is a tree of values.
+const LONGEST: u64 = 1 << 30;
+
+/// A point at a time.
+pub(super) struct Point {
+    /// The reference position.
+    pub(super) X: Vec<f64>,
+    pub(super) t: f64,
+    /// Parameters of this point alone.
+    pub(super) parameters: Vec<(String, f64)>,
+}
+
+/// Where the point `index` is, for messages.
+pub(super) fn place(file: Source, index: usize) -> String {
+    format!("{file}, entry {index} (counted from 0)")
+}
+
+/// The points of a file: JSON where it begins as a list or an object does, else CSV.
+pub(super) fn read(file: Source, selection: &Selection) -> Result<Vec<Point>> {
+    let text = file.short_text(LONGEST)?;
+    if !text.trim_start().starts_with(['[', '{']) {
+        return of_csv(&text, selection.dimension()).with_context(|| file.to_string());
+    }
+    let value: Value =
+        serde_json::from_str(&text).with_context(|| format!("{file} is not valid JSON"))?;
+    let Value::Array(entries) = value else {
+        bail!("{file}: expected a list of points, [ {FORM}, ... ]")
+    };
+    let entries = entries.iter().enumerate();
+    entries.map(|(index, entry)| point(entry).with_context(|| place(file, index))).collect()
+}
+
+/// The rows of a table with columns for the coordinates and the time; letter case does not matter.
+fn of_csv(text: &str, n: usize) -> Result<Vec<Point>> {
+    let mut reader = ReaderBuilder::new().trim(Trim::All).from_reader(text.as_bytes());
+    let header = reader.headers().context("it has no line of column names")?.clone();
+    let form = format!("{},t", AXES[..n].join(","));
+    let column = |name: &str| {
+        header.iter().position(|own| own.eq_ignore_ascii_case(name)).with_context(|| {
+            let names: Vec<&str> = header.iter().collect();
+            format!(
+                "points are CSV with the columns {form}, or JSON, [ {FORM}, ... ]; there is no column {name} among {}",
+                names.join(",")
+            )
+        })
+    };
+    let axes = AXES[..n].iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
+    let time = column("t")?;
+    let rows = reader.records().enumerate();
+    rows.map(|(index, row)| {
+        let row = row.with_context(|| format!("row {}", index + 1))?;
+        let number = |column: usize| {
+            let cell = row.get(column).unwrap_or_default();
+            let number = cell.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.with_context(|| {
+                let name = header.get(column).unwrap_or_default();
+                format!("row {}: '{cell}' in column {name} is no finite number", index + 1)
+            })
+        };
+        let X = axes.iter().map(|column| number(*column)).collect::<Result<_>>()?;
+        Ok(Point { X, t: number(time)?, parameters: Vec::new() })
+    })
+    .collect()
+}
+
+/// A point as JSON.
+fn point(entry: &Value) -> Result<Point> {
+    let Value::Object(entry) = entry else { bail!("expected {FORM}") };
+    if let Some(key) = entry.keys().find(|key| is_misspelt(key)) {
+        bail!("unknown key '{key}'; the keys are X, t and par");
+    }
+    let X = match entry.get("X") {
+        Some(Value::Array(list)) => {
+            list.iter().map(|x| number(x, "a coordinate in X")).collect::<Result<Vec<_>>>()?
+        }
+        Some(other) => bail!("X is {other}; it must be a list of numbers"),
+        None => bail!("X is missing; expected {FORM}"),
+    };
+    let t = number(entry.get("t").ok_or_else(|| anyhow!("t is missing; expected {FORM}"))?, "t")?;
+    let none = Map::new();
+    let parameters = match entry.get("par") {
+        None => &none,
+        Some(Value::Object(parameters)) => parameters,
+        Some(other) => bail!("par is {other}; it must be an object, {{ \"NAME\": number, ... }}"),
+    };
+    let parameters = parameters
+        .iter()
+        .map(|(name, value)| Ok((name.clone(), number(value, &format!("parameter {name}"))?)));
+    Ok(Point { X, t, parameters: parameters.collect::<Result<_>>()? })
+}
+
+/// Whether a key must have been meant for one of X, t and par. Other keys are the caller's notes.
+fn is_misspelt(key: &str) -> bool {
+    let lower = key.to_lowercase();
+    !["X", "t", "par"].contains(&key)
+        && (["x", "t", "time", "point", "position"].contains(&lower.as_str())
+            || lower.starts_with("par"))
+}
+
+/// A number of JSON, which is always finite.
+fn number(value: &Value, what: &str) -> Result<f64> {
+    value.as_f64().ok_or_else(|| anyhow!("{what} is {value}; it must be a number"))
+}
