@@ -373,9 +373,9 @@ def write_findings(findings):
     bare_late = dict(arrays_late, mass=numpy.ones((count, 1)))
     two("first-frame-by-id", frame(t, x, bare, ["id"]), frame(late, x_late[::-1], {k: v[::-1] for k, v in bare_late.items()}, ["id"]),
         "first frame's positions are taken to be exact at t = 0.0; particles are found again by identity",
-        "reference positions: the first frame's positions", "u      1.000e-3  1.000e-3  1.000e-3", "status: ok")
+        "reference positions: the first frame's positions", "u [m]  1.000e-3  1.000e-3  1.000e-3", "status: ok")
     two("first-frame-by-order", frame(t, x, bare, ["mass"]), frame(late, x_late, bare_late, ["mass"]),
-        "found again by order", "u      1.000e-3  1.000e-3  1.000e-3")
+        "found again by order", "u [m]  1.000e-3  1.000e-3  1.000e-3")
     two("missing-particles", frame(t, x, arrays, [*u, "id"]), frame(late, x_late, arrays_late, [*u, "id"], keep=slice(2, None)),
         "PROBLEM: 1 frame(s) hold another number of particles than the first one's 6: ./a_2.vtu holds 4",
         "PROBLEM: 2 particle(s) of the first frame are missing: id 7 of ./a_2.vtu")
@@ -383,8 +383,8 @@ def write_findings(findings):
         "PROBLEM: 10 particle(s) have an identity that another one of their frame has, in 2 frames")
     two("points-at-rest", frame(t, padded(X), arrays, u), frame(late, padded(X), arrays_late, u),
         "note: the points do not move while displacements change", "reference positions: the points of the files",
-        "u      1.000e-3  1.000e-3  1.000e-3")
-    two("points-told", frame(t, padded(X), arrays, u), frame(late, padded(X), arrays_late, u), "u      1.000e-3  1.000e-3  1.000e-3",
+        "u [m]  1.000e-3  1.000e-3  1.000e-3")
+    two("points-told", frame(t, padded(X), arrays, u), frame(late, padded(X), arrays_late, u), "u [m]  1.000e-3  1.000e-3  1.000e-3",
         options="--points reference")
     far = padded(X * 1000)
     two("outside-body", frame(t, far + arrays["displacement"], arrays, u), frame(late, far + arrays_late["displacement"], arrays_late, u),
@@ -395,7 +395,7 @@ def write_findings(findings):
     two("time-not-finite", frame(t, x, arrays, u), frame(numpy.nan, x_late, arrays_late, u),
         "PROBLEM: 1 frame(s) whose time is not finite are left out", "1 frame(s) from t = 0.0 to 0.0")
     two("partly-outside-time", frame(t, x, arrays, u), frame(late + 0.02, x_late, arrays_late, u),
-        "note: 1 of 2 frames lie outside the times 0 to 0.02", "u      1.000e-3  1.000e-3  1.000e-3")
+        "note: 1 of 2 frames lie outside the times 0 to 0.02", "u [m]  1.000e-3  1.000e-3  1.000e-3")
     two("array-of-other-shape", frame(t, x, dict(arrays, P=numpy.ones((count, 1))), [*u, "P"]), frame(late, x_late, dict(arrays_late, P=numpy.ones((count, 1))), [*u, "P"]),
         "note: array `P` has 1 component(s) and is not taken for first_piola_kirchhoff, which has 4 or 9")
 

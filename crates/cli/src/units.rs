@@ -1,6 +1,6 @@
 //! The units of a solution's fields, as far as the units of its parameters tell them.
 
-use mmsmith_verify::Field;
+use mmsmith_verify::{Field, Quantity};
 
 use crate::library::Selection;
 
@@ -59,6 +59,19 @@ impl Units {
 
     pub(crate) fn time(self) -> &'static str {
         self.time
+    }
+
+    /// The unit of a recorded field's errors; none for a pure number.
+    pub(crate) fn of_quantity(self, quantity: Quantity) -> Option<String> {
+        match quantity {
+            Quantity::Displacement => self.of_field(Field::Displacement),
+            Quantity::Velocity => self.of_field(Field::Velocity),
+            Quantity::FirstPiolaKirchhoff | Quantity::Cauchy | Quantity::Kirchhoff => {
+                self.of_field(Field::Stress)
+            }
+            Quantity::Density => Some(self.density.into()),
+            Quantity::DeformationGradient | Quantity::VolumeRatio => None,
+        }
     }
 
     /// The unit of a field's errors; none for a pure number.

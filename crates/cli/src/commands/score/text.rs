@@ -6,6 +6,7 @@ use crate::arguments::ScoreOptions;
 use crate::library::Selection;
 use crate::number;
 use crate::table::{self, Table};
+use crate::units::{Units, with_unit};
 
 /// Recordings compared with each other.
 pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> String {
@@ -21,6 +22,7 @@ pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> S
         compared.rows.iter().flat_map(|row| row.differences.keys().copied()).collect();
     fields.sort_unstable();
     fields.dedup();
+    let units = Units::of(selection);
     for field in fields {
         let mut table = Table::new(0, ["dt", "linf", "rate", "l2", "rate", "l1", "rate", "status"]);
         for (index, row) in compared.rows.iter().enumerate() {
@@ -35,7 +37,8 @@ pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> S
             line.push(if row.status == "ok" { "ok" } else { "PROBLEM" }.into());
             table.row(line);
         }
-        text += &format!("\ndifference of {field}\n{}", table.text());
+        let table = table.with_unit(&["dt"], units.map(Units::time));
+        text += &format!("\ndifference of {}\n{}", named(field, units), table.text());
     }
     text
 }
@@ -45,15 +48,27 @@ pub(super) fn text(selection: &Selection, score: &Score) -> String {
     for row in &score.rows {
         text += &heading(row);
     }
+    let units = Units::of(selection);
     match &score.orders {
-        None => text += &score.rows.iter().map(errors).collect::<String>(),
+        None => text += &score.rows.iter().map(|row| errors(row, units)).collect::<String>(),
         Some(_) => {
-            for (field, table) in tables(score) {
-                text += &format!("\nerror of {field}\n{}", table.text());
+            let tables = tables(score).into_iter();
+            let tables: Vec<(Quantity, Table)> = tables
+                .map(|(field, table)| (field, table.with_unit(&["h"], units.map(Units::length))))
+                .collect();
+            for (field, table) in &tables {
+                text += &format!("\nerror of {}\n{}", named(*field, units), table.text());
             }
+            let has = "A wider terminal and --json have them.";
+            text += &table::on_left_out(tables.iter().map(|(_, table)| table), has);
         }
     }
     text
+}
+
+/// A field with the unit of its errors, where it is known.
+fn named(field: Quantity, units: Option<Units>) -> String {
+    with_unit(&field.to_string(), units.and_then(|units| units.of_quantity(field)))
 }
 
 /// What was read, and what is to be said about it.
@@ -79,11 +94,11 @@ fn told(findings: &[Remark]) -> String {
 }
 
 /// The errors of one recording.
-fn errors(row: &ScoreRow) -> String {
+fn errors(row: &ScoreRow, units: Option<Units>) -> String {
     let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
     for (field, norms) in &row.errors {
         if row.fields.contains(field) {
-            let mut cells = vec![field.to_string()];
+            let mut cells = vec![named(*field, units)];
             cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
             table.row(cells);
         }
