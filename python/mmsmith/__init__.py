@@ -1,11 +1,13 @@
 """Manufactured solutions for large-deformation solid mechanics.
 
 `load` gives the exact fields of a solution at arrays of points. `run`, `converge`, `stability`, `tradeoff` and `score` do what the
-commands of `mms` do. `orders` and `assert_order` judge a solver of your own, `audit` judges the test that judges it.
+commands of `mms` do. `orders` and `assert_order` judge a solver of your own, `audit` judges the test that judges it, and
+`diagnose` finds the mistake in a solver whose errors do not fall.
 """
 
 from mmsmith import _mmsmith
 from mmsmith._audit import Audit, audit
+from mmsmith._diagnose import Cause, Diagnosis, causes, diagnose
 from mmsmith._mmsmith import Error, NoEffect, __version__
 from mmsmith._orders import Orders, assert_order, measure, orders
 from mmsmith._solution import Annulus, Box, Points, Solution, load
@@ -15,6 +17,8 @@ __all__ = [
     "Annulus",
     "Audit",
     "Box",
+    "Cause",
+    "Diagnosis",
     "Error",
     "NoEffect",
     "Orders",
@@ -23,8 +27,10 @@ __all__ = [
     "__version__",
     "assert_order",
     "audit",
+    "causes",
     "command",
     "converge",
+    "diagnose",
     "faults",
     "load",
     "measure",

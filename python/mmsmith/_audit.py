@@ -99,7 +99,7 @@ def audit(
         try:
             check_order(solver, solution, cells, tolerance, norm, expected)
         except AssertionError as error:
-            raise AssertionError(f"the test fails with the right fields of {solution.name}:\n{error}") from None
+            raise AssertionError(f"the test fails with the right fields of {solution.name}; mmsmith.diagnose names the mistake in the solver:\n{error}") from None
     outcomes: dict[str, dict[str, str]] = {}
     for fault in faults:
         outcomes[fault] = {}

@@ -4,10 +4,10 @@
 //! says less.
 
 use mmsmith_cli::Refusal;
-use mmsmith_codegen::Fault;
+use mmsmith_codegen::{CAUSES, Cause, Counter, Fault, NoEffect as Unchanged};
 use mmsmith_interpret::{Arrays, ArraysAtPoints, Quantity, interpret_staged};
 use mmsmith_runtime::{AnySolution, Domain, Law, Solution, Surface};
-use mmsmith_spec::Spec;
+use mmsmith_spec::{Fields as Derived, Spec};
 use mmsmith_stage::{FieldName, Staged};
 use numpy::{PyReadonlyArray2, PyReadwriteArrayDyn};
 use pyo3::create_exception;
@@ -36,7 +36,7 @@ struct Fields {
     #[pyo3(get)]
     parameters: BTreeMap<String, f64>,
     #[pyo3(get)]
-    fault: Option<&'static str>,
+    fault: Option<String>,
 }
 
 /// What is the same at all points.
@@ -86,12 +86,11 @@ impl Fields {
     fn build(
         spec: Spec,
         overrides: &BTreeMap<String, f64>,
-        fault: Option<Fault>,
+        fault: Option<String>,
+        plant: impl FnOnce(&Spec, &mut Derived) -> Result<(), Unchanged>,
     ) -> PyResult<Self> {
         let mut fields = spec.derive().map_err(refused)?;
-        if let Some(fault) = fault {
-            fault.plant(&spec, &mut fields).map_err(|none| NoEffect::new_err(none.to_string()))?;
-        }
+        plant(&spec, &mut fields).map_err(|none| NoEffect::new_err(none.to_string()))?;
         let staged = Staged::of(&spec, fields);
         let pairs = || overrides.iter().map(|(name, &value)| (name.as_str(), value));
         let facts = match interpret_staged(&spec, &staged, pairs()).map_err(refused)? {
@@ -104,7 +103,6 @@ impl Fields {
         let mut parameters: BTreeMap<String, f64> =
             spec.parameters.iter().map(|p| (p.name.clone(), p.default)).collect();
         parameters.extend(overrides.clone());
-        let fault = fault.map(Fault::name);
         Ok(Fields { spec, arrays, facts, parameters, fault })
     }
 
@@ -145,7 +143,7 @@ impl Fields {
     fn new(py: Python<'_>, name: &str, parameters: BTreeMap<String, f64>) -> PyResult<Self> {
         py.detach(|| {
             let spec = mmsmith_cli::specification(name).map_err(refused)?;
-            Fields::build(spec, &parameters, None)
+            Fields::build(spec, &parameters, None, |_, _| Ok(()))
         })
     }
 
@@ -154,7 +152,25 @@ impl Fields {
             let known = Fault::ALL.map(Fault::name);
             refused(format!("{unknown}; there are: {}", known.join(", ")))
         })?;
-        py.detach(|| Fields::build(self.spec.clone(), &self.parameters, Some(fault)))
+        py.detach(|| {
+            let plant = |spec: &Spec, fields: &mut Derived| fault.plant(spec, fields);
+            Fields::build(self.spec.clone(), &self.parameters, Some(fault.name().into()), plant)
+        })
+    }
+
+    /// The fields with the opposite of one mistake or more.
+    fn against(&self, py: Python<'_>, names: Vec<String>) -> PyResult<Self> {
+        let found = names.iter().map(|name| {
+            Cause::named(name).ok_or_else(|| refused(format!("there is no cause '{name}'")))
+        });
+        let causes: Vec<&Cause> = found.collect::<PyResult<_>>()?;
+        py.detach(|| {
+            // Times are shifted in the part in Python, which knows the solver's time steps.
+            let plant = |spec: &Spec, fields: &mut Derived| {
+                Cause::plant_all(&causes, spec, fields, f64::NAN)
+            };
+            Fields::build(self.spec.clone(), &self.parameters, Some(names.join(" and ")), plant)
+        })
     }
 
     fn evaluate(
@@ -296,6 +312,25 @@ fn faults() -> Vec<(&'static str, &'static str)> {
     Fault::ALL.map(|fault| (fault.name(), fault.about())).into()
 }
 
+/// The mistakes that are looked for in solvers, in the order of the table: the name, the mistake in a line, where to look, the kind of
+/// what shows it, the field and the number of time steps or cells where there are such.
+#[pyfunction]
+fn causes() -> Vec<(&'static str, &'static str, &'static str, &'static str, &'static str, f64)> {
+    let parts = |counter: Counter| match counter {
+        Counter::Fields(_) => ("fields", "", 0.0),
+        Counter::Time { of, steps } => ("time", of.word(), steps),
+        Counter::Place(placed) => ("place", placed.word(), 0.0),
+        Counter::Cell { cells } => ("cell", "force", cells),
+        Counter::Impulse { steps } => ("impulse", "force", steps),
+        Counter::Unused(unused) => ("unused", unused.word(), 0.0),
+    };
+    let row = |cause: &Cause| {
+        let (kind, of, steps) = parts(cause.counter);
+        (cause.name, cause.mistake, cause.look, kind, of, steps)
+    };
+    CAUSES.iter().map(row).collect()
+}
+
 /// The names of all solutions that can be loaded without a path.
 #[pyfunction]
 fn solutions() -> Vec<String> {
@@ -367,6 +402,7 @@ fn _mmsmith(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Fields>()?;
     module.add_class::<FieldsAtPoints>()?;
     module.add_function(wrap_pyfunction!(faults, module)?)?;
+    module.add_function(wrap_pyfunction!(causes, module)?)?;
     module.add_function(wrap_pyfunction!(solutions, module)?)?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
     module.add_function(wrap_pyfunction!(call, module)?)

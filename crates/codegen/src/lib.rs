@@ -12,6 +12,7 @@
 //! numbers, and as string literals and comments, never as code.
 
 mod c_names;
+mod cause;
 mod code;
 mod fault;
 mod listing;
@@ -23,6 +24,7 @@ mod target;
 mod targets;
 mod text;
 
+pub use cause::{CAUSES, Cause, Counter, Placed, Timed, Unused};
 pub use code::{Code, Origin};
 pub use fault::{Fault, NoEffect, UnknownFault};
 pub use names::Names;

@@ -1,0 +1,261 @@
+//! Mistakes that solvers make, each with fields that have the opposite mistake.
+//!
+//! A solver that makes the mistake becomes right when it is given these fields, and its errors fall with the order of its method. So
+//! a mistake is found without a look at the code.
+
+mod planting;
+mod table;
+mod timing;
+
+pub use table::CAUSES;
+
+use crate::fault::{NoEffect, has_effect};
+use mmsmith_expr::Expr;
+use mmsmith_spec::{Fields, Spec};
+use planting::Planting;
+
+/// A mistake in a solver.
+#[derive(Clone, Copy, Debug)]
+pub struct Cause {
+    /// The name on command lines and in JSON.
+    pub name: &'static str,
+    /// The mistake in a line.
+    pub mistake: &'static str,
+    /// Where to look in the code.
+    pub look: &'static str,
+    /// What shows it.
+    pub counter: Counter,
+}
+
+/// The fields that a solver is given to find out whether it makes a mistake.
+#[derive(Clone, Copy, Debug)]
+pub enum Counter {
+    /// Changed fields.
+    Fields(fn(&mut Planting<'_>)),
+    /// A field at another time.
+    Time {
+        /// Which field.
+        of: Timed,
+        /// How much later, in time steps.
+        steps: f64,
+    },
+    /// A field at the reference position that the exact motion takes to the point asked for.
+    Place(Placed),
+    /// A field so many cells away along every axis.
+    Cell {
+        /// How far.
+        cells: f64,
+    },
+    /// A body force that in the first time step gives a body at rest the velocity that it should have had.
+    Impulse {
+        /// The length of that push in time steps.
+        steps: f64,
+    },
+    /// Nothing: the result does not depend on this field, though it should.
+    Unused(Unused),
+}
+
+/// A field that a solver may ask for at a wrong time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timed {
+    /// The body force.
+    Force,
+    /// The acceleration within the body force.
+    Inertia,
+    /// Tractions.
+    Traction,
+    /// The displacement after the start.
+    Boundary,
+    /// The velocity after the start.
+    BoundaryVelocity,
+    /// The velocity at the start.
+    InitialVelocity,
+}
+
+/// A field that a solver may ask for at current positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Placed {
+    /// The body force.
+    Force,
+    /// Tractions.
+    Traction,
+    /// The displacement after the start.
+    Boundary,
+}
+
+/// A field that a solver should have used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unused {
+    /// The body force.
+    Force,
+    /// A component of the body force.
+    ForceComponent,
+    /// The body force after the start.
+    ForceLater,
+    /// Tractions.
+    Traction,
+    /// Tractions after the start.
+    TractionLater,
+    /// The displacement after the start, on surfaces where it is prescribed.
+    Boundary,
+    /// The velocity at the start.
+    InitialVelocity,
+    /// The displacement at the start.
+    InitialDisplacement,
+}
+
+macro_rules! words {
+    ($name:ident { $($variant:ident => $word:literal,)+ }) => {
+        impl $name {
+            /// The word in JSON, and for the part in Python.
+            #[must_use]
+            pub fn word(self) -> &'static str {
+                match self {
+                    $($name::$variant => $word,)+
+                }
+            }
+        }
+    };
+}
+
+words!(Timed {
+    Force => "force",
+    Inertia => "inertia",
+    Traction => "traction",
+    Boundary => "boundary",
+    BoundaryVelocity => "boundary-velocity",
+    InitialVelocity => "initial-velocity",
+});
+words!(Placed {
+    Force => "force",
+    Traction => "traction",
+    Boundary => "boundary",
+});
+words!(Unused {
+    Force => "force",
+    ForceComponent => "force-component",
+    ForceLater => "force-later",
+    Traction => "traction",
+    TractionLater => "traction-later",
+    Boundary => "boundary",
+    InitialVelocity => "initial-velocity",
+    InitialDisplacement => "initial-displacement",
+});
+
+impl Cause {
+    /// The cause of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Cause> {
+        CAUSES.iter().find(|cause| cause.name == name)
+    }
+
+    /// The rank of what is changed first, where there are several changes: the law, its constants and the strain, then the stress, then
+    /// what the balance makes of both.
+    fn rank(&self) -> usize {
+        let rank = |starts: &[&str]| starts.iter().any(|start| self.name.starts_with(start));
+        match self.counter {
+            Counter::Fields(_) if rank(&["stress-"]) => 1,
+            Counter::Fields(_) if rank(&["internal-force-", "mass-", "inertia-"]) => 2,
+            Counter::Fields(_) if rank(&["force-", "traction-", "initial-"]) => 3,
+            Counter::Fields(_) => 0,
+            _ => 4,
+        }
+    }
+
+    /// As [`Cause::plant`], for several mistakes at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`Cause::plant`], for each of them.
+    pub fn plant_all(
+        causes: &[&Cause],
+        spec: &Spec,
+        fields: &mut Fields,
+        dt: f64,
+    ) -> Result<(), NoEffect> {
+        let mut causes = causes.to_vec();
+        causes.sort_by_key(|cause| cause.rank());
+        causes.into_iter().try_for_each(|cause| cause.plant(spec, fields, dt))
+    }
+
+    /// Changes the fields of `spec` to those with the opposite mistake. `dt` is the solver's time step, which causes that shift times
+    /// need.
+    ///
+    /// # Errors
+    ///
+    /// [`NoEffect`] where all fields stay as they are: then nothing can be said of the mistake with this solution.
+    pub fn plant(&self, spec: &Spec, fields: &mut Fields, dt: f64) -> Result<(), NoEffect> {
+        let changed = has_effect(spec, fields, handed, |fields| match self.counter {
+            Counter::Fields(change) => change(&mut Planting::new(spec, fields)),
+            Counter::Time { of, steps } => timing::shift(fields, of, steps, dt),
+            Counter::Place(placed) => timing::seek(fields, placed),
+            Counter::Impulse { steps } => timing::push(fields, steps, dt),
+            Counter::Cell { .. } | Counter::Unused(_) => {}
+        });
+        let none = NoEffect { fault: self.name.to_owned(), solution: spec.name.clone() };
+        changed.then_some(()).ok_or(none)
+    }
+}
+
+/// What a solver is given that is noticed inside the body; tractions where these are all that is changed.
+fn handed(before: &Fields, after: &Fields) -> [Vec<Expr>; 2] {
+    let inside = |fields: &Fields| [&fields.u[..], &fields.v, &fields.b].concat();
+    let tractions = |fields: &Fields| {
+        fields.surfaces.iter().flat_map(|surface| surface.traction.clone()).collect()
+    };
+    match inside(before) == inside(after) {
+        true => [tractions(before), tractions(after)],
+        false => [inside(before), inside(after)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::Path;
+
+    fn spec(name: &str) -> Spec {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");
+        let text = fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
+        Spec::parse(&text, name).unwrap()
+    }
+
+    #[test]
+    fn every_cause_has_a_name_of_its_own_and_words() {
+        let names: BTreeSet<_> = CAUSES.iter().map(|cause| cause.name).collect();
+        assert_eq!(names.len(), CAUSES.len());
+        for cause in CAUSES {
+            assert!(cause.mistake.len() > 5 && cause.look.len() > 15, "{}", cause.name);
+            assert!(!cause.look.ends_with('.') && !cause.mistake.ends_with('.'), "{}", cause.name);
+        }
+    }
+
+    /// With a density that is not one, a stress that is not symmetric and tractions, every change shows but that to the own law.
+    #[test]
+    fn every_counter_changes_fields() {
+        let spec = spec("skew-2d");
+        let fields = spec.derive().unwrap();
+        let own = ["law-neo-hookean"];
+        for cause in CAUSES {
+            let changes = match cause.counter {
+                Counter::Unused(_) | Counter::Cell { .. } => continue,
+                _ => !own.contains(&cause.name),
+            };
+            let planted = cause.plant(&spec, &mut fields.clone(), 1e-3);
+            assert_eq!(planted.is_ok(), changes, "{}", cause.name);
+        }
+    }
+
+    /// In one dimension there is nothing to transpose or to exchange.
+    #[test]
+    fn what_changes_nothing_is_told() {
+        let spec = spec("bar");
+        let fields = spec.derive().unwrap();
+        for name in ["stress-transposed", "force-components-exchanged", "lambda-doubled"] {
+            let none = Cause::named(name).unwrap().plant(&spec, &mut fields.clone(), 1e-3);
+            assert!(none.unwrap_err().to_string().contains(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Fields at other times and places.
+
+use super::{Placed, Timed};
+use mmsmith_expr::{Expr, Function, Graph, Rational};
+use mmsmith_spec::Fields;
+use std::collections::BTreeMap;
+
+/// Steps towards a reference position, each of which multiplies the error by the displacement gradient. What is written out grows with
+/// them.
+const SOUGHT: usize = 6;
+/// How sharply "at the start" ends: so large that the function that tells it is zero or one to the last bit at every time step.
+const SHARP: i64 = 1000;
+
+fn number(graph: &mut Graph, value: f64) -> Expr {
+    let value = Rational::from_float(value).unwrap_or_else(|| Rational::from_integer(0.into()));
+    graph.number(value)
+}
+
+/// Zero up to half a time step, one from one time step on.
+fn later(graph: &mut Graph, dt: f64) -> Expr {
+    let t = graph.symbol("t");
+    let step = number(graph, dt);
+    let three_quarters = graph.number(Rational::new(3.into(), 4.into()));
+    let in_steps = graph.div(t, step);
+    let beyond = graph.sub(in_steps, three_quarters);
+    let sharp = graph.integer(SHARP);
+    let steep = graph.mul(sharp, beyond);
+    let tanh = graph.call(Function::Tanh, &[steep]);
+    let half = graph.number(Rational::new(1.into(), 2.into()));
+    let sum = graph.add(Graph::ONE, tanh);
+    graph.mul(half, sum)
+}
+
+/// A field at a time that is so many steps later.
+pub(super) fn shift(fields: &mut Fields, of: Timed, steps: f64, dt: f64) {
+    let graph = &mut fields.graph;
+    let t = graph.symbol("t");
+    let by = number(graph, steps * dt);
+    let by = match of {
+        Timed::Force | Timed::Inertia | Timed::Traction => by,
+        Timed::Boundary | Timed::BoundaryVelocity => {
+            let later = later(graph, dt);
+            graph.mul(by, later)
+        }
+        Timed::InitialVelocity => {
+            let later = later(graph, dt);
+            let at_start = graph.sub(Graph::ONE, later);
+            graph.mul(by, at_start)
+        }
+    };
+    let shifted = graph.add(t, by);
+    let times = BTreeMap::from([(t, shifted)]);
+    let mut move_all = |vector: &mut [Expr]| {
+        vector.iter_mut().for_each(|entry| *entry = graph.replace(*entry, &times));
+    };
+    match of {
+        Timed::Force => move_all(&mut fields.b),
+        Timed::Traction => {
+            fields.surfaces.iter_mut().for_each(|surface| move_all(&mut surface.traction));
+        }
+        Timed::Boundary => move_all(&mut fields.u),
+        Timed::BoundaryVelocity | Timed::InitialVelocity => move_all(&mut fields.v),
+        Timed::Inertia => {
+            let mut moved = fields.a.clone();
+            move_all(&mut moved);
+            for ((b, &a), moved) in fields.b.iter_mut().zip(&fields.a).zip(moved) {
+                let difference = graph.sub(moved, a);
+                *b = graph.add(*b, difference);
+            }
+        }
+    }
+}
+
+/// A body force that within the first steps pushes a body at rest to its velocity.
+pub(super) fn push(fields: &mut Fields, steps: f64, dt: f64) {
+    let graph = &mut fields.graph;
+    let later = later(graph, dt);
+    let at_start = graph.sub(Graph::ONE, later);
+    let length = number(graph, steps * dt);
+    let rate = graph.div(at_start, length);
+    // A staggered scheme has no velocity at t = 0, but half a step before it.
+    let t = graph.symbol("t");
+    let back = number(graph, if steps < 1.0 { 0.0 } else { -dt / 2.0 });
+    let before = graph.add(t, back);
+    let times = BTreeMap::from([(t, before)]);
+    for (b, &v) in fields.b.iter_mut().zip(&fields.v) {
+        let velocity = graph.replace(v, &times);
+        let push = graph.mul(rate, velocity);
+        *b = graph.add(*b, push);
+    }
+}
+
+/// A field at the reference position that the motion takes to the position given, by steps that are written out.
+pub(super) fn seek(fields: &mut Fields, placed: Placed) {
+    let n = fields.u.len();
+    let definitions: BTreeMap<Expr, Expr> = fields.definitions.iter().copied().collect();
+    let coordinates: Vec<Expr> = fields.inputs[..n].iter().map(|(X, _)| *X).collect();
+    let graph = &mut fields.graph;
+    let u: Vec<Expr> = fields.u.iter().map(|&u| graph.replace(u, &definitions)).collect();
+    let mut found = coordinates.clone();
+    for _ in 0..SOUGHT {
+        let places: BTreeMap<Expr, Expr> =
+            coordinates.iter().copied().zip(found.iter().copied()).collect();
+        // X <- x - u(X)
+        found = (0..n)
+            .map(|i| {
+                let moved = graph.replace(u[i], &places);
+                graph.sub(coordinates[i], moved)
+            })
+            .collect();
+    }
+    let places: BTreeMap<Expr, Expr> =
+        coordinates.iter().copied().zip(found.iter().copied()).collect();
+    let mut place_all = |vector: &mut [Expr]| {
+        for entry in vector {
+            let explicit = graph.replace(*entry, &definitions);
+            *entry = graph.replace(explicit, &places);
+        }
+    };
+    match placed {
+        Placed::Force => place_all(&mut fields.b),
+        Placed::Traction => {
+            fields.surfaces.iter_mut().for_each(|surface| place_all(&mut surface.traction));
+        }
+        Placed::Boundary => place_all(&mut fields.u),
+    }
+}
