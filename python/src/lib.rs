@@ -4,7 +4,7 @@
 //! says less.
 
 use mmsmith_cli::Refusal;
-use mmsmith_codegen::{CAUSES, Cause, Counter, Fault, NoEffect as Unchanged};
+use mmsmith_codegen::{CAUSES, Cause, Counter, Fault, NoEffect as Unchanged, Steps};
 use mmsmith_interpret::{Arrays, ArraysAtPoints, Quantity, interpret_staged};
 use mmsmith_runtime::{AnySolution, Domain, Law, Solution, Surface};
 use mmsmith_spec::{Fields as Derived, Spec};
@@ -167,7 +167,7 @@ impl Fields {
         py.detach(|| {
             // Times are shifted in the part in Python, which knows the solver's time steps.
             let plant = |spec: &Spec, fields: &mut Derived| {
-                Cause::plant_all(&causes, spec, fields, f64::NAN)
+                Cause::plant_all(&causes, spec, fields, Steps::of(f64::NAN, f64::NAN))
             };
             Fields::build(self.spec.clone(), &self.parameters, Some(names.join(" and ")), plant)
         })

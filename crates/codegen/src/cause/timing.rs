@@ -1,6 +1,6 @@
 //! Fields at other times and places.
 
-use super::{Placed, Timed};
+use super::{Placed, Steps, Timed, Unused};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
 use mmsmith_spec::Fields;
 use std::collections::BTreeMap;
@@ -16,13 +16,12 @@ fn number(graph: &mut Graph, value: f64) -> Expr {
     graph.number(value)
 }
 
-/// Zero up to half a time step, one from one time step on.
-fn later(graph: &mut Graph, dt: f64) -> Expr {
+/// Zero before the time `start`, one after it.
+fn later(graph: &mut Graph, start: f64) -> Expr {
     let t = graph.symbol("t");
-    let step = number(graph, dt);
-    let three_quarters = graph.number(Rational::new(3.into(), 4.into()));
-    let in_steps = graph.div(t, step);
-    let beyond = graph.sub(in_steps, three_quarters);
+    let start = number(graph, start);
+    let in_starts = graph.div(t, start);
+    let beyond = graph.sub(in_starts, Graph::ONE);
     let sharp = graph.integer(SHARP);
     let steep = graph.mul(sharp, beyond);
     let tanh = graph.call(Function::Tanh, &[steep]);
@@ -31,21 +30,26 @@ fn later(graph: &mut Graph, dt: f64) -> Expr {
     graph.mul(half, sum)
 }
 
-/// A field at a time that is so many steps later.
-pub(super) fn shift(fields: &mut Fields, of: Timed, steps: f64, dt: f64) {
+/// One before the time `start`, zero after it.
+fn earlier(graph: &mut Graph, start: f64) -> Expr {
+    let later = later(graph, start);
+    graph.sub(Graph::ONE, later)
+}
+
+/// A field at a time that is later by `by`.
+pub(super) fn shift(fields: &mut Fields, of: Timed, by: f64, start: f64) {
     let graph = &mut fields.graph;
     let t = graph.symbol("t");
-    let by = number(graph, steps * dt);
+    let by = number(graph, by);
     let by = match of {
         Timed::Force | Timed::Inertia | Timed::Traction => by,
         Timed::Boundary | Timed::BoundaryVelocity => {
-            let later = later(graph, dt);
+            let later = later(graph, start);
             graph.mul(by, later)
         }
         Timed::InitialVelocity => {
-            let later = later(graph, dt);
-            let at_start = graph.sub(Graph::ONE, later);
-            graph.mul(by, at_start)
+            let earlier = earlier(graph, start);
+            graph.mul(by, earlier)
         }
     };
     let shifted = graph.add(t, by);
@@ -71,16 +75,15 @@ pub(super) fn shift(fields: &mut Fields, of: Timed, steps: f64, dt: f64) {
     }
 }
 
-/// A body force that within the first steps pushes a body at rest to its velocity.
-pub(super) fn push(fields: &mut Fields, steps: f64, dt: f64) {
+/// A body force that within the first step pushes a body at rest to its velocity; the push is so many steps long.
+pub(super) fn push(fields: &mut Fields, length: f64, Steps { dt, start, .. }: Steps) {
     let graph = &mut fields.graph;
-    let later = later(graph, dt);
-    let at_start = graph.sub(Graph::ONE, later);
-    let length = number(graph, steps * dt);
-    let rate = graph.div(at_start, length);
+    let at_start = earlier(graph, start);
+    let duration = number(graph, length * dt);
+    let rate = graph.div(at_start, duration);
     // A staggered scheme has no velocity at t = 0, but half a step before it.
     let t = graph.symbol("t");
-    let back = number(graph, if steps < 1.0 { 0.0 } else { -dt / 2.0 });
+    let back = number(graph, if length < 1.0 { 0.0 } else { -dt / 2.0 });
     let before = graph.add(t, back);
     let times = BTreeMap::from([(t, before)]);
     for (b, &v) in fields.b.iter_mut().zip(&fields.v) {
@@ -123,5 +126,52 @@ pub(super) fn seek(fields: &mut Fields, placed: Placed) {
             fields.surfaces.iter_mut().for_each(|surface| place_all(&mut surface.traction));
         }
         Placed::Boundary => place_all(&mut fields.u),
+    }
+}
+
+/// The body force at points that lie so far along every axis.
+pub(super) fn beside(fields: &mut Fields, by: f64) {
+    let n = fields.u.len();
+    let definitions: BTreeMap<Expr, Expr> = fields.definitions.iter().copied().collect();
+    let Fields { graph, inputs, b, .. } = fields;
+    let by = number(graph, by);
+    let places: BTreeMap<Expr, Expr> =
+        inputs[..n].iter().map(|&(X, _)| (X, graph.add(X, by))).collect();
+    for entry in b {
+        let explicit = graph.replace(*entry, &definitions);
+        *entry = graph.replace(explicit, &places);
+    }
+}
+
+/// A field larger by a hundredth.
+pub(super) fn nudge(fields: &mut Fields, unused: Unused, start: f64) {
+    let graph = &mut fields.graph;
+    let hundredth = graph.number(Rational::new(1.into(), 100.into()));
+    let share = match unused {
+        Unused::Force | Unused::ForceComponent | Unused::Traction => hundredth,
+        Unused::ForceLater | Unused::TractionLater | Unused::Boundary => {
+            let later = later(graph, start);
+            graph.mul(hundredth, later)
+        }
+        Unused::InitialVelocity | Unused::InitialDisplacement => {
+            let earlier = earlier(graph, start);
+            graph.mul(hundredth, earlier)
+        }
+    };
+    let factor = graph.add(Graph::ONE, share);
+    let mut scale = |vector: &mut [Expr]| {
+        vector.iter_mut().for_each(|entry| *entry = graph.mul(factor, *entry));
+    };
+    match unused {
+        Unused::Force | Unused::ForceLater => scale(&mut fields.b),
+        Unused::ForceComponent => {
+            let last = fields.b.len() - 1;
+            scale(&mut fields.b[last..]);
+        }
+        Unused::Traction | Unused::TractionLater => {
+            fields.surfaces.iter_mut().for_each(|surface| scale(&mut surface.traction));
+        }
+        Unused::Boundary | Unused::InitialDisplacement => scale(&mut fields.u),
+        Unused::InitialVelocity => scale(&mut fields.v),
     }
 }
