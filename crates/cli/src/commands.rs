@@ -158,7 +158,12 @@ fn caption(selection: &Selection, settled: &Settled, extent: Option<Extent>) -> 
 fn setting(selection: &Selection, settled: &Settled, extent: Option<Extent>) -> String {
     let Case { scheme, per_cell, periods, .. } = settled.case;
     let Parts { shape, integrator, .. } = scheme.parts();
-    let extent = extent.map(|extent| format!(", {extent}")).unwrap_or_default();
+    let part = |extent| match (extent, selection.dimension()) {
+        // Three planes of symmetry.
+        (Extent::Quarter, 3) => ", eighth".to_owned(),
+        _ => format!(", {extent}"),
+    };
+    let extent = extent.map(part).unwrap_or_default();
     format!(
         "({}){extent}: {shape} + {integrator}{}, {per_cell} particles per cell and direction, {}, {}",
         selection.told_parameters(),

@@ -89,9 +89,11 @@ fn skeleton(form: Form, section: &Section) -> Vec<String> {
             .collect(),
         Form::Orders | Form::Displacement | Form::Speed => {
             let (common, labels) = labels(&section.commands);
-            std::iter::once(format!("Each row is `{common}` with the words of its first column."))
-                .chain(labels.into_iter().map(|label| format!("| `{label}` |")))
-                .collect()
+            std::iter::once(format!(
+                "Each row is the command `{common}` with the options in its first column."
+            ))
+            .chain(labels.into_iter().map(|label| format!("| `{label}` |")))
+            .collect()
         }
     }
 }
@@ -255,7 +257,9 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
         }
         Form::Orders | Form::Displacement | Form::Speed => {
             let (common, labels) = labels(&section.commands);
-            parts.push(format!("Each row is `{common}` with the words of its first column.\n"));
+            parts.push(format!(
+                "Each row is the command `{common}` with the options in its first column.\n"
+            ));
             let columns = form.columns();
             parts.push(format!("| | {} |", columns.join(" | ")));
             parts.push(format!("|---|{}", "---:|".repeat(columns.len())));

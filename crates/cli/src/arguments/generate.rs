@@ -28,8 +28,13 @@ pub(crate) struct GenerateOptions {
 
 /// Hosts, with a line about each.
 fn hosts() -> impl TypedValueParser<Value = &'static Host> {
-    let values = HOSTS.iter().map(|own| PossibleValue::new(own.name).help(own.about));
-    PossibleValuesParser::new(values).try_map(|name| Host::named(&name.to_lowercase()).ok_or(name))
+    // As people call the language.
+    let alias = |name: &str| (name == "cpp").then_some("c++");
+    let values = HOSTS
+        .iter()
+        .map(|own| PossibleValue::new(own.name).help(own.about).aliases(alias(own.name)));
+    PossibleValuesParser::new(values)
+        .try_map(|name| Host::named(&name.to_lowercase().replace("c++", "cpp")).ok_or(name))
 }
 
 /// Faults, with a line about each.

@@ -254,7 +254,7 @@ choices!(
 choices!(
     /// How much of a ring or a shell.
     Extent => verify::Extent {
-        /// The part between the planes of symmetry
+        /// The part between the planes of symmetry: a quarter of a ring, an eighth of a shell
         Quarter,
         /// All of it
         Full,

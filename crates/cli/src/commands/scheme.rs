@@ -15,7 +15,7 @@ use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, Scheme
 pub(super) const USUAL_CFL: f64 = 0.4;
 /// The number of cells where nothing is said.
 const USUAL_CELLS: usize = 32;
-/// The same for a solid of three dimensions in a total frame that was not asked for, whose cells have 64 particles each.
+/// The same for a solid of three dimensions in a total Lagrangian formulation that was not asked for, whose cells have 64 particles each.
 const USUAL_CELLS_OF_SOLIDS: usize = 16;
 /// Particles in a cell along each direction, but for Gauss points.
 const USUAL_PER_CELL: usize = 2;
@@ -35,7 +35,7 @@ pub(super) struct Settled {
     pub(super) loaded: Vec<Boundary>,
 }
 
-/// A total frame that was not asked for.
+/// A total Lagrangian formulation that was not asked for.
 #[derive(Clone)]
 pub(super) struct Choice {
     scheme: Total,
@@ -44,7 +44,7 @@ pub(super) struct Choice {
     cfl_is_chosen: bool,
 }
 
-/// What holds for a solution that the updated frame models, with the given weights and integrator.
+/// What holds for a solution that the updated Lagrangian formulation models, with the given weights and integrator.
 pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> Case {
     let scheme = Scheme::Updated(Updated { shape, stepping, ..Updated::default() });
     Case { scheme, cells, ..Case::default() }
@@ -165,7 +165,7 @@ impl Settled {
     }
 }
 
-/// Whether the options say something that only the updated frame has.
+/// Whether the options say something that only the updated Lagrangian formulation has.
 fn says_updated(options: &SchemeOptions) -> bool {
     options.shape.is_some_and(|shape| shape.degree().is_none())
         || options.integrator != Integrator::Cd
@@ -298,7 +298,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
     })
 }
 
-/// What weights and integrator leave unsaid, in words; of the updated frame what is not the usual.
+/// What weights and integrator leave unsaid, in words; of the updated Lagrangian formulation what is not the usual.
 pub(super) fn words(scheme: &Scheme) -> String {
     let Parts { composition, mass, layout, grid, start, pose, .. } = scheme.parts();
     match scheme {

@@ -122,7 +122,7 @@ impl Comparison {
     }
 }
 
-/// Five schemes that may fit a solution, of different cost: in the updated frame in one pass a step and in several, and in the
+/// Five schemes that may fit a solution, of different cost: in the updated Lagrangian formulation in one pass a step and in several, and in the
 /// total one.
 fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     let open = SchemeOptions::open();
@@ -158,7 +158,7 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
         let Parts { shape, integrator, .. } = case.scheme.parts();
         let mut words = match case.scheme {
             Scheme::Updated(_) => format!("{shape} + {integrator}"),
-            Scheme::Total(_) => format!("{shape}, total frame"),
+            Scheme::Total(_) => format!("{shape}, total Lagrangian"),
         };
         if options.mass.is_some() {
             words += ", lumped mass";

@@ -41,7 +41,7 @@ fn schemes() -> [Curved; 3] {
             order: Some(2),
         },
         Curved {
-            name: "bspline3, total frame",
+            name: "bspline3, total Lagrangian",
             case: Case { scheme: Scheme::Total(splines), per_cell: 4, cfl: 0.2, ..usual },
             order: Some(4),
         },
@@ -93,7 +93,7 @@ pub(super) fn svg() -> Result<String> {
         "A ring that expands and contracts, and the orders of three schemes on it",
         "Left: the particles of a ring after one period, coloured by hoop stress. Right: the largest error of the \
          displacement over the grid spacing, for particles on a square lattice, particles that fit the rims, and splines \
-         in the total frame.",
+         in the total Lagrangian formulation.",
         height,
         &[ring, plot],
     ))

@@ -98,7 +98,7 @@ impl Report<'_> {
             });
             let best = own.min_by(|a, b| self.error(a).total_cmp(&self.error(b)));
             let Some(best) = best else {
-                lines.push(format!("Not {kind}: every run of it stopped."));
+                lines.push(format!("{kind} does not suit this solution: every run of it stopped."));
                 continue;
             };
             let cheaper = entries
@@ -112,8 +112,8 @@ impl Report<'_> {
                 continue;
             };
             lines.push(format!(
-                "Not {kind} for accuracy: its best within the budget is {:.2e} in {:.1e} s ({}); {} has {:.2e} in {:.1e} s, a \
-                 factor of {:.0}.",
+                "{kind} is slow for small errors: its smallest error within the budget is {:.2e}, in {:.1e} s ({}). {} has {:.2e} in {:.1e} s, \
+                 {:.0} times faster.",
                 self.error(best),
                 best.row.wall_s,
                 words::line(&best.setting),

@@ -16,7 +16,7 @@ fn precision(setting: &Setting) -> &'static str {
     if setting.single { "f32" } else { "f64" }
 }
 
-/// What settings are drawn and tabulated alike: the weights, the frame, and whether particles fit the body.
+/// What settings are drawn and tabulated alike: the weights, the formulation, and whether particles fit the body.
 pub(super) fn kind(setting: &Setting) -> String {
     let Parts { shape, layout, .. } = parts(setting);
     match setting.case.scheme {
