@@ -72,7 +72,7 @@ pub(crate) fn is_first() -> bool {
     ranks().is_none_or(|ranks| ranks.rank() == 0)
 }
 
-/// The number of threads of a process where nothing is said: its part of the cores here. Zero takes all.
+/// The default number of threads of a process: its part of the cores here. Zero takes all.
 pub(crate) fn threads(said: Option<usize>) -> usize {
     let part = || {
         let here = number(&COUNTS_HERE).unwrap_or(1).max(1);

@@ -58,6 +58,11 @@ impl Bar {
     /// A bar that tells the time left from the start, for work that is predicted to take so many seconds.
     pub(crate) fn expecting(name: &str, predicted_s: Option<f64>) -> Self {
         let bar = ProgressBar::new(LENGTH);
+        // Before it is first drawn.
+        let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.retain(|bar| bar.upgrade().is_some());
+        shown.push(bar.downgrade());
+        drop(shown);
         if terminal::is_quiet() || !stderr().is_terminal() {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
@@ -71,10 +76,6 @@ impl Bar {
         line.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
         // What the bar says is complete before it is first drawn.
         line.bar.enable_steady_tick(Duration::from_millis(500));
-        let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        shown.retain(|bar| bar.upgrade().is_some());
-        shown.push(line.bar.downgrade());
-        drop(shown);
         Self { line: Arc::new(line), stretch: (0.0, 1.0) }
     }
 

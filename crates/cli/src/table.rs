@@ -14,6 +14,8 @@ pub(crate) struct Table {
     words: usize,
     /// Columns that text leaves out where they do not fit, in this order.
     spare: Vec<Range<usize>>,
+    /// As many of these are left out in any case, since a table beside this one has no room for them.
+    unwanted: usize,
     /// The least width of a last column of words, which go on in the next line where they do not fit.
     flow: Option<usize>,
 }
@@ -24,7 +26,7 @@ const GAP: usize = 2;
 impl Table {
     pub(crate) fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
         let rows = vec![header.into_iter().map(Into::into).collect()];
-        Self { rows, words, spare: Vec::new(), flow: None }
+        Self { rows, words, spare: Vec::new(), unwanted: 0, flow: None }
     }
 
     /// The table with columns that text leaves out where the line is too short for all of them; those of the first call first.
@@ -106,13 +108,19 @@ impl Table {
             *last = (*last).min(least);
         }
         let mut kept: Vec<usize> = (0..widths.len()).collect();
-        for columns in &self.spare {
-            if line_length(&narrowest, &kept) <= most {
+        for (index, columns) in self.spare.iter().enumerate() {
+            if index >= self.unwanted && line_length(&narrowest, &kept) <= most {
                 break;
             }
             kept.retain(|column| !columns.contains(column));
         }
         kept
+    }
+
+    /// How many groups of spare columns have no room.
+    fn without_room(&self, most: usize) -> usize {
+        let kept = self.kept(&self.widths(), most);
+        self.spare.iter().filter(|columns| !kept.iter().any(|kept| columns.contains(kept))).count()
     }
 
     /// A row as text: one line, or several where its last cell flows.
@@ -222,6 +230,15 @@ fn parts(widths: &[usize], kept: &[usize], heads: usize, most: usize) -> Vec<Vec
     parts
 }
 
+/// Leaves out of each table what one of them has no room for, so that tables of one study have the same columns.
+pub(crate) fn align<K>(tables: &mut [(K, Table)]) {
+    let most = terminal::columns();
+    let unwanted = tables.iter().map(|(_, table)| table.without_room(most)).max().unwrap_or(0);
+    for (_, table) in tables {
+        table.unwanted = unwanted;
+    }
+}
+
 /// A line on the columns that the text of some tables leaves out, and what has them; nothing where there are none.
 pub(crate) fn on_left_out<'a>(tables: impl IntoIterator<Item = &'a Table>, has: &str) -> String {
     let mut names: Vec<&str> = tables.into_iter().flat_map(Table::left_out).collect();
@@ -292,6 +309,21 @@ mod tests {
         assert_eq!(table.text_within(23), "  cells      linf  rate\n     16  4.077e-3     -\n");
         let parts = "  cells      linf\n     16  4.077e-3\n\n  cells  rate\n     16     -\n";
         assert_eq!(table.text_within(20), parts);
+    }
+
+    #[test]
+    fn tables_of_one_study_have_the_same_columns() {
+        let table = |error: &str| {
+            let header = ["cells", "particles", "h [m]", "linf [m]", "l1"];
+            let mut table = Table::new(0, header).sparing(4..5);
+            table.row(["16", "256", "6.25e-2", error, "1"]);
+            table
+        };
+        let wide = "1".repeat(60);
+        let mut tables = [("a", table("1")), ("b", table(&wide))];
+        align(&mut tables);
+        assert!(tables.iter().all(|(_, table)| !table.text_within(80).contains("l1")));
+        assert!(table("1").text_within(80).contains("l1"));
     }
 
     #[test]

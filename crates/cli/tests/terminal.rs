@@ -8,17 +8,19 @@ use std::fs::File;
 use std::io::Read;
 use std::os::fd::OwnedFd;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use command::mms;
 use nix::pty::{OpenptyResult, Winsize, openpty};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
-/// Calls `mms` with `arguments` in `place` on a terminal of so many columns; what the terminal got, and the exit status.
-fn on_terminal(place: &Path, columns: u16, arguments: &str) -> (String, i32) {
+/// Starts `mms` with `arguments` in `place` on a terminal of so many columns; what it writes is read from the other end.
+fn start(place: &Path, columns: u16, arguments: &str) -> (Child, File) {
     let size = Winsize { ws_row: 40, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
     let OpenptyResult { master, slave } = openpty(Some(&size), None).expect("a terminal");
     let end = |terminal: &OwnedFd| Stdio::from(terminal.try_clone().expect("another handle"));
-    let mut child = Command::new(env!("CARGO_BIN_EXE_mms"))
+    let child = Command::new(env!("CARGO_BIN_EXE_mms"))
         .current_dir(place)
         .args(arguments.split_whitespace())
         .env("TERM", "xterm-256color")
@@ -28,10 +30,15 @@ fn on_terminal(place: &Path, columns: u16, arguments: &str) -> (String, i32) {
         .stderr(end(&slave))
         .spawn()
         .expect("the binary starts");
-    drop(slave);
+    (child, File::from(master))
+}
+
+/// Calls `mms` with `arguments` in `place` on a terminal of so many columns; what the terminal got, and the exit status.
+fn on_terminal(place: &Path, columns: u16, arguments: &str) -> (String, i32) {
+    let (mut child, mut terminal) = start(place, columns, arguments);
     let mut bytes = Vec::new();
     // The last reader of a terminal whose other end is closed gets an error on Linux.
-    let _ = File::from(master).read_to_end(&mut bytes);
+    let _ = terminal.read_to_end(&mut bytes);
     let status = child.wait().expect("it ends").code().expect("it ends by itself");
     (String::from_utf8(bytes).expect("text"), status)
 }
@@ -165,6 +172,26 @@ fn progress_stays_in_its_line() {
     for line in plain(&shown).lines().flat_map(|line| line.split('\r')) {
         assert!(line.chars().count() <= 80, "{line}");
     }
+}
+
+#[test]
+fn an_interruption_takes_the_bar_away_and_says_so() {
+    let place = tempfile::tempdir().unwrap();
+    let (mut child, mut terminal) = start(place.path(), 80, "check --thorough ring --seconds 1h");
+    let mut shown = Vec::new();
+    let mut more = [0; 4096];
+    while !String::from_utf8_lossy(&shown).contains("] ") {
+        let read = terminal.read(&mut more).expect("it is under way");
+        shown.extend_from_slice(&more[..read]);
+    }
+    let id = Pid::from_raw(child.id().try_into().expect("an identifier"));
+    kill(id, Signal::SIGINT).expect("it is under way");
+    let _ = terminal.read_to_end(&mut shown);
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    let shown = String::from_utf8_lossy(&shown).into_owned();
+    let (before, end) = shown.rsplit_once("\u{1b}[2K").expect("the bar was drawn");
+    assert!(before.contains("] ") && !end.contains("] "), "{shown:?}");
+    assert!(plain(end).ends_with("error: interrupted\r\n"), "{shown:?}");
 }
 
 #[test]

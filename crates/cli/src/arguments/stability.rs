@@ -73,7 +73,7 @@ pub(crate) enum SearchKind {
 }
 
 impl StabilityOptions {
-    /// A map over two settings, told as `NAME=VALUE,...`, with what holds where nothing is said.
+    /// A map over two settings, told as `NAME=VALUE,...`, with defaults for the rest.
     pub(crate) fn map(name: &str, cells: usize, over: [&str; 2]) -> Self {
         Self { cells, ..parsed(&[name, "--over", over[0], "--over", over[1]]) }
     }

@@ -130,7 +130,7 @@ impl TradeoffOptions {
         (!cases.is_empty()).then_some(cases)
     }
 
-    /// What holds where nothing is said.
+    /// The defaults.
     pub(crate) fn usual(name: &str, budget: f64) -> Self {
         Self { budget, ..parsed(&[name]) }
     }

@@ -147,12 +147,14 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                 let title = format!("difference of {} on this grid", units::named(field, units));
                 sections.push((title, table.with_unit(&["dt"], time)));
             }
-            sections.push(("verdicts on the differences".into(), verdict_table(judged, "dt")));
+            sections
+                .push(("verdicts on the differences".into(), verdict_table(judged, "dt", true)));
             notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
         }
         notes += &way_out(&model.exact, &base, &study);
         let what = if differences.is_some() { "verdicts on the errors" } else { "verdicts" };
-        sections.push((what.into(), verdict_table(&judged, step_name(&sweep))));
+        sections
+            .push((what.into(), verdict_table(&judged, step_name(&sweep), differences.is_none())));
         if has_range(&judged) || differences.as_ref().is_some_and(|(_, judged)| has_range(judged)) {
             notes += "Rows in parentheses are outside the asymptotic range.\n";
         }
@@ -433,7 +435,7 @@ const NORMS: [&str; 6] = ["linf", "rate", "l2", "rate", "l1", "rate"];
 /// One table for each field: a row a case, and the rate right of each norm.
 pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field, Table); 4] {
     let errors: Vec<_> = study.rows.iter().map(|row| &row.errors).collect();
-    Field::ALL.map(|field| {
+    let mut tables = Field::ALL.map(|field| {
         let header = ["cells", "particles", "h", "CFL"].into_iter().chain(NORMS).chain(["status"]);
         let table = Table::new(0, header).sparing(8..10).sparing(1..2).sparing(3..4);
         let mut table = table.sparing(6..8);
@@ -455,12 +457,14 @@ pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field
             &study.orders,
         ));
         (field, table)
-    })
+    });
+    table::align(&mut tables);
+    tables
 }
 
 /// The same for differences on one grid.
 pub(super) fn difference_tables(temporal: &Temporal, judged: &Verdicts) -> [(Field, Table); 4] {
-    Field::ALL.map(|field| {
+    let mut tables = Field::ALL.map(|field| {
         let header = ["dt", "CFL", "steps"].into_iter().chain(NORMS).chain(["status"]);
         let mut table = Table::new(0, header).sparing(7..9).sparing(2..3).sparing(5..7);
         for (index, row) in temporal.rows.iter().enumerate() {
@@ -473,7 +477,9 @@ pub(super) fn difference_tables(temporal: &Temporal, judged: &Verdicts) -> [(Fie
         let empty = String::new;
         table.row(fits(["fit in dt".into(), empty(), empty()], field, &temporal.orders));
         (field, table)
-    })
+    });
+    table::align(&mut tables);
+    tables
 }
 
 /// Error and rate in each norm; in parentheses outside the asymptotic range, if there is one.
@@ -525,8 +531,8 @@ fn on_range(judged: &Verdicts, rows: usize) -> String {
     format!("No asymptotic range: it is open which order the errors tend to. {remedy}\n")
 }
 
-/// What each field and norm shows, a row each.
-pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
+/// What each field and norm shows, a row each. `is_decisive` where the result of the study hangs on it.
+pub(super) fn verdict_table(judged: &Verdicts, step: &str, is_decisive: bool) -> Table {
     let header = ["field", "norm", "expected", "order", "leading term", "verdict"];
     let mut table = Table::new(2, header).sparing(4..5).flowing(37);
     for (field, norms) in judged.iter() {
@@ -538,7 +544,9 @@ pub(super) fn verdict_table(judged: &Verdicts, step: &str) -> Table {
             let behaviour = match one.behaviour {
                 Behaviour::Asymptotic => "asymptotic",
                 Behaviour::NotSettled => "no asymptotic range",
-                Behaviour::DoesNotConverge => "DOES NOT CONVERGE",
+                Behaviour::DoesNotConverge if is_decisive => "DOES NOT CONVERGE",
+                // The error of the grid, which a study of time steps leaves as it is.
+                Behaviour::DoesNotConverge => "does not fall with dt",
                 Behaviour::Stopped => "the finest run STOPPED",
                 Behaviour::NotJudged => "the finest run is not judged",
                 Behaviour::AtRounding => "too few errors above rounding",

@@ -11,9 +11,9 @@ use mmsmith_verify::{
 
 use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Weights};
 
-/// The CFL number where nothing is said, and nothing else of the scheme was chosen for the solution.
+/// The default CFL number, unless mms chose the formulation for the solution.
 pub(super) const USUAL_CFL: f64 = 0.4;
-/// The number of cells where nothing is said.
+/// The default number of cells.
 const USUAL_CELLS: usize = 32;
 /// The same for a solid of three dimensions in a total Lagrangian formulation that was not asked for, whose cells have 64 particles each.
 const USUAL_CELLS_OF_SOLIDS: usize = 16;
@@ -176,7 +176,7 @@ fn says_updated(options: &SchemeOptions) -> bool {
         || options.precision == Precision::F32
 }
 
-/// Particles in a cell along each direction where nothing is said: as many Gauss points as integrate the splines' squares.
+/// The default number of particles per cell and direction: as many Gauss points as integrate the splines' squares.
 fn per_cell(scheme: &Scheme) -> usize {
     match scheme {
         Scheme::Total(Total { layout: verify::Layout::Gauss, degree, .. }) => degree + 1,

@@ -190,7 +190,7 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
         text += &table.html(&format!("{problem}: runs that stopped"));
     }
     let best = &results.space[0];
-    text += &verdict_table(&best.verdicts, "h")
+    text += &verdict_table(&best.verdicts, "h", true)
         .html(&format!("{problem}: what each field of {} shows in space, at CFL 0.4", best.name()));
     if does_not_converge(results) {
         text += "<p>The L_inf error of F does not converge here: particles at the stair-stepped rim keep an error of \

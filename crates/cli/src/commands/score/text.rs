@@ -53,9 +53,10 @@ pub(super) fn text(selection: &Selection, score: &Score) -> String {
         None => text += &score.rows.iter().map(|row| errors(row, units)).collect::<String>(),
         Some(_) => {
             let tables = tables(score).into_iter();
-            let tables: Vec<(Quantity, Table)> = tables
+            let mut tables: Vec<(Quantity, Table)> = tables
                 .map(|(field, table)| (field, table.with_unit(&["h"], units.map(Units::length))))
                 .collect();
+            table::align(&mut tables);
             for (field, table) in &tables {
                 text += &format!("\nerror of {}\n{}", named(*field, units), table.text());
             }

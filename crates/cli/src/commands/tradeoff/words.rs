@@ -57,7 +57,7 @@ pub(super) fn scheme(setting: &Setting) -> String {
     told.join(", ")
 }
 
-/// Whether the particles lie as they do where nothing is said.
+/// Whether the particles lie as they do by default.
 fn is_lattice(scheme: &Scheme) -> bool {
     match scheme {
         Scheme::Updated(updated) => matches!(updated.placement, Placement::Lattice { .. }),
