@@ -75,8 +75,13 @@ fn named(field: Quantity, units: Option<Units>) -> String {
 /// What was read, and what is to be said about it.
 fn heading(row: &ScoreRow) -> String {
     let mut text = format!(
-        "{}: {} particles, {} frame(s) from t = {:?} to {:?}, h = {:?}\n",
-        row.file, row.particles, row.frames, row.first_time, row.last_time, row.h
+        "{}: {} particles, {} frame(s) from t = {:?} to {:?}, h = {}\n",
+        row.file,
+        row.particles,
+        row.frames,
+        row.first_time,
+        row.last_time,
+        number::rounded(row.h, 4)
     );
     text += &format!("  reference positions: {}\n", row.reference_positions.words());
     text += &format!("  displacements: {}\n", row.displacements.words());
@@ -169,7 +174,7 @@ pub(super) fn of_agreement(
         row.file,
         scheme.unwrap_or_default(),
         agreement.run.steps,
-        number::exact(agreement.run.dt),
+        number::rounded(agreement.run.dt, 4),
         table.text()
     )
 }
