@@ -62,7 +62,7 @@ def test_parameters_and_what_is_known_of_a_solution():
     assert ring.parameters["A"] == 0.05
     assert ring.domain == mmsmith.Annulus(0.5, 1.0)
     assert ring.boundaries["outer"] == "traction-free"
-    assert (ring.dimension, ring.law_name, ring.density) == (2, "neo-hookean", 1.0)
+    assert (ring.dimension, ring.law_name, ring.density) == (2, "neo-hookean", 4.0)
     assert set(ring.law) == {"lambda", "mu"}
     assert mmsmith.load("skew-2d").domain == mmsmith.Box((0.0, 0.0), (1.0, 1.0))
     assert repr(ring) == "mmsmith.load('ring', A=0.05)"

@@ -180,7 +180,8 @@ def test_an_audit_counts_what_a_test_catches():
     with pytest.raises(AssertionError, match="the test fails with the right fields of ring"):
         mmsmith.audit(interpolating, "ring", u=3)
     # A force per volume is one per mass where the density is one.
-    assert mmsmith.audit(interpolating, "ring", faults=["body-force-per-volume"], u=2).outcomes["body-force-per-volume"]["ring"] == "blind"
+    one = mmsmith.load("ring", rho0=1.0)
+    assert mmsmith.audit(interpolating, one, faults=["body-force-per-volume"], u=2).outcomes["body-force-per-volume"]["ring"] == "blind"
 
 
 def test_a_solver_is_tested_in_three_lines(pytester):

@@ -9,7 +9,7 @@ int main(int count, char **argument)
     const int n = count > 1 ? atoi(argument[1]) : 16;
     axis_aligned_1d_parameters parameters = axis_aligned_1d_defaults();
     axis_aligned_1d_solution bar;
-    double X[MOST + 1], u[MOST + 1], v[MOST + 1], P[MOST], b, dX = 1.0 / n, dt = 0.2 * dX / 100.0;
+    double X[MOST + 1], u[MOST + 1], v[MOST + 1], P[MOST], b, dX = 1.0 / n, dt = 0.2 * dX / 50.0;
     const char *message = axis_aligned_1d_prepare(&bar, &parameters);
     int i, step, steps = 10 * n;
     if (message || n < 2 || n > MOST) {

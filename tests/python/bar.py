@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-A, E, NU, DENSITY, CFL = 0.1, 1e4, 0.3, 1.0, 0.4
+A, E, NU, DENSITY, CFL = 0.1, 1e4, 0.3, 4.0, 0.4
 LAMBDA, MU = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
 SPEED = np.sqrt(E / DENSITY)
 CELLS = (16, 32, 64, 128)

@@ -2,11 +2,11 @@
 
     python write_variants.py FOLDER
 
-The recording is exact but for known errors: the ring of the library (`mms-specs/ring.toml`, default parameters) at two
-times, on 6 points, with 1e-3 added to the displacement, 1e-2 to the velocity (x), 1e-4 to F[0][0] and 1 to P[1][1] of
+The recording is exact but for known errors: the ring of the library (`mms-specs/ring.toml`, default parameters, the density
+1) at two times, on 6 points, with 1e-3 added to the displacement, 1e-2 to the velocity (x), 1e-4 to F[0][0] and 1 to P[1][1] of
 the second frame. The files in `ok` were written by meshio, VTK (as ParaView writes) and pyvista. In each folder of `err`
 is damaged or senseless input, in each of `findings` one with something to be told; their `call.txt` holds the arguments
-of `mms score ring` and, line by line, what it must say.
+of `mms score ring --set rho0=1` and, line by line, what it must say.
 """
 
 import base64

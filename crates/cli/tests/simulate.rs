@@ -160,7 +160,7 @@ fn files_are_named_and_pictures_tell_units_and_scheme() {
     for file in ["drift.svg", "p.svg", "h.csv", "r.json"] {
         assert!(called.stdout.contains(&format!("wrote {file}\n")), "{}", called.stdout);
     }
-    assert!(called.stdout.contains(" steps of dt = 0.001 s, CFL 0.4\n"), "{}", called.stdout);
+    assert!(called.stdout.contains(" steps of dt = 0.002 s, CFL 0.4\n"), "{}", called.stdout);
     for field in ["  u [m] ", "  v [m/s] ", "  F ", "  P [Pa] "] {
         assert!(called.stdout.contains(field), "{}", called.stdout);
     }
@@ -540,7 +540,7 @@ fn a_run_draws_its_particles_at_a_time_with_axes_and_units() {
     let run = "run axis-aligned --cells 4 --threads 1 --at 0.5 --stress pressure --picture p.svg";
     assert_eq!(mms(place, run).status, 0);
     let picture = std::fs::read_to_string(place.join("p.svg")).unwrap();
-    assert!(picture.contains("axis-aligned: pressure, t = 0.01 s"), "{picture}");
+    assert!(picture.contains("axis-aligned: pressure, t = 0.02 s"), "{picture}");
     assert!(picture.contains(">x [m]<") && picture.contains(">Pa<"), "{picture}");
     assert_eq!(picture.matches("h0").count(), 64);
 

@@ -18,7 +18,7 @@ from skfem.helpers import ddot, dot, grad, transpose
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from at_rest import solution  # noqa: E402
 
-TIME = 0.004
+TIME = 0.008
 CELLS = (4, 8, 16)
 
 

@@ -36,6 +36,8 @@ use crate::{csv, number, terminal};
 
 /// The study's problems, by name.
 const PROBLEMS: [&str; 2] = ["axis-aligned", "ring"];
+/// The study's density, which the library's solutions do not have.
+const DENSITY: (&str, f64) = ("rho0", 1.0);
 const CD: Stepping = Stepping::Cd(Start::Halved);
 /// The schemes compared in space.
 const SPACE: [(Shape, Stepping); 5] = [
@@ -153,6 +155,17 @@ pub(crate) fn reproduce(options: &ReproduceOptions) -> Result<bool> {
     })
 }
 
+/// The study's density and the `values` of other parameters.
+fn study_parameters(values: &[(&str, f64)]) -> Vec<(String, f64)> {
+    let all = values.iter().chain([&DENSITY]);
+    all.map(|(name, value)| ((*name).to_owned(), *value)).collect()
+}
+
+/// A problem with [`study_parameters`].
+fn studied(problem: &str, values: &[(&str, f64)]) -> Result<Selection> {
+    Selection::new(problem, &study_parameters(values))
+}
+
 /// What runs of a problem take, from a few steps made just now.
 struct Pace {
     model: Model,
@@ -163,7 +176,7 @@ impl Pace {
     fn of(problem: &str) -> Result<Self> {
         /// Spent on the steps.
         const EFFORT: Duration = Duration::from_millis(100);
-        let model = Model::new(&Selection::new(problem, &[])?, Precision::F64)?;
+        let model = Model::new(&studied(problem, &[])?, Precision::F64)?;
         let usual = usual(Shape::Gimp, CD, GRID);
         // Only the bar depends on it.
         let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &usual, EFFORT).ok();
@@ -222,7 +235,7 @@ fn total_seconds(paces: &[Pace], budget: f64) -> f64 {
 
 /// The differences of the first problem at a small amplitude on a fine grid.
 fn gentle_differences(folder: &Path, pace: &Pace, agenda: &Agenda) -> Result<Vec<Differences>> {
-    let selection = Selection::new(PROBLEMS[0], &[("A".to_owned(), GENTLE)])?;
+    let selection = studied(PROBLEMS[0], &[("A", GENTLE)])?;
     let model = Model::new(&selection, Precision::F64)?;
     let all = DIFFERENCES.map(|scheme| {
         let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS));
@@ -274,7 +287,7 @@ fn measure_problem(
     pace: &Pace,
     agenda: &Agenda,
 ) -> Result<Results> {
-    let selection = Selection::new(problem, &[])?;
+    let selection = studied(problem, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let series = |kind: &str,
                   scheme: (Shape, Stepping),
@@ -387,7 +400,7 @@ fn introduction() -> String {
         "# The original study, again\n\n\
          P. Wallstedt and J. Guilkey, *Evaluation of Time Integration Schemes for the Generalized Interpolation \
          Material Point Method*, measured by mmsmith {} with {} thread(s).\n\n\
-         Both problems with their standard parameters, one period, 2 particles per cell and direction, CFL 0.4 on \
+         Both problems with the density 1 and their other standard parameters, one period, 2 particles per cell and direction, CFL 0.4 on \
          the bar wave speed where it is not varied, cd from the velocity at time zero with a halved first \
          acceleration. Errors are in units of length: L_inf is the largest over all particles and steps. Rates are \
          ln(e_i/e_(i-1)) / ln(h_i/h_(i-1)), in time with dt for h. All fields and norms are in the JSON and CSV \

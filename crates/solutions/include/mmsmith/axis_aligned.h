@@ -245,7 +245,7 @@ MMSMITH_FN axis_aligned_parameters axis_aligned_defaults(void)
     p.A = 0.1;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     return p;
 }
 

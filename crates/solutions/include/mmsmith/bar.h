@@ -239,7 +239,7 @@ MMSMITH_FN bar_parameters bar_defaults(void)
     p.A = 0.01;
     p.E = 10000.0;
     p.nu = 0.0;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     p.L = 1.0;
     return p;
 }

@@ -181,7 +181,7 @@ MMSMITH_FN rigid_motion_parameters rigid_motion_defaults(void)
     p.A = 1.0;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     p.U = 0.2;
     return p;
 }

@@ -178,7 +178,7 @@ MMSMITH_FN ring_parameters ring_defaults(void)
     ring_parameters p;
     p.A = 0.1;
     p.E = 10000.0;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     p.Ri = 0.5;
     p.Ro = 1.0;
     return p;

@@ -179,7 +179,7 @@ MMSMITH_FN shear_wave_parameters shear_wave_defaults(void)
     p.A = 0.05;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     p.L = 1.0;
     return p;
 }

@@ -276,7 +276,7 @@ MMSMITH_FN skew_3d_parameters skew_3d_defaults(void)
     p.A = 0.05;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     return p;
 }
 

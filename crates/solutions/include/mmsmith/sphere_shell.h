@@ -248,7 +248,7 @@ MMSMITH_FN sphere_shell_parameters sphere_shell_defaults(void)
     p.A = 0.05;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     p.Ri = 0.5;
     p.Ro = 1.0;
     return p;

@@ -244,7 +244,7 @@ MMSMITH_FN swirl_parameters swirl_defaults(void)
     p.A = 0.5;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     return p;
 }
 

@@ -183,7 +183,7 @@ MMSMITH_FN torsion_parameters torsion_defaults(void)
     p.A = 0.5;
     p.E = 10000.0;
     p.nu = 0.3;
-    p.rho0 = 1.0;
+    p.rho0 = 4.0;
     return p;
 }
 

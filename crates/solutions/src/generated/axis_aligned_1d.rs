@@ -19,7 +19,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
             A: T::nearest(0.1),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
         }
     }
 }
@@ -72,13 +72,13 @@ impl<T: crate::Real> AxisAligned1d<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
             },
         ],
-        specification: "# One coordinate of the axis-aligned problem: a bar in uniaxial strain between two walls.\nname = 'axis-aligned-1d'\ntitle = 'Axis-aligned displacement of a bar'\nreference = 'P. Wallstedt and J. Guilkey, Evaluation of Time Integration Schemes for the Generalized Interpolation Material Point Method (slides), in one dimension'\ncoordinates = 'cartesian'\ndimension = 1\n\n[parameters]\nA = { default = 0.1, range = '> -1/Pi, < 1/Pi', unit = 'm', description = 'amplitude; |A| Pi < 1 keeps J positive' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\n\n[displacement]\nX = 'A*sin(Pi*X)*cos(c*Pi*t)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'sliding'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# One coordinate of the axis-aligned problem: a bar in uniaxial strain between two walls.\nname = 'axis-aligned-1d'\ntitle = 'Axis-aligned displacement of a bar'\nreference = 'P. Wallstedt and J. Guilkey, Evaluation of Time Integration Schemes for the Generalized Interpolation Material Point Method (slides), in one dimension'\ncoordinates = 'cartesian'\ndimension = 1\n\n[parameters]\nA = { default = 0.1, range = '> -1/Pi, < 1/Pi', unit = 'm', description = 'amplitude; |A| Pi < 1 keeps J positive' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\n\n[displacement]\nX = 'A*sin(Pi*X)*cos(c*Pi*t)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'sliding'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

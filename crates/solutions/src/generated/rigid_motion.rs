@@ -21,7 +21,7 @@ impl<T: crate::Real> Default for RigidMotionParameters<T> {
             A: T::nearest(1.0),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
             U: T::nearest(0.2),
         }
     }
@@ -76,7 +76,7 @@ impl<T: crate::Real> RigidMotion<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
@@ -89,7 +89,7 @@ impl<T: crate::Real> RigidMotion<T> {
                 description: "amplitude of the translation",
             },
         ],
-        specification: "# Rotation and translation without deformation: stress is zero, b is the acceleration. It tests that a law is objective.\nname = 'rigid-motion'\ntitle = 'Rigid rotation and translation'\nreference = 'a test of objectivity'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 1.0, description = 'largest angle, in radians' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nU = { default = 0.2, unit = 'm', description = 'amplitude of the translation' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*sin(c*Pi*t)/2'\nco = 'cos(half)'\nsi = 'sin(half)'\n\n[displacement]\nX = '-2*si*(X*si + Y*co) + U*sin(c*Pi*t)'\nY = '2*si*(X*co - Y*si)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# Rotation and translation without deformation: stress is zero, b is the acceleration. It tests that a law is objective.\nname = 'rigid-motion'\ntitle = 'Rigid rotation and translation'\nreference = 'a test of objectivity'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 1.0, description = 'largest angle, in radians' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nU = { default = 0.2, unit = 'm', description = 'amplitude of the translation' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*sin(c*Pi*t)/2'\nco = 'cos(half)'\nsi = 'sin(half)'\n\n[displacement]\nX = '-2*si*(X*si + Y*co) + U*sin(c*Pi*t)'\nY = '2*si*(X*co - Y*si)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

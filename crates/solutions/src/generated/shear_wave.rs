@@ -21,7 +21,7 @@ impl<T: crate::Real> Default for ShearWaveParameters<T> {
             A: T::nearest(0.05),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
             L: T::nearest(1.0),
         }
     }
@@ -76,7 +76,7 @@ impl<T: crate::Real> ShearWave<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
@@ -89,7 +89,7 @@ impl<T: crate::Real> ShearWave<T> {
                 description: "wave length",
             },
         ],
-        specification: "# A plane shear wave of the linear theory that solves the nonlinear equations exactly: b = 0, in symbols. What a solver\n# returns is free of any mistake in b.\nname = 'shear-wave'\ntitle = 'Simple shear wave'\nreference = 'simple shear of a neo-Hookean body'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.05, unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nL = { default = 1.0, range = '> 0', unit = 'm', description = 'wave length' }\n\n[let]\nmu = 'E/(2*(1 + nu))'\nk = '2*Pi/L'\nw = 'sqrt(mu*k^2/rho0)'\n\n[displacement]\nX = 'A*sin(k*Y)*sin(w*t)'\n\n[material]\nlaw = 'neo-hookean'\nmu = 'mu'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = ['L', 'L']\ncell-length = 'L'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2*Pi/w'\nwave-speed = 'sqrt(E/rho0)'\n",
+        specification: "# A plane shear wave of the linear theory that solves the nonlinear equations exactly: b = 0, in symbols. What a solver\n# returns is free of any mistake in b.\nname = 'shear-wave'\ntitle = 'Simple shear wave'\nreference = 'simple shear of a neo-Hookean body'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.05, unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nL = { default = 1.0, range = '> 0', unit = 'm', description = 'wave length' }\n\n[let]\nmu = 'E/(2*(1 + nu))'\nk = '2*Pi/L'\nw = 'sqrt(mu*k^2/rho0)'\n\n[displacement]\nX = 'A*sin(k*Y)*sin(w*t)'\n\n[material]\nlaw = 'neo-hookean'\nmu = 'mu'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = ['L', 'L']\ncell-length = 'L'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2*Pi/w'\nwave-speed = 'sqrt(E/rho0)'\n",
     };
     /// The solution with the given parameters.
     ///

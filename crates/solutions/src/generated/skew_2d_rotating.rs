@@ -21,8 +21,8 @@ impl<T: crate::Real> Default for Skew2dRotatingParameters<T> {
             A: T::nearest(0.1),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
-            Omega: T::nearest(100.0),
+            rho0: T::nearest(4.0),
+            Omega: T::nearest(50.0),
         }
     }
 }
@@ -77,20 +77,20 @@ impl<T: crate::Real> Skew2dRotating<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
             },
             crate::Parameter {
                 name: "Omega",
-                default: 100.0,
+                default: 50.0,
                 unit: "1/s",
                 admissible: "",
                 description: "angular velocity of the whole body",
             },
         ],
-        specification: "# The skew motion of skew-2d in a body that turns as a whole: a law or an update of stress that is not objective shows.\nname = 'skew-2d-rotating'\ntitle = 'Skew motion of a turning square'\nreference = 'made for this library'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.1, range = '> -1/4, < 1/4', unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nOmega = { default = 100.0, unit = '1/s', description = 'angular velocity of the whole body' }\n\n[let]\nc = 'sqrt(E/rho0)'\np = 'c*Pi*t'\n\n[displacement]\nX = 'A*sin(3*X + Y)*cos(p)'\nY = 'A*(cos(2*X)*sin(Pi*Y/2) + X*Y^2/2)*(4*sin(p) + 3*cos(p))/5'\n\n[with-rotation]\nangle = 'Omega*t'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# The skew motion of skew-2d in a body that turns as a whole: a law or an update of stress that is not objective shows.\nname = 'skew-2d-rotating'\ntitle = 'Skew motion of a turning square'\nreference = 'made for this library'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.1, range = '> -1/4, < 1/4', unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nOmega = { default = 50.0, unit = '1/s', description = 'angular velocity of the whole body' }\n\n[let]\nc = 'sqrt(E/rho0)'\np = 'c*Pi*t'\n\n[displacement]\nX = 'A*sin(3*X + Y)*cos(p)'\nY = 'A*(cos(2*X)*sin(Pi*Y/2) + X*Y^2/2)*(4*sin(p) + 3*cos(p))/5'\n\n[with-rotation]\nangle = 'Omega*t'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

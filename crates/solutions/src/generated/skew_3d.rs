@@ -19,7 +19,7 @@ impl<T: crate::Real> Default for Skew3dParameters<T> {
             A: T::nearest(0.05),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
         }
     }
 }
@@ -74,13 +74,13 @@ impl<T: crate::Real> Skew3d<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
             },
         ],
-        specification: "# The skew motion in three dimensions: every entry of F differs from every other.\nname = 'skew-3d'\ntitle = 'Skew motion of a cube'\nreference = 'made for this library'\ncoordinates = 'cartesian'\ndimension = 3\n\n[parameters]\nA = { default = 0.05, range = '> -1/8, < 1/8', unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\np = 'c*Pi*t'\n\n[displacement]\nX = 'A*sin(3*X + Y - Z/2)*cos(p)'\nY = 'A*(cos(2*X)*sin(Pi*Y/2) + X*Z^2)*(4*sin(p) + 3*cos(p))/5'\nZ = 'A*exp(X/2)*cos(Y + 2*Z)*(5*cos(p) - 12*sin(p))/13'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0, 0]\nupper = [1, 1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# The skew motion in three dimensions: every entry of F differs from every other.\nname = 'skew-3d'\ntitle = 'Skew motion of a cube'\nreference = 'made for this library'\ncoordinates = 'cartesian'\ndimension = 3\n\n[parameters]\nA = { default = 0.05, range = '> -1/8, < 1/8', unit = 'm', description = 'amplitude' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\np = 'c*Pi*t'\n\n[displacement]\nX = 'A*sin(3*X + Y - Z/2)*cos(p)'\nY = 'A*(cos(2*X)*sin(Pi*Y/2) + X*Z^2)*(4*sin(p) + 3*cos(p))/5'\nZ = 'A*exp(X/2)*cos(Y + 2*Z)*(5*cos(p) - 12*sin(p))/13'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = [0, 0, 0]\nupper = [1, 1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

@@ -23,7 +23,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
             A: T::nearest(0.05),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
             Ri: T::nearest(0.5),
             Ro: T::nearest(1.0),
         }
@@ -80,7 +80,7 @@ impl<T: crate::Real> SphereShell<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
@@ -100,7 +100,7 @@ impl<T: crate::Real> SphereShell<T> {
                 description: "outer radius",
             },
         ],
-        specification: "# A hollow sphere that breathes, in three dimensions: every shell moves along its own radius.\nname = 'sphere-shell'\ntitle = 'Breathing spherical shell'\nreference = 'made for this library, after the ring of P. Wallstedt and J. Guilkey'\ncoordinates = 'spherical'\ndimension = 3\nrequire = ['Ri < Ro']\n\n[parameters]\nA = { default = 0.05, unit = 'm', description = 'amplitude of the outer surface' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nRi = { default = 0.5, range = '> 0', unit = 'm', description = 'inner radius' }\nRo = { default = 1.0, range = '> 0', unit = 'm', description = 'outer radius' }\n\n[let]\nc = 'sqrt(E/rho0)'\nT = 'A*cos(c*Pi*t)'\n\n[displacement]\nR = 'T*(R/Ro)^2*(3 - 2*R/Ro)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'shell'\ninner = 'Ri'\nouter = 'Ro'\n\n[[boundary]]\nsurface = 'inner'\ncondition = 'prescribed-traction'\n\n[[boundary]]\nsurface = 'outer'\ncondition = 'prescribed-traction'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'symmetry'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# A hollow sphere that breathes, in three dimensions: every shell moves along its own radius.\nname = 'sphere-shell'\ntitle = 'Breathing spherical shell'\nreference = 'made for this library, after the ring of P. Wallstedt and J. Guilkey'\ncoordinates = 'spherical'\ndimension = 3\nrequire = ['Ri < Ro']\n\n[parameters]\nA = { default = 0.05, unit = 'm', description = 'amplitude of the outer surface' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\nRi = { default = 0.5, range = '> 0', unit = 'm', description = 'inner radius' }\nRo = { default = 1.0, range = '> 0', unit = 'm', description = 'outer radius' }\n\n[let]\nc = 'sqrt(E/rho0)'\nT = 'A*cos(c*Pi*t)'\n\n[displacement]\nR = 'T*(R/Ro)^2*(3 - 2*R/Ro)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'shell'\ninner = 'Ri'\nouter = 'Ro'\n\n[[boundary]]\nsurface = 'inner'\ncondition = 'prescribed-traction'\n\n[[boundary]]\nsurface = 'outer'\ncondition = 'prescribed-traction'\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'symmetry'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'symmetry'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

@@ -19,7 +19,7 @@ impl<T: crate::Real> Default for SwirlParameters<T> {
             A: T::nearest(0.5),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
         }
     }
 }
@@ -73,13 +73,13 @@ impl<T: crate::Real> Swirl<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
             },
         ],
-        specification: "# Particles turn about the centre of a square, by an angle that vanishes at the walls with its gradient: there u = 0 and\n# F = I, so that walls may slide or stick. Nothing is deformed at t = 0. With the fourth power of the sines the motion and its\n# mirror image in a wall are smooth together, up to the third derivative: with squares, solvers that mirror at walls have\n# order 2. The cosine minus one is written with half the angle, which keeps its digits where the angle is small.\nname = 'swirl'\ntitle = 'Swirl in a square with walls'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.5, range = '> -2, < 2', description = 'largest angle, in radians' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*sin(Pi*X)^4*sin(Pi*Y)^4*sin(c*Pi*t)/2'\n\n[displacement]\nX = '-2*sin(half)^2*(X - 1/2) - 2*sin(half)*cos(half)*(Y - 1/2)'\nY = '2*sin(half)*cos(half)*(X - 1/2) - 2*sin(half)^2*(Y - 1/2)'\n\n[material]\nlaw = 'neo-hookean'\nlambda = 'E*nu/((1 + nu)*(1 - 2*nu))'\nmu = 'E/(2*(1 + nu))'\ndensity = 'rho0'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'sliding'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# Particles turn about the centre of a square, by an angle that vanishes at the walls with its gradient: there u = 0 and\n# F = I, so that walls may slide or stick. Nothing is deformed at t = 0. With the fourth power of the sines the motion and its\n# mirror image in a wall are smooth together, up to the third derivative: with squares, solvers that mirror at walls have\n# order 2. The cosine minus one is written with half the angle, which keeps its digits where the angle is small.\nname = 'swirl'\ntitle = 'Swirl in a square with walls'\ncoordinates = 'cartesian'\ndimension = 2\n\n[parameters]\nA = { default = 0.5, range = '> -2, < 2', description = 'largest angle, in radians' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*sin(Pi*X)^4*sin(Pi*Y)^4*sin(c*Pi*t)/2'\n\n[displacement]\nX = '-2*sin(half)^2*(X - 1/2) - 2*sin(half)*cos(half)*(Y - 1/2)'\nY = '2*sin(half)*cos(half)*(X - 1/2) - 2*sin(half)^2*(Y - 1/2)'\n\n[material]\nlaw = 'neo-hookean'\nlambda = 'E*nu/((1 + nu)*(1 - 2*nu))'\nmu = 'E/(2*(1 + nu))'\ndensity = 'rho0'\n\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'sliding'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'sliding'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

@@ -19,7 +19,7 @@ impl<T: crate::Real> Default for TorsionParameters<T> {
             A: T::nearest(0.5),
             E: T::nearest(10000.0),
             nu: T::nearest(0.3),
-            rho0: T::nearest(1.0),
+            rho0: T::nearest(4.0),
         }
     }
 }
@@ -74,13 +74,13 @@ impl<T: crate::Real> Torsion<T> {
             },
             crate::Parameter {
                 name: "rho0",
-                default: 1.0,
+                default: 4.0,
                 unit: "kg/m^3",
                 admissible: "> 0",
                 description: "reference density",
             },
         ],
-        specification: "# A bar whose cross sections turn by an angle in proportion to their height: shear with rotation, J = 1, in three\n# dimensions.\nname = 'torsion'\ntitle = 'Torsion of a square bar'\nreference = 'after the universal solution of R. Rivlin for torsion, with inertia'\ncoordinates = 'cartesian'\ndimension = 3\n\n[parameters]\nA = { default = 0.5, description = 'largest twist, in radians per length' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 1.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*Z*sin(c*Pi*t)/2'\nco = 'cos(half)'\nsi = 'sin(half)'\n\n[displacement]\nX = '-2*si*(X*si + Y*co)'\nY = '2*si*(X*co - Y*si)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = ['-1/2', '-1/2', 0]\nupper = ['1/2', '1/2', 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
+        specification: "# A bar whose cross sections turn by an angle in proportion to their height: shear with rotation, J = 1, in three\n# dimensions.\nname = 'torsion'\ntitle = 'Torsion of a square bar'\nreference = 'after the universal solution of R. Rivlin for torsion, with inertia'\ncoordinates = 'cartesian'\ndimension = 3\n\n[parameters]\nA = { default = 0.5, description = 'largest twist, in radians per length' }\nE = { default = 1.0e4, range = '> 0', unit = 'Pa', description = \"Young's modulus\" }\nnu = { default = 0.3, range = '> -1, < 1/2', description = \"Poisson's ratio\" }\nrho0 = { default = 4.0, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\n[let]\nc = 'sqrt(E/rho0)'\nhalf = 'A*Z*sin(c*Pi*t)/2'\nco = 'cos(half)'\nsi = 'sin(half)'\n\n[displacement]\nX = '-2*si*(X*si + Y*co)'\nY = '2*si*(X*co - Y*si)'\n\n[material]\nlaw = 'neo-hookean'\n\n[domain]\nshape = 'box'\nlower = ['-1/2', '-1/2', 0]\nupper = ['1/2', '1/2', 1]\n\n[[boundary]]\nsurface = 'X-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'X-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Y-upper'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-lower'\ncondition = 'prescribed-motion'\n\n[[boundary]]\nsurface = 'Z-upper'\ncondition = 'prescribed-motion'\n\n[time]\nperiod = '2/c'\nwave-speed = 'c'\n",
     };
     /// The solution with the given parameters.
     ///

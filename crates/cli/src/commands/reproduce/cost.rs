@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 
-use super::PROBLEMS;
 use super::section::Section;
+use super::{PROBLEMS, study_parameters};
 use crate::arguments::TradeoffOptions;
 use crate::commands::tradeoff::{Swept, sweep};
 use crate::json::Output;
@@ -15,7 +15,7 @@ use crate::terminal;
 /// Measures both problems for `budget` seconds each and writes their data into the folders of `out`.
 pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Section> {
     let said = format!(
-        "All schemes that fit a problem, from cheap to dear, for {budget} s each, as mms tradeoff NAME --budget {budget}s \
+        "All schemes that fit a problem, from cheap to dear, for {budget} s each, as mms tradeoff NAME --set rho0=1 --budget {budget}s \
          measures them. With more time the front goes further down, and more settings are confirmed on neighbouring cell \
          counts."
     );
@@ -26,7 +26,8 @@ pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Sectio
         let [json, csv, plot, advice] =
             ["tradeoff.json", "tradeoff.csv", "tradeoff.svg", "tradeoff.md"].map(file);
         let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
-        let options = TradeoffOptions::usual(problem, budget);
+        let mut options = TradeoffOptions::usual(problem, budget);
+        options.parameters.set = study_parameters(&[]);
         let Swept::All(report) = sweep(&options, &agenda.next(budget))? else {
             bail!("the report needs the whole sweep, not a shard's part of it");
         };

@@ -9,14 +9,13 @@ use mmsmith_verify::{
 use serde_json::json;
 
 use super::section::Section;
-use super::{CD, PROBLEMS, Pace, name};
+use super::{CD, PROBLEMS, Pace, name, studied};
 use crate::arguments::Precision;
 use crate::commands::run::{course, drift_plot, history_document};
 use crate::commands::scheme::{Settled, usual};
 use crate::commands::{Model, settings};
 use crate::csv;
 use crate::json::Output;
-use crate::library::Selection;
 use crate::progress::Agenda;
 use crate::table::Table;
 
@@ -45,7 +44,7 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
     let mut tables = Vec::new();
     for (problem, pace) in PROBLEMS.into_iter().zip(paces) {
         let folder = out.join(problem);
-        let selection = Selection::new(problem, &[])?;
+        let selection = studied(problem, &[])?;
         let model = Model::new(&selection, Precision::F64)?;
         let mut curves = Vec::new();
         let header = ["scheme", "least", "largest", "at the end", "momentum", "status"];

@@ -6,11 +6,10 @@ use mmsmith_verify::{
     Total, Updated, converge as measure, run as simulate,
 };
 
-use super::GRID;
+use super::{GRID, studied};
 use crate::arguments::{Precision, Stress};
 use crate::commands::Model;
 use crate::commands::picture::{draw, range};
-use crate::library::Selection;
 use crate::svg::{Curve, Plot, beside};
 use crate::units::Units;
 
@@ -50,7 +49,7 @@ fn schemes() -> [Curved; 3] {
 
 /// The picture.
 pub(super) fn svg() -> Result<String> {
-    let selection = Selection::new(PROBLEM, &[])?;
+    let selection = studied(PROBLEM, &[])?;
     let model = Model::new(&selection, Precision::F64)?;
     let units = Units::of(&selection);
 

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use mmsmith_verify::Shape;
 
 use super::section::Section;
-use super::{CD, PROBLEMS, Pace};
+use super::{CD, PROBLEMS, Pace, study_parameters};
 use crate::arguments::StabilityOptions;
 use crate::commands::scheme::usual;
 use crate::commands::stability::{Surveyed, survey};
@@ -32,7 +32,8 @@ pub(super) fn section(out: &Path, bar: &Bar) -> Result<Section> {
     let file = |name: &str| Output::prepare(&folder.join(name));
     let (json, csv, plot) =
         (file("stability.json")?, file("stability.csv")?, file("stability.svg")?);
-    let options = StabilityOptions::map(problem, CELLS, OVER);
+    let mut options = StabilityOptions::map(problem, CELLS, OVER);
+    options.scheme.parameters.set = study_parameters(&[]);
     let Surveyed::All(found) = survey(&options, bar)? else {
         bail!("the report needs the limits of all settings, not those of one shard");
     };

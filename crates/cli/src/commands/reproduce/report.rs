@@ -11,9 +11,9 @@ use sha2::{Digest, Sha256};
 use super::claims::{Claim, difference_orders, told_orders};
 use super::section::Section;
 use super::{
-    CELLS, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results, SMALL_STEP,
-    SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables, errors_with_units,
-    name, pictures, space_plot, stopped, tables, time_plot, verdict_table,
+    CELLS, DENSITY, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results,
+    SMALL_STEP, SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables,
+    errors_with_units, name, pictures, space_plot, stopped, tables, time_plot, verdict_table,
 };
 use crate::svg::escape;
 use crate::table::{self, Table};
@@ -144,9 +144,10 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     );
     let mut parameters = Table::new(1, ["parameter", "value", "unit"]);
     for parameter in description.parameters {
+        let (density, value) = DENSITY;
         parameters.row([
             parameter.name.to_owned(),
-            number::exact(parameter.default),
+            number::exact(if parameter.name == density { value } else { parameter.default }),
             if parameter.unit.is_empty() { "1".to_owned() } else { parameter.unit.to_owned() },
         ]);
     }
