@@ -563,6 +563,7 @@ impl Lowering<'_> {
                     a == b
                 })
             }
+            [_, _, ..] if !constant.is_zero() => self.graph.constant_among_terms(&constant, terms),
             _ => None,
         };
         if let Some(product) = product {

@@ -237,10 +237,16 @@ impl<'a> Accuracy<'a> {
                             Ok(None)
                         }
                         // Where two stretches pass zero together, J stays positive in an inverted body, in which
-                        // a law need not have a value; nor far from the body.
+                        // a law need not have a value; nor far from the body, nor on a face where a slope is infinite.
                         Err(AccuracyError::Oracle {
                             error: OracleError::Domain { .. }, ..
-                        }) if matches!(class, Class::NearInversion | Class::Far) => Ok(None),
+                        }) if matches!(
+                            class,
+                            Class::NearInversion | Class::Far | Class::Boundary
+                        ) =>
+                        {
+                            Ok(None)
+                        }
                         findings => findings.map(Some),
                     }
                 },

@@ -281,6 +281,11 @@ fn stresses_keep_the_digits_of_what_cancels() {
         (of_file("digits/one-direction-alone"), PLANE_AND_DIRECTION),
         (of_file("digits/triangular"), LARGE_STRETCHES),
         (of_file("digits/tube-of-constant-area"), STIFF_TUBE),
+        // K of u and H was 1e12 and more so early, K of v and a 930 and more so late.
+        (of_file("digits/start-from-rest"), &[0.3, 0.6, 4e-8, 0.05, 1200.0, 0.3, 1.7]),
+        (of_file("digits/start-from-rest"), &[0.7, 0.2, 4e-4, 0.05, 1200.0, 0.3, 1.7]),
+        (of_file("digits/saturating-ramps"), &[0.3, 0.6, 4.0, 0.05, 1200.0, 0.3, 1.7]),
+        (of_file("digits/saturating-ramps"), &[0.3, 0.6, 400.0, 0.05, 1200.0, 0.3, 1.7]),
     ];
     for (text, inputs) in cases {
         let spec = Spec::parse(&text, "a case").unwrap();

@@ -2,7 +2,7 @@
 
 use crate::graph::NumberMap;
 use crate::{Expr, Function, Graph, Node, Rational};
-use num_traits::{One, Signed};
+use num_traits::{One, Signed, Zero};
 
 /// Partial derivatives of the expressions of one graph, each found once.
 ///
@@ -113,8 +113,9 @@ impl Derivatives {
         rule.with(graph, &values)
     }
 
-    /// The derivative of `f S^p` for a sum `S` whose root is divided by, as `S^(p - 1) (S f' + p S' f)` where the bracket is
-    /// one term, as in `x/sqrt(1 + x^2)`: far away the two parts of it nearly cancel. `None` where it is not.
+    /// The derivative of `f S^p` for a sum `S` of a number and one term that is divided by, or one whose root is,
+    /// as `S^(p - 1) (S f' + p S' f)` where the bracket is one term, as in `x/(1 + x)` and `x/sqrt(1 + x^2)`: far away the two parts of it
+    /// nearly cancel. `None` where it is not.
     fn of_quotient(
         &mut self,
         graph: &mut Graph,
@@ -123,8 +124,9 @@ impl Derivatives {
         others: impl Iterator<Item = (Expr, Rational)>,
         variable: Expr,
     ) -> Option<Expr> {
-        let divides_by_root = exponent.is_negative() && !exponent.is_integer();
-        if !divides_by_root || !matches!(graph.node(base), Node::Sum { .. }) {
+        let Node::Sum { constant, terms } = graph.node(base) else { return None };
+        let saturates = !exponent.is_integer() || !constant.is_zero() && terms.len() == 1;
+        if !exponent.is_negative() || !saturates {
             return None;
         }
         let others = graph.product(others);

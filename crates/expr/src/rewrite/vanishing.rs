@@ -43,6 +43,25 @@ impl Graph {
         square.or_else(|| self.difference_to_constant(constant, term, coefficient))
     }
 
+    /// A sum of a constant and several terms, one of which vanishes with the constant somewhere, with these two as a product: a start
+    /// from rest, `Y sin(c t) + 1 - cos(c t)`, of which a common factor has been taken out.
+    pub(crate) fn constant_among_terms(
+        &mut self,
+        constant: &Rational,
+        terms: &[(Expr, Rational)],
+    ) -> Option<Expr> {
+        let (place, product) =
+            terms.iter().enumerate().find_map(|(place, (term, coefficient))| {
+                let is_wave = matches!(self.node(*term), Node::Call(Function::Cos, _));
+                let square = || self.square_of_half(constant, *term, coefficient);
+                Some((place, is_wave.then(square)??))
+            })?;
+        let others = terms.iter().enumerate().filter(|(other, _)| *other != place);
+        let others = others.map(|(_, (term, coefficient))| (coefficient.clone(), *term));
+        let all: Vec<_> = others.chain([(Rational::one(), product)]).collect();
+        Some(self.sum(all))
+    }
+
     /// `1 - cos(a) = 2 sin(a/2)^2`, `1 + cos(a) = 2 cos(a/2)^2`, `1 -+ sin(a)`, which are those of `pi/2 - a`, and `1 - cos(a)^2`,
     /// `1 - sin(a)^2`.
     fn square_of_half(
@@ -309,6 +328,24 @@ impl OfHalfAngles {
 mod tests {
     use super::*;
     use crate::Ast;
+
+    #[test]
+    fn a_constant_goes_with_the_wave_that_it_cancels_against() {
+        let mut graph = Graph::new();
+        let mut joined = |text: &str| {
+            let ast = Ast::parse(text).unwrap();
+            let sum = graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap();
+            let Node::Sum { constant, terms } = graph.node(sum).clone() else { return None };
+            let joined = graph.constant_among_terms(&constant, &terms)?;
+            Some(graph.print(joined))
+        };
+        let square = |text: &str| Some(text.to_owned());
+        assert_eq!(joined("Y*sin(c*t) + 1 - cos(c*t)"), square("Y*sin(c*t) + 2*sin(c*t/2)^2"));
+        assert_eq!(joined("3*Y + 2 + 2*cos(X)"), square("3*Y + 4*cos(X/2)^2"));
+        // A sine, and another amplitude, leave nothing to cancel at rest.
+        assert_eq!(joined("Y + 1 - sin(X)"), None);
+        assert_eq!(joined("Y + 2 - cos(X)"), None);
+    }
 
     #[test]
     fn waves_with_coefficients_that_add_up_to_zero_are_compared() {
