@@ -35,6 +35,10 @@ impl Coordinates {
         Self::NAMES.iter().find(|(n, _)| *n == name).map(|&(_, c)| c)
     }
 
+    pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().map(|(name, _)| *name)
+    }
+
     pub(crate) fn known() -> String {
         Self::NAMES.map(|(name, _)| format!("'{name}'")).join(" or ")
     }

@@ -72,14 +72,28 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The name among `known` that is closest to `name`, where one is close; for suggestions in messages.
+/// The name among `known` that `name` shortens, else the one that is closest to it, where one is close; for suggestions in
+/// messages.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|candidate| (distance(name, candidate), candidate))
-        .filter(|(distance, candidate)| *distance * 2 <= candidate.chars().count().max(2))
-        .min()
-        .map(|(_, candidate)| candidate)
+    let known: Vec<&str> = known.into_iter().collect();
+    let near = known
+        .iter()
+        .map(|candidate| (distance(name, candidate), *candidate))
+        .filter(|(distance, candidate)| *distance * 2 <= candidate.chars().count());
+    shortened(name, &known).or_else(|| near.min().map(|(_, candidate)| candidate))
+}
+
+/// The fewest letters of a name that stand for the whole, as `dim` does.
+const SHORTEST: usize = 3;
+
+/// The one name among `known` that begins with `name`, letter case ignored.
+fn shortened<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
+    let start = name.to_lowercase();
+    let mut longer = known.iter().filter(|candidate| candidate.to_lowercase().starts_with(&start));
+    match (name.chars().count() >= SHORTEST, longer.next(), longer.next()) {
+        (true, Some(only), None) => Some(only),
+        _ => None,
+    }
 }
 
 /// The number of single-character edits between two names, letter case ignored.
@@ -136,6 +150,8 @@ mod tests {
             ("sigmax", Some("sigma_max")),
             ("temperature", None),
             ("xy", None),
+            ("sig", Some("sigma_max")),
+            ("s", None),
         ] {
             assert_eq!(nearest(name, known), expected, "{name}");
         }

@@ -143,6 +143,7 @@ pub(crate) struct DomainTable {
     pub(crate) upper: Option<Spanned<List<Text>>>,
     pub(crate) inner: Option<Text>,
     pub(crate) outer: Option<Text>,
+    pub(crate) corners: Option<Spanned<String>>,
     pub(crate) cell_length: Option<Text>,
 }
 

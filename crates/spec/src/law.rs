@@ -17,7 +17,7 @@ use crate::{DeriveError, Law};
 use energy::ComponentLaw;
 use kinematics::{doubled_strain, with_transpose};
 use mmsmith_expr::{Expr, Function, Graph, Node};
-use mmsmith_vocabulary::{Derivation as Formulas, Volumetric};
+use mmsmith_vocabulary::{Derivation as Formulas, Material, Volumetric};
 use std::collections::BTreeSet;
 use turn::Turn;
 
@@ -372,6 +372,23 @@ pub(crate) fn stress(
     }
     Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
         .stress(derivation, deformation))
+}
+
+/// The energy of a law with directions in `J`, `I1`, components and its constants, as a specification would state it.
+pub(crate) fn energy_text(material: &Material<Expr>) -> String {
+    let text = match material.derivation() {
+        Formulas::Energy { W } => W.to_owned(),
+        Formulas::Isochoric { W, others } => {
+            format!("{} + {others}", W.replace(energy::EXCESS, "(J^(-2/3)*I1 - 3)"))
+        }
+        // These laws are isotropic.
+        Formulas::NeoHookean { .. }
+        | Formulas::StVenantKirchhoff { .. }
+        | Formulas::LinearElastic { .. }
+        | Formulas::PrincipalStretches(_) => String::new(),
+    };
+    let volume = material.volumetric().map(Volumetric::formula);
+    text + &volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default()
 }
 
 /// `P = lambda tr(H) I + mu (H + H^T)`.

@@ -225,6 +225,7 @@ impl<'a> Scope<'a> {
         what: &str,
         names: &[String],
     ) -> Result<Expr, Diagnostic> {
+        self.refuse_derivatives(text, what)?;
         let declared = self.names.clone();
         for name in names {
             if declared.contains_key(name) {
@@ -238,6 +239,24 @@ impl<'a> Scope<'a> {
         let expr = self.constant(text, what);
         self.names = declared;
         expr
+    }
+
+    /// Refuses `diff` in a material's response: `F11` and the like are names there, not functions of place and time, so that a rate
+    /// or a gradient of them would be zero.
+    fn refuse_derivatives(&self, text: &Text, what: &str) -> Result<(), Diagnostic> {
+        let ast = self.source.parse(text)?;
+        let Some(call) = call_of(&ast, "diff") else { return Ok(()) };
+        let message = format!(
+            "{what} may not use diff: it is a function of F, J, C and parameters at one place and time, without rates or gradients \
+             of them"
+        );
+        let help = "viscous and gradient laws cannot be stated; write a derivative by J, I1 or a component as the formula that it is, \
+                    as 2*(J - 1) for diff((J - 1)^2, J)";
+        Err(self.source.error(
+            message,
+            text.locate(self.source.text, &call.span),
+            Some(help.into()),
+        ))
     }
 
     /// As [`Scope::constant`], for text that the specification leaves out: the conventional expression.
@@ -273,7 +292,7 @@ impl<'a> Scope<'a> {
         let expr = result.map_err(|e| {
             let help = unknown.map(|name| match elsewhere.get(&name) {
                 Some(reason) => reason.clone(),
-                None => match nearest(&name, names.keys().map(String::as_str)) {
+                None => match nearest(&name, names.keys().map(String::as_str).chain(["Pi"])) {
                     Some(known) => format!("did you mean '{known}'?"),
                     None => {
                         let known: Vec<&str> = names.keys().map(String::as_str).collect();
@@ -310,6 +329,19 @@ fn collect_names(ast: &Ast, names: &mut BTreeSet<String>) {
         AstKind::Call(_, arguments) => {
             arguments.iter().for_each(|argument| collect_names(argument, names));
         }
+    }
+}
+
+/// The first call of the function `name`.
+fn call_of<'a>(ast: &'a Ast, name: &str) -> Option<&'a Ast> {
+    match &ast.kind {
+        AstKind::Number(_) | AstKind::Name(_) => None,
+        AstKind::Sum(parts) | AstKind::Product(parts) => {
+            parts.iter().find_map(|(_, part)| call_of(part, name))
+        }
+        AstKind::Power(base, exponent) => call_of(base, name).or_else(|| call_of(exponent, name)),
+        AstKind::Call(called, _) if called == name => Some(ast),
+        AstKind::Call(_, arguments) => arguments.iter().find_map(|part| call_of(part, name)),
     }
 }
 

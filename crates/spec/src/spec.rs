@@ -7,6 +7,7 @@ use crate::coordinates::CARTESIAN;
 use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, List, ParameterEntry, Text};
 use crate::law::energy::{INVARIANTS, component_names};
+use crate::law::energy_text;
 use crate::read::LONGEST_FILE;
 use crate::scope::{Scope, Source};
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
@@ -267,7 +268,20 @@ impl Law {
         coordinates: Coordinates,
     ) -> mmsmith_vocabulary::Law<Expr> {
         let (response, of_response, is_stress) = match self {
-            Law::Library(material) => return mmsmith_vocabulary::Law::Library(*material),
+            Law::Library(material)
+                if material.row().is_isotropic || coordinates == Coordinates::Cartesian =>
+            {
+                return mmsmith_vocabulary::Law::Library(*material);
+            }
+            // The library's laws have their directions along Cartesian axes; here they turn from place to place.
+            Law::Library(material) => {
+                let constants = self.constants().into_iter();
+                return mmsmith_vocabulary::Law::Stated(Stated {
+                    response: Response::Energy(energy_text(material)),
+                    components: Components::Curvilinear,
+                    constants: constants.map(|(row, value)| (row.name.to_owned(), value)).collect(),
+                });
+            }
             Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W], false),
             Law::Stress { P } => {
                 let row = |row: &Vec<Expr>| row.iter().map(|&entry| graph.print(entry)).collect();
@@ -497,7 +511,7 @@ impl Spec {
         }
         let document: Document = toml::from_str(text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
-            source.error(e.message().to_owned(), span, None)
+            source.error(e.message().to_owned(), span, meant_field(e.message()))
         })?;
         document.check_sizes(&source)?;
         // Escapes may hide them, too.
@@ -529,9 +543,12 @@ impl<'a> Reader<'a> {
     fn new(document: &Document, source: Source<'a>) -> Result<Self, Diagnostic> {
         check_name(&document.name, &source)?;
         let Some(coordinates) = Coordinates::from_name(document.coordinates.get_ref()) else {
-            let message =
-                format!("'{}' are not coordinates that are known", document.coordinates.get_ref());
-            let help = format!("coordinates = {}", Coordinates::known());
+            let given = document.coordinates.get_ref();
+            let message = format!("'{given}' are not coordinates that are known");
+            let mut help = format!("coordinates = {}", Coordinates::known());
+            if let Some(near) = nearest(given, Coordinates::names()) {
+                help = format!("did you mean '{near}'? {help}");
+            }
             return Err(source.error(message, document.coordinates.span(), Some(help)));
         };
         let dimension = document.dimension.get_ref().0;
@@ -785,7 +802,11 @@ impl<'a> Reader<'a> {
             if !keys.contains(&key) {
                 let message = format!("the law '{law}' has no '{key}'");
                 let mut help = format!("it takes {}", keys.join(", "));
-                if let Some(near) = nearest(key, keys.iter().copied().chain(["law", "density"])) {
+                if let Some(usual) = usual_modulus(key, &keys) {
+                    help = format!("{usual}; {help}");
+                } else if let Some(near) =
+                    nearest(key, keys.iter().copied().chain(["law", "density"]))
+                {
                     help = format!("did you mean '{near}'? {help}");
                 }
                 return Err(self.scope.source.error(message, span, Some(help)));
@@ -819,11 +840,6 @@ impl<'a> Reader<'a> {
             Some(word) => self.choice(word, "volumetric part", Volumetric::NAMES)?,
             None => Volumetric::default(),
         };
-        if !row.is_isotropic && self.coordinates != Coordinates::Cartesian {
-            let message = format!("the law '{law}' has directions, along Cartesian axes");
-            let help = "it needs coordinates = 'cartesian'";
-            return Err(self.scope.source.error(message, table.law.span(), Some(help.into())));
-        }
         let span = document.material.span();
         let mut values = Vec::with_capacity(row.constants.len());
         for Constant { name, usual, .. } in row.constants {
@@ -942,6 +958,7 @@ impl<'a> Reader<'a> {
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
             }
         };
+        self.refuse_spheres_and_boxes(keys)?;
         for (key, is_given) in given {
             if is_given != needed.contains(&key) {
                 let verb = if is_given { "has no" } else { "needs" };
@@ -961,6 +978,39 @@ impl<'a> Reader<'a> {
             });
         }
         Ok(Domain::Box { lower: self.corner(&keys.lower)?, upper: self.corner(&keys.upper)? })
+    }
+
+    /// Refuses shapes that do not fit cylindrical coordinates: a shell, whose surfaces are spheres, and a box that does not say that
+    /// its corners are Cartesian.
+    fn refuse_spheres_and_boxes(&self, keys: &DomainTable) -> Result<(), Diagnostic> {
+        let refuse = |message: &str, span, help: &str| {
+            Err(self.scope.source.error(message, span, Some(help.into())))
+        };
+        if let Some(corners) = &keys.corners {
+            self.choice(corners, "kind of corners", [("cartesian", ())])?;
+            if keys.shape.get_ref() != "box" {
+                return refuse("only a box has corners", corners.span(), "leave this line out");
+            }
+        }
+        if self.coordinates != Coordinates::Cylindrical {
+            return Ok(());
+        }
+        match keys.shape.get_ref().as_str() {
+            "shell" => refuse(
+                "a shell lies between two spheres, and R of cylindrical coordinates is the distance from the axis Z",
+                keys.shape.span(),
+                "a shell needs coordinates = 'spherical' or 'cartesian'; a tube is no shape that is known: take a box outside of the \
+                 axis, as shape = 'box', corners = 'cartesian', lower = ['1/2', '1/2', 0], upper = [1, 1, 1]",
+            ),
+            "box" if keys.corners.is_none() => refuse(
+                "the corners of a box have Cartesian coordinates X, Y, Z, also where the displacement is stated in cylindrical ones: \
+                 this box is no tube",
+                keys.shape.span(),
+                "write corners = 'cartesian' below it if a Cartesian box is meant, and keep it off the axis R = 0; a tube is no shape \
+                 that is known",
+            ),
+            _ => Ok(()),
+        }
     }
 
     fn corner(&mut self, texts: &Option<Spanned<List<Text>>>) -> Result<Vec<Expr>, Diagnostic> {
@@ -989,6 +1039,7 @@ impl<'a> Reader<'a> {
             surfaces.push(("outer".into(), Surface::Outer));
         }
         let known = surfaces.iter().map(|(name, surface)| (name.as_str(), *surface));
+        self.refuse_radial_planes(&table.surface, domain)?;
         let surface = self.choice(&table.surface, "surface", known)?;
         let condition = self.choice(&table.condition, "condition", Condition::NAMES)?;
         let cut = matches!(domain, Domain::Annulus { .. }) && matches!(surface, Surface::Lower(_));
@@ -1002,6 +1053,32 @@ impl<'a> Reader<'a> {
             ));
         }
         Ok(Boundary { surface, condition })
+    }
+
+    /// Refuses `R-lower` and the like, for which the nearest name would be another surface.
+    fn refuse_radial_planes(
+        &self,
+        surface: &Spanned<String>,
+        domain: &Domain,
+    ) -> Result<(), Diagnostic> {
+        let of_coordinate =
+            surface.get_ref().strip_suffix("-lower").or(surface.get_ref().strip_suffix("-upper"));
+        let Some(coordinate @ ("R" | "theta" | "phi")) = of_coordinate else { return Ok(()) };
+        let message =
+            format!("there is no surface of constant {coordinate} called '{}'", surface.get_ref());
+        let help = match (domain, coordinate) {
+            (Domain::Annulus { .. }, "R") => {
+                "the surfaces between the radii are 'inner' and 'outer'"
+            }
+            (Domain::Annulus { .. }, _) => {
+                "planes of symmetry are X-lower, Y-lower and, in space, Z-lower"
+            }
+            (Domain::Box { .. }, _) => {
+                "the surfaces of a box are planes, X-lower, X-upper, ...; for a body between two radii write shape = 'annulus' \
+                 (dimension = 2) or 'shell' (dimension = 3, spherical or Cartesian coordinates) with inner and outer"
+            }
+        };
+        Err(self.scope.source.error(message, surface.span(), Some(help.into())))
     }
 
     fn choice<'b, T>(
@@ -1025,6 +1102,25 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// The field that was meant, by the reader's message about one that it does not know, which lists all between backticks.
+fn meant_field(message: &str) -> Option<String> {
+    let mut names = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
+    let name = names.next()?;
+    nearest(name, names).map(|near| format!("did you mean '{near}'?"))
+}
+
+/// The line that states a law's constant in Young's modulus and Poisson's ratio, where `key` is one of these and the law has Lame's
+/// constants.
+fn usual_modulus(key: &str, keys: &[&str]) -> Option<&'static str> {
+    let is_modulus =
+        matches!(key, "E" | "nu" | "young" | "youngs-modulus" | "poisson" | "poissons-ratio");
+    (is_modulus && keys.contains(&"mu")).then_some(if keys.contains(&"lambda") {
+        "declare E and nu under [parameters]: lambda and mu follow from them where they are not given"
+    } else {
+        "declare E and nu under [parameters], and write mu = 'E/(2*(1 + nu))' and the like here"
+    })
 }
 
 /// Whether a character turns the direction in which text is shown, so that a reader sees other than what is there.

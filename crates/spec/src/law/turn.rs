@@ -9,6 +9,9 @@ use crate::tensor::{Matrix, Vector, determinant, index_sets, principal_minors, t
 use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// A turn has few angles. Sums of many waves have none that turns the body, and each angle is work.
+const MOST_ANGLES: usize = 32;
+
 /// A displacement gradient `S + N` in which `I + S` is a rotation.
 #[derive(Clone, Debug)]
 pub(crate) struct Turn {
@@ -23,7 +26,7 @@ impl Turn {
         let n = u.len();
         let graph = &mut derivation.graph;
         let angles = angles(graph, u, &derivation.geometry.coordinates);
-        if angles.is_empty() {
+        if angles.is_empty() || angles.len() > MOST_ANGLES {
             return None;
         }
         let (mut held, mut free) = (BTreeMap::new(), BTreeMap::new());
