@@ -1,6 +1,7 @@
 //! The commands, each in its own module.
 
 mod batch;
+mod blind;
 mod certify;
 mod check;
 mod converge;
@@ -8,6 +9,7 @@ mod coverage;
 mod eval;
 mod explain;
 mod generate;
+mod inversion;
 mod list;
 mod picture;
 mod predict;

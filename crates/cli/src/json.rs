@@ -34,6 +34,20 @@ impl Output {
     /// Makes sure that `path` can be written and that there is some room for it, without touching what is there. `-` is
     /// standard output, where nothing else is said from now on.
     pub(crate) fn prepare(path: &Path) -> Result<Self> {
+        let mut output = Self::open(path)?;
+        if let Place::File { path, file } = &mut output.place {
+            file.probe_room(ROOM).with_context(|| format!("no room for {}", path.display()))?;
+        }
+        Ok(output)
+    }
+
+    /// Writes `text` at once, which needs no more room than it has.
+    pub(crate) fn write_at_once(path: &Path, text: &str) -> Result<()> {
+        Self::open(path)?.write_text(text)
+    }
+
+    /// A place that can be written, without touching what is there.
+    fn open(path: &Path) -> Result<Self> {
         if path == Path::new("-") {
             terminal::reserve()?;
             return Ok(Self::at(Place::Standard));
@@ -48,8 +62,7 @@ impl Output {
             return Ok(Self::at(Place::Device(path)));
         }
         WholeFile::sweep(&path);
-        let mut file = WholeFile::create(&path).with_context(|| format!("cannot write {shown}"))?;
-        file.probe_room(ROOM).with_context(|| format!("no room for {shown}"))?;
+        let file = WholeFile::create(&path).with_context(|| format!("cannot write {shown}"))?;
         Ok(Self::at(Place::File { path, file }))
     }
 
@@ -89,10 +102,15 @@ impl Output {
     }
 }
 
+/// Makes the folder where there is none.
+pub(crate) fn make_folder(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))
+}
+
 /// Makes the folder where there is none, and makes sure that files can be written to it and that there is some room.
 pub(crate) fn prepare_folder(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    make_folder(folder)?;
     // It goes as it came.
     Output::prepare(&folder.join(".probe")).map(drop)
 }

@@ -378,6 +378,8 @@ pub(crate) struct Subject {
     /// With the parameters asked for, then with others: a mistake may hide at particular values.
     pub(crate) solutions: Vec<AnySolution<f64>>,
     pub(crate) parameters: Vec<BTreeMap<String, f64>>,
+    /// With the parameters asked for.
+    pub(crate) selection: Selection,
     pub(crate) spec: Spec,
     /// What messages call the specification.
     pub(crate) file: String,
@@ -414,7 +416,8 @@ impl Subject {
             }
         }
         let (file, folder) = (origin.file(), origin.folder().map(Path::to_owned));
-        Ok(Self { name: selection.name().to_owned(), solutions, parameters, spec, file, folder })
+        let name = selection.name().to_owned();
+        Ok(Self { name, solutions, parameters, selection, spec, file, folder })
     }
 }
 

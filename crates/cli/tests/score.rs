@@ -1,5 +1,5 @@
 //! `mms score` through the real binary: its own output to the bit, every variant of the formats, bad input, and what it
-//! has to say. The files in `tests/data/score` were written by `tests/python/write_variants.py`.
+//! has to say. The files in `tests/data/score` were written by `tests/python/write_variants.py`, of a body with the density 1.
 
 #![allow(clippy::unwrap_used)]
 
@@ -98,7 +98,7 @@ fn several_recordings_have_the_orders_of_converge() {
     for field in FIELDS {
         assert_eq!(scored["orders"][field], study["orders"][field]);
     }
-    assert_eq!(keys(&scored), "findings orders passed rows schema settings verdict");
+    assert_eq!(keys(&scored), "blind_spots findings orders passed rows schema settings verdict");
     assert_eq!(scored["schema"], "mmsmith.score/1");
     for (row, expected) in
         scored["rows"].as_array().unwrap().iter().zip(study["rows"].as_array().unwrap())
@@ -129,7 +129,7 @@ fn several_recordings_have_the_orders_of_converge() {
 fn every_variant_of_the_formats_is_read() {
     let place = tempfile::tempdir().unwrap();
     for path in entries("ok") {
-        let scored = score(place.path(), &format!("ring {}", path.display()));
+        let scored = score(place.path(), &format!("ring --set rho0=1 {}", path.display()));
         let row = &scored["rows"][0];
         assert_eq!(row["status"], "ok", "{}", path.display());
         assert_eq!(row["fields"].as_array().unwrap().len(), 4, "{}", path.display());
@@ -156,7 +156,8 @@ fn a_binary_variant_is_read_to_the_bit() {
     let place = tempfile::tempdir().unwrap();
     let errors = |name: &str| {
         let path = data("ok").join(name);
-        score(place.path(), &format!("ring {}", path.display()))["rows"][0]["errors"].clone()
+        score(place.path(), &format!("ring --set rho0=1 {}", path.display()))["rows"][0]["errors"]
+            .clone()
     };
     let expected = errors("vtk-appended-raw-64");
     for path in entries("ok") {
@@ -175,7 +176,7 @@ fn bad_input_ends_with_status_two_and_says_what_is_wrong() {
         let (arguments, expected) = call(&case);
         let expected: Vec<_> = expected.iter().map(String::as_str).collect();
         assert!(!expected.is_empty(), "{}", case.display());
-        refuses(&case, &format!("score ring {arguments}"), &expected);
+        refuses(&case, &format!("score ring --set rho0=1 {arguments}"), &expected);
         cases += 1;
     }
     assert!(cases > 40);
@@ -185,7 +186,7 @@ fn bad_input_ends_with_status_two_and_says_what_is_wrong() {
 fn what_has_to_be_known_is_told_with_counts() {
     for case in entries("findings") {
         let (arguments, expected) = call(&case);
-        let called = mms(&case, &format!("score ring {arguments}"));
+        let called = mms(&case, &format!("score ring --set rho0=1 {arguments}"));
         for part in &expected {
             assert!(called.stdout.contains(part), "{}: {part}\n{}", case.display(), called.stdout);
         }
@@ -203,7 +204,8 @@ fn findings_are_in_the_json_and_a_row_with_a_problem_has_no_part_in_orders() {
     let bad = data("findings").join("not-a-number");
     let good = data("ok").join("vtk-base64-64");
     let (bad, good) = (bad.display(), good.display());
-    let scored = score(place.path(), &format!("ring {good} {bad} {good} --h 0.4,0.2,0.1"));
+    let scored =
+        score(place.path(), &format!("ring --set rho0=1 {good} {bad} {good} --h 0.4,0.2,0.1"));
     let findings = scored["findings"].as_array().unwrap();
     let finding = findings.iter().find(|finding| finding["kind"] == "not-finite").unwrap();
     assert_eq!(keys(finding), "count file frames kind message problem row");
@@ -258,6 +260,7 @@ fn other_stresses_j_and_density_are_compared_with_what_f_and_p_say() {
         [[at(0, 0), at(0, 1)], [at(1, 0), at(1, 1)]]
     };
     let (u, F, P) = (&exact["u"], matrix("F"), matrix("P"));
+    const DENSITY: f64 = 4.0;
     let J = F[0][0] * F[1][1] - F[0][1] * F[1][0];
     let tau = |i: usize, j: usize| P[i][0] * F[j][0] + P[i][1] * F[j][1];
     // Kirchhoff stress by its three different components, Cauchy stress row by row.
@@ -265,7 +268,7 @@ fn other_stresses_j_and_density_are_compared_with_what_f_and_p_say() {
     let line = |off: f64| {
         let values = [
             J + off,
-            1.0 / J - off,
+            DENSITY / J - off,
             tau(0, 0) + off,
             tau(1, 1),
             tau(0, 1),
@@ -287,7 +290,7 @@ fn other_stresses_j_and_density_are_compared_with_what_f_and_p_say() {
             assert!((error - off).abs() < 1e-9, "{field}: {error}");
         }
     }
-    let text = line(0.0).replace(&format!(",{:?},", 1.0 / J), ",1,");
+    let text = line(0.0).replace(&format!(",{:?},", DENSITY / J), ",4,");
     fs::write(place.join("others.csv"), text).unwrap();
     let called = mms(place, "score skew-2d others.csv --periods 1000");
     assert!(called.stdout.contains("density is that of the undeformed body"), "{}", called.stdout);

@@ -5,7 +5,7 @@
 //! determinant of `F`, `P` and the strain energy with the solver's hand-written law, and `b` with `a - Div P / rho0`. `u` itself is the
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
-use mmsmith_mpm::Law;
+use mmsmith_mpm::{Law, Material};
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -458,11 +458,14 @@ where
         J.add(at, (own.J - determinant(&own.F)).abs(), rounding, own.J.abs().max(1.0));
 
         // F^-1 is bounded by its cofactors; the law forms F - F^-T from a rounded F.
-        let inverse = own.F.norm().powi(D as i32 - 1) / own.J.abs();
+        let inverse = match law.is_some_and(is_of_small_strain) {
+            true => 0.0,
+            false => own.F.norm().powi(D as i32 - 1) / own.J.abs(),
+        };
         let rounding = f64::EPSILON * stiffness * (own.F.norm() + inverse) * inverse.max(1.0);
         let strain = own.P.amax().max(stiffness * own.H.amax());
         if let Some(law) = law {
-            let expected = law.first_piola_kirchhoff(&own.F);
+            let expected = stress(law, &own.F);
             let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
             P.add(at, difference, rounding, strain);
             if let (Some(energy), Some(expected)) =
@@ -532,6 +535,20 @@ where
         .filter(|comparison| !comparison.points.is_empty())
         .map(Comparison::finding)
         .collect()
+}
+
+/// The stress of the solver's law. That of linear elasticity takes no determinant, and a displacement that is no motion of a body
+/// has it all the same.
+fn stress<const D: usize>(law: &Law<f64, D>, F: &SMatrix<f64, D, D>) -> Option<SMatrix<f64, D, D>>
+where
+    f64: Precision<D>,
+{
+    let at_small_strain = || law.stress_at_small_strain(&(F - SMatrix::identity()));
+    law.first_piola_kirchhoff(F).or_else(|| is_of_small_strain(law).then(at_small_strain))
+}
+
+fn is_of_small_strain<const D: usize>(law: &Law<f64, D>) -> bool {
+    matches!(law, Law::Library(Material::LinearElastic { .. }))
 }
 
 /// The fields from the functions that give one each.

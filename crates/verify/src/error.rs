@@ -118,10 +118,10 @@ pub enum SceneError {
         /// Its debug form.
         value: String,
     },
-    /// A stated law in components along directions that turn from place to place.
+    /// A law with directions along curvilinear coordinates, which turn from place to place.
     #[error(
-        "this law is stated in components along curvilinear coordinates, and the solver's components are Cartesian: state it in J, \
-         I1 and I2, or the solution in Cartesian coordinates (mms check and mms eval serve it all the same)"
+        "this law has directions along curvilinear coordinates, and the solver's directions are Cartesian: state the law in J, \
+         I1 and I2, or the solution in Cartesian coordinates (mms check, eval and gen serve it all the same)"
     )]
     CurvilinearComponents,
     /// A stated law that cannot be read.

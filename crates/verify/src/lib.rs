@@ -17,6 +17,7 @@
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
 //! Lengths, times and stresses are in the units of the solution; errors are not divided by anything.
 
+mod blind;
 mod case;
 mod check;
 mod checkpoint;
@@ -31,6 +32,7 @@ mod frames;
 mod history;
 mod interrupt;
 mod inverse;
+mod inversion;
 mod measurement;
 mod order;
 mod plan;
@@ -51,6 +53,7 @@ mod updated;
 mod verdict;
 mod whole_file;
 
+pub use blind::{BlindSpot, blind_spots};
 pub use case::{Arithmetic, Case, CflSpeed, Extent};
 pub use check::{
     BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
@@ -64,6 +67,7 @@ pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
+pub use inversion::{Inversion, inversion};
 pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};

@@ -10,6 +10,7 @@ use crate::error::CaseError;
 use crate::order::Order;
 use crate::plan::plan;
 use crate::run::{Outputs, Progress, Row, Status, run};
+use crate::verdict::above_mean;
 
 /// What changes from row to row.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,8 +114,9 @@ pub fn orders_above(
     values: &[Option<&PerField<PerNorm<f64>>>],
     floors: &[PerField<f64>],
 ) -> PerField<PerNorm<Order>> {
-    each_norm(values, |field, _, errors| {
-        let floor = |row: usize| floors.get(row).map_or(0.0, |floor| floor[field]);
+    each_norm(values, |field, norm, errors| {
+        let floor =
+            |row: usize| floors.get(row).map_or(0.0, |floor| floor[field] * above_mean(norm));
         let above =
             |(row, error): (usize, &Option<f64>)| error.filter(|error| *error >= floor(row));
         let errors: Vec<_> = errors.iter().enumerate().map(above).collect();

@@ -1,7 +1,7 @@
 //! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
 //! the expected one.
 
-use mmsmith_measure::norms::{PerField, PerNorm};
+use mmsmith_measure::norms::{Norm, PerField, PerNorm};
 use mmsmith_mpm::total_lagrangian::{Layout, MassMatrix};
 use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain, Solution};
@@ -35,6 +35,8 @@ pub enum Behaviour {
     Stopped,
     /// The finest case reached its end with errors that say nothing.
     NotJudged,
+    /// The grids are too coarse to tell: see [`Verdict::sparing_coarse_grids`].
+    TooCoarse,
     /// Errors are so small that rounding may have caused them, but for fewer than two cases.
     AtRounding,
     /// Fewer than two cases with an error and different steps.
@@ -107,9 +109,18 @@ impl Verdict {
                 |order: &&Option<f64>| order.is_some_and(|o| (o - finest).abs() <= tolerance);
             orders.iter().rev().take_while(same).count()
         });
+        // Rounding grows with the steps and with finer grids, beyond what floors count of it.
+        let is_near_rounding = |row: &usize| {
+            let floor = floors.get(*row).copied().unwrap_or(0.0);
+            errors[*row].is_some_and(|error| error < GROWN_ROUNDING * floor)
+        };
+        let grows = |order: f64| order <= tolerance && rows.last().is_some_and(is_near_rounding);
+        let has_grown = finest.is_some_and(grows);
+        let finest = finest.filter(|_| !has_grown);
         let last = rows.last().map(|&row| errors[row]);
         let behaviour = match finest {
             _ if rows.len() < 2 && !rounding_rows.is_empty() => Behaviour::AtRounding,
+            _ if has_grown => Behaviour::AtRounding,
             _ if rows.len() < 2 => Behaviour::NoOrder,
             _ if last == Some(None) => Behaviour::Stopped,
             _ if last.flatten().is_some_and(|error| !error.is_finite()) => Behaviour::NotJudged,
@@ -123,10 +134,11 @@ impl Verdict {
             _ => Vec::new(),
         };
         asymptotic_rows.sort_unstable();
-        // Room for the rounding of a tolerance such as 0.1 itself.
-        let met = |(order, expected): (f64, f64)| (order - expected).abs() <= tolerance + 1e-12;
+        // An order beyond the expected one is no fault of a scheme. Room for the rounding of a tolerance such as 0.1 itself.
+        let met = |(order, expected): (f64, f64)| order >= expected - tolerance - 1e-12;
         let passed = expected.map(|expected| finest.is_some_and(|order| met((order, expected))));
-        let exponent = if passed == Some(true) { expected } else { finest };
+        let is_near = |(order, expected): (f64, f64)| (order - expected).abs() <= tolerance + 1e-12;
+        let exponent = if finest.zip(expected).is_some_and(is_near) { expected } else { finest };
         let last = rows.last().copied().filter(|_| exponent.is_some());
         let coefficient = last
             .and_then(|row| Some(errors[row]? / steps[row].powf(exponent?)))
@@ -142,6 +154,32 @@ impl Verdict {
             exponent,
             passed,
         }
+    }
+}
+
+/// An error that does not fall, and is smaller than so many floors of rounding, is rounding.
+const GROWN_ROUNDING: f64 = 64.0;
+
+/// Cells of the coarsest grid from which on a series is expected to show the order of a scheme.
+const FEWEST_CELLS: usize = 8;
+/// The share of an expected order that coarse grids may hide. Faults cost half an order or more: an eighth is less, up to order 4,
+/// and from there on less than the whole order that a wrong degree costs.
+const HIDDEN: f64 = 0.125;
+
+impl Verdict {
+    /// The same, but without a failure where the coarsest grid has fewer than eight cells and the order is short of the expected
+    /// one by no more than an eighth of it: such grids may lie before the asymptotic range.
+    #[must_use]
+    pub fn sparing_coarse_grids(self, coarsest: usize) -> Self {
+        let is_almost = |(order, expected): (f64, f64)| order >= expected * (1.0 - HIDDEN);
+        let is_spared = coarsest < FEWEST_CELLS
+            && self.passed == Some(false)
+            && matches!(self.behaviour, Behaviour::Asymptotic | Behaviour::NotSettled)
+            && self.finest.zip(self.expected).is_some_and(is_almost);
+        if is_spared {
+            return Self { behaviour: Behaviour::TooCoarse, passed: None, ..self };
+        }
+        self
     }
 }
 
@@ -176,9 +214,19 @@ pub fn verdicts_above(
 ) -> PerField<PerNorm<Verdict>> {
     crate::study::each_norm(values.errors, |field, norm, errors| {
         let expected = expected[field][norm];
-        let floors: Vec<f64> = values.floors.iter().map(|floor| floor[field]).collect();
+        let floors: Vec<f64> =
+            values.floors.iter().map(|floor| floor[field] * above_mean(norm)).collect();
         Verdict::above(values.steps, errors, &floors, expected, tolerance)
     })
+}
+
+/// The largest error that rounding may cause, in units of its root mean square: the floors are of the latter, and the largest of
+/// some thousand particles and steps lies beyond.
+pub(crate) fn above_mean(norm: Norm) -> f64 {
+    match norm {
+        Norm::Linf => 8.0,
+        Norm::L2 | Norm::L1 => 1.0,
+    }
 }
 
 /// The orders in `h` at a fixed CFL number that theory promises for `case`: second order in the displacement for
@@ -289,10 +337,33 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_order_fails_and_so_does_one_that_is_too_high() {
+    fn an_order_that_is_too_low_fails_and_one_beyond_the_expected_passes_as_it_is() {
         assert_eq!(judge(&[4.0, 2.0, 1.0], Some(2.0)).passed, Some(false));
-        assert_eq!(judge(&[64.0, 8.0, 1.0], Some(2.0)).passed, Some(false));
         assert_eq!(judge(&[4.0, 2.0, 1.0], None).passed, None);
+        let verdict = judge(&[64.0, 8.0, 1.0], Some(2.0));
+        assert_eq!((verdict.passed, verdict.exponent), (Some(true), Some(3.0)));
+    }
+
+    #[test]
+    fn coarse_grids_spare_what_is_almost_the_order_and_nothing_else() {
+        let errors = |order: f64| [1.0, 0.5_f64.powf(order), 0.25_f64.powf(order)];
+        for (order, expected, coarsest, passed) in [
+            (3.83, 4.0, 4, None),
+            (3.6, 4.0, 7, None),
+            // Half an order is a fault, and so is a little less than that on finer grids.
+            (3.4, 4.0, 4, Some(false)),
+            (3.83, 4.0, 8, Some(false)),
+            (1.8, 2.0, 4, None),
+            (1.5, 2.0, 4, Some(false)),
+            (5.0, 6.0, 4, Some(false)),
+            (3.95, 4.0, 4, Some(true)),
+            (5.0, 4.0, 4, Some(true)),
+            (-1.0, 4.0, 4, Some(false)),
+        ] {
+            let verdict = judge(&errors(order), Some(expected)).sparing_coarse_grids(coarsest);
+            assert_eq!(verdict.passed, passed, "{order} for {expected} from {coarsest} cells on");
+            assert_eq!(verdict.behaviour == Behaviour::TooCoarse, passed.is_none());
+        }
     }
 
     #[test]
@@ -326,6 +397,13 @@ mod tests {
         let judge = |errors: [f64; 4], expected| {
             Verdict::above(&steps, &errors.map(Some), &[1e-3; 4], expected, 0.1)
         };
+        // A little above the floor and growing: rounding, and no judgement.
+        let grown = judge([2e-4, 4e-3, 8e-3, 2e-2], None);
+        assert_eq!((grown.behaviour, grown.finest), (Behaviour::AtRounding, None));
+        // Far above it an error that grows is one, and so is one that stays.
+        for errors in [[2e-4, 0.1, 0.2, 0.4], [0.4, 0.4, 0.4, 0.4]] {
+            assert_eq!(judge(errors, None).behaviour, Behaviour::DoesNotConverge);
+        }
         // The order of the two rows above, whatever the others do.
         let verdict = judge([1.0, 0.25, 2e-4, 9e-4], Some(2.0));
         assert_eq!((verdict.finest, verdict.passed), (Some(2.0), Some(true)));

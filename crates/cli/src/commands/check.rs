@@ -12,6 +12,7 @@ use mmsmith_verify::{
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
+use super::{blind, inversion};
 use crate::arguments::CheckOptions;
 use crate::json::Output;
 use crate::library::{Subject, names};
@@ -40,14 +41,18 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         .collect::<Result<Vec<_>, _>>()?;
     let mut results = Vec::new();
     let mut passed = true;
-    for (Subject { name, solutions, parameters, spec, .. }, listings) in
+    for (Subject { name, solutions, parameters, selection, spec, .. }, listings) in
         subjects.iter().zip(&listings)
     {
         let reports = solutions.iter().map(|solution| check_fields(solution, points));
         let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
+        let blind = blind::measure(selection)?;
+        let inverted = inversion::measure(selection)?;
         let all_passed = report.passed() && claims.hold();
-        terminal::say(&text(name, all_passed, &report, parameters, &claims))?;
+        let findings = text(name, all_passed, &report, parameters, &claims);
+        let told = inverted.as_ref().map(|told| format!("  {}\n", told.text()));
+        terminal::say(&format!("{findings}{}{}\n", told.unwrap_or_default(), blind::text(&blind)))?;
         passed &= all_passed;
         results.push(json!({
             "solution": name,
@@ -56,6 +61,8 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "points": report.points,
             "findings": report.findings,
             "not_periodic": report.not_periodic,
+            "blind_spots": blind,
+            "inverted": inverted,
             "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
             "cross_checks": claims.listings.iter().map(Comparison::document).collect::<Vec<_>>(),
             "passed": all_passed,
@@ -265,7 +272,5 @@ fn text(
             100.0 * v
         );
     }
-    text += &claims.text();
-    text.push('\n');
-    text
+    text + &claims.text()
 }

@@ -11,7 +11,7 @@ use mmsmith_verify::{
 use serde_json::{Value, json};
 
 use super::scheme::Settled;
-use super::{Model, caption, settings, with_threads};
+use super::{Model, caption, inversion, settings, with_threads};
 use crate::arguments::{ConvergeOptions, SchemeOptions};
 use crate::json::Output;
 use crate::keep::{Found, Keep, Order};
@@ -125,7 +125,9 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         let floors = floors(&model, &base, &sweep)?;
         // What theory promises is no failure where nothing can judge it; what was asked for is.
         let strict = options.expect.is_some() || options.tolerance.is_some();
-        let settle = |judged: Verdicts| if strict { judged } else { unless_unjudged(judged) };
+        let coarsest = coarsest(&study, &sweep);
+        let settle =
+            |judged: Verdicts| if strict { judged } else { unless_unjudged(judged, coarsest) };
         let judged = settle(judge_above(&study, &sweep, &in_space, tolerance, &floors));
         let differences = differences.map(Temporal::from).map(|found| {
             let expected = asked.unwrap_or_else(|| expected_in_time(&base));
@@ -142,6 +144,11 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             sections.push((format!("error of {}", units::named(field, units)), table));
         }
         let mut notes = stops(&study);
+        if !notes.is_empty()
+            && let Some(told) = inversion::measure(&selection)?
+        {
+            notes += &format!("{}\n", told.text());
+        }
         if let Some((found, judged)) = &differences {
             for (field, table) in difference_tables(found, judged) {
                 let title = format!("difference of {} on this grid", units::named(field, units));
@@ -159,6 +166,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             notes += "Rows in parentheses are outside the asymptotic range.\n";
         }
         notes += &on_range(&judged, study.rows.len());
+        notes += &on_coarse(&judged, &study);
         if has_rounding(&judged) {
             notes += "A row at rounding has errors that rounding alone may cause; verdicts leave it out.\n";
         }
@@ -330,24 +338,31 @@ fn judge_above(
     verdicts_above(&Values { steps: &steps, errors: &errors, floors }, expected, tolerance)
 }
 
-/// Verdicts where an expectation that nothing can judge is none. Errors on coarse grids may fall faster than theory promises: an
-/// order above it that has not settled is no failure.
-fn unless_unjudged(mut judged: Verdicts) -> Verdicts {
-    for norms in [&mut judged.u, &mut judged.v, &mut judged.F, &mut judged.P] {
-        for one in [&mut norms.linf, &mut norms.l2, &mut norms.l1] {
-            let is_above =
-                || one.finest.zip(one.expected).is_some_and(|(order, expected)| order > expected);
-            let is_unjudged = match one.behaviour {
-                Behaviour::NoOrder | Behaviour::AtRounding => true,
-                Behaviour::NotSettled => one.passed == Some(false) && is_above(),
-                _ => false,
-            };
-            if is_unjudged {
-                one.passed = None;
-            }
-        }
+/// The cells of the coarsest grid of a series of grids.
+fn coarsest(study: &Study, sweep: &Sweep) -> Option<usize> {
+    match sweep {
+        Sweep::Cells(_) => study.rows.iter().map(|row| row.cells).min(),
+        Sweep::Cfls(_) => None,
     }
-    judged
+}
+
+/// Verdicts where an expectation that nothing can judge is none. Errors on coarse grids may fall faster than theory promises, or
+/// somewhat slower: that is no failure, and no proof before the order has settled.
+fn unless_unjudged(judged: Verdicts, coarsest: Option<usize>) -> Verdicts {
+    let settle = |one: OrderVerdict| {
+        let above = one.finest.zip(one.expected).map(|(order, expected)| order - expected);
+        let is_unjudged = match one.behaviour {
+            Behaviour::NoOrder | Behaviour::AtRounding => true,
+            Behaviour::NotSettled => above.is_some_and(|above| above > one.tolerance),
+            _ => false,
+        };
+        match coarsest {
+            _ if is_unjudged => OrderVerdict { passed: None, ..one },
+            Some(cells) => one.sparing_coarse_grids(cells),
+            None => one,
+        }
+    };
+    PerField::from_fn(|field| PerNorm::from_fn(|norm| settle(judged[field][norm].clone())))
 }
 
 /// What a table says of how a case ended, and of its errors of one field.
@@ -531,6 +546,19 @@ fn on_range(judged: &Verdicts, rows: usize) -> String {
     format!("No asymptotic range: it is open which order the errors tend to. {remedy}\n")
 }
 
+/// The remedy where grids are too coarse for a verdict.
+fn on_coarse(judged: &Verdicts, study: &Study) -> String {
+    let is_coarse = |one: &OrderVerdict| one.behaviour == Behaviour::TooCoarse;
+    if !judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| is_coarse(one))) {
+        return String::new();
+    }
+    let finer: Vec<String> = study.rows.iter().map(|row| (2 * row.cells).to_string()).collect();
+    format!(
+        "Too coarse: the order is almost the expected one, as before the asymptotic range. --cells {} would tell.\n",
+        finer.join(",")
+    )
+}
+
 /// What each field and norm shows, a row each. `is_decisive` where the result of the study hangs on it.
 pub(super) fn verdict_table(judged: &Verdicts, step: &str, is_decisive: bool) -> Table {
     let header = ["field", "norm", "expected", "order", "leading term", "verdict"];
@@ -547,6 +575,7 @@ pub(super) fn verdict_table(judged: &Verdicts, step: &str, is_decisive: bool) ->
                 Behaviour::DoesNotConverge if is_decisive => "DOES NOT CONVERGE",
                 // The error of the grid, which a study of time steps leaves as it is.
                 Behaviour::DoesNotConverge => "does not fall with dt",
+                Behaviour::TooCoarse => "cannot tell: too coarse",
                 Behaviour::Stopped => "the finest run STOPPED",
                 Behaviour::NotJudged => "the finest run is not judged",
                 Behaviour::AtRounding => "too few errors above rounding",

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
 use super::scheme::Settled;
-use super::{Model, predict};
+use super::{Model, blind, predict};
 use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
@@ -32,8 +32,11 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
     let predicted = predict::on_grids(&model, &settled.case).map_err(|error| error.to_string());
     let words = settled.choice();
+    let blind = blind::measure(&selection)?;
     terminal::say(
-        &(text(&spec, &exercises, &cost) + &exact_elements(degree) + &runs(&predicted, &words)),
+        &(text(&spec, &exercises, &blind, &cost)
+            + &exact_elements(degree)
+            + &runs(&predicted, &words)),
     )?;
     let compared = match options.compare {
         true => Some(Comparison::measure(&model)?),
@@ -44,6 +47,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     }
     if let Some(output) = output {
         let mut document = document(&spec, degree, &exercises, &cost, &predicted);
+        document["blind_spots"] = json!(blind);
         if let Some(compared) = &compared {
             document["compared"] = json!(compared);
         }
@@ -113,7 +117,12 @@ impl BodyForceCost {
     }
 }
 
-fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
+fn text(
+    spec: &Spec,
+    exercises: &[Exercise],
+    blind: &[blind::Told],
+    cost: &BodyForceCost,
+) -> String {
     let print = |expr| spec.graph.print(expr);
     let mut text = format!(
         "{} ({}D, {}): {}\n",
@@ -162,6 +171,7 @@ fn text(spec: &Spec, exercises: &[Exercise], cost: &BodyForceCost) -> String {
             Some(instead) => format!("  no   {part} ({instead} would)\n"),
         };
     }
+    text += &blind::text(blind);
     text += "\noperations of the body force, generated\n";
     let header = ["stage", "+ -", "*", "/", "sqrt", "functions"];
     let mut table = Table::new(1, header);

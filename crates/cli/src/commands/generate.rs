@@ -28,9 +28,9 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             .context("--fault: choose another solution or another fault")?,
     };
     let text = options.target.source(&code)?;
-    json::prepare_folder(&options.out)?;
+    json::make_folder(&options.out)?;
     let path = options.out.join(options.target.file_name(&Names::of(&spec.name).module));
-    Output::prepare(&path)?.write_text(&text)?;
+    Output::write_at_once(&path, &text)?;
     terminal::say(&format!("wrote {}\n", path.display()))?;
     Ok(true)
 }

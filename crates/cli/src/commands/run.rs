@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::picture::Picture;
 use super::scheme::Settled;
-use super::{Model, caption, resume, settings, with_threads};
+use super::{Model, caption, inversion, resume, settings, with_threads};
 use crate::arguments::RunOptions;
 use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
@@ -103,6 +103,13 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 + &caption(&selection, settled, extent)
                 + &text(&row, Units::of(&selection))),
         )?;
+        let inverted = match row.status.passed() {
+            Some(false) => inversion::measure(&selection)?,
+            _ => None,
+        };
+        if let Some(told) = &inverted {
+            terminal::say(&format!("{}\n", told.text()))?;
+        }
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
             terminal::say(&format!("particle files: {}\n", list.display()))?;
@@ -127,6 +134,9 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
                 "passed": row.status.passed(),
                 "result": row,
             });
+            if let Some(inverted) = &inverted {
+                document["inverted"] = json!(inverted);
+            }
             if let Some(moments) = &moments {
                 document["history"] = history_document(moments);
             }

@@ -15,7 +15,7 @@ use mmsmith_verify::{
 };
 use serde_json::json;
 
-use super::with_threads;
+use super::{blind, with_threads};
 use crate::arguments::ScoreOptions;
 use crate::expect;
 use crate::json::Output;
@@ -76,9 +76,11 @@ fn scored(
     for (row, agreement) in score.rows.iter().zip(&agreements) {
         terminal::say(&text::of_agreement(options, row, agreement))?;
     }
-    terminal::say(&text::verdict(&score))?;
+    let blind = blind::measure(selection)?;
+    terminal::say(&(text::verdict(&score) + &blind::text(&blind)))?;
     if let Some(output) = output {
         let mut document = document::document(selection, options, &score);
+        document["blind_spots"] = json!(blind);
         if !agreements.is_empty() {
             document["against"] = json!(agreements);
         }
