@@ -70,13 +70,22 @@ fn explain_and_score_tell_the_blind_spots_that_check_tells() {
     assert_eq!(kinds(&read_json(&place.join("score.json"))["blind_spots"]), ["no-lambda"]);
 }
 
+/// Prescribed motion on all sides of a square.
+fn sides() -> String {
+    ["X-lower", "X-upper", "Y-lower", "Y-upper"]
+        .iter()
+        .map(|side| format!("[[boundary]]\nsurface = '{side}'\ncondition = 'prescribed-motion'\n"))
+        .collect()
+}
+
 /// A bar that folds where `2 Pi A/L cos(...)` is below -1.
 fn folding(law: &str) -> String {
     format!(
         "name = 'folding'\ntitle = 'A bar that folds'\ncoordinates = 'cartesian'\ndimension = 2\n\
          [parameters]\nA = {{ default = 0.5 }}\nE = {{ default = 900 }}\nnu = {{ default = 0.3 }}\nrho0 = {{ default = 3 }}\n\
          [displacement]\nX = 'A*sin(2*Pi*X)*sin(Pi*t)'\nY = 'A/9*Y^2*sin(Pi*t)'\n[material]\nlaw = '{law}'\n\
-         [domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n[time]\nperiod = 2\nwave-speed = 'sqrt(E/rho0)'\n"
+         [domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n{}[time]\nperiod = 2\nwave-speed = 'sqrt(E/rho0)'\n",
+        sides()
     )
 }
 
@@ -112,16 +121,14 @@ fn a_motion_that_is_inverted_is_told_with_time_and_amplitude_and_small_strain_do
 
 /// A square under a displacement at rest, which is prescribed on all of it.
 fn at_rest(law: &str, u: [&str; 2]) -> String {
-    let sides: String = ["X-lower", "X-upper", "Y-lower", "Y-upper"]
-        .iter()
-        .map(|side| format!("[[boundary]]\nsurface = '{side}'\ncondition = 'prescribed-motion'\n"))
-        .collect();
     format!(
         "name = 'at-rest'\ntitle = 'A square at rest'\ncoordinates = 'cartesian'\ndimension = 2\n\
          [parameters]\nA = {{ default = 1e-4 }}\nE = {{ default = 2e9 }}\nnu = {{ default = 0.4 }}\nrho0 = {{ default = 900 }}\n\
          [displacement]\nX = '{}'\nY = '{}'\n[material]\nlaw = '{law}'\n\
-         [domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n{sides}",
-        u[0], u[1]
+         [domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n{}",
+        u[0],
+        u[1],
+        sides()
     )
 }
 
