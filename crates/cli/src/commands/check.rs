@@ -40,6 +40,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         .map(|subject| Published::read(&subject.spec, &subject.file, subject.folder.as_deref()))
         .collect::<Result<Vec<_>, _>>()?;
     let mut results = Vec::new();
+    let mut tables = Vec::new();
     let mut passed = true;
     for (Subject { name, solutions, parameters, selection, spec, .. }, listings) in
         subjects.iter().zip(&listings)
@@ -50,9 +51,11 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         let blind = blind::measure(selection)?;
         let inverted = inversion::measure(selection)?;
         let all_passed = report.passed() && claims.hold();
-        let findings = text(name, all_passed, &report, parameters, &claims);
+        let table = table(&report);
+        let findings = text(name, all_passed, &report, parameters, &claims, &table);
         let told = inverted.as_ref().map(|told| format!("  {}\n", told.text()));
         terminal::say(&format!("{findings}{}{}\n", told.unwrap_or_default(), blind::text(&blind)))?;
+        tables.push(table);
         passed &= all_passed;
         results.push(json!({
             "solution": name,
@@ -72,6 +75,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         "All numbers but the scale are relative to it. Allowed: {OWN_ERROR_FACTOR} times the check's own estimated \
          error, plus {TOLERANCE:e}.\n"
     ))?;
+    terminal::say(&table::on_left_out(&tables, "A wider terminal and --json have them."))?;
     if let Some(output) = output {
         output.write(&json!({
             "schema": "mmsmith.check/1",
@@ -225,14 +229,29 @@ fn text(
     report: &CheckReport,
     parameters: &[BTreeMap<String, f64>],
     claims: &Claims,
+    table: &Table,
 ) -> String {
     let verdict = if passed { "passed" } else { "FAILED" };
     let sets = number::counted(parameters.len(), "set");
     let mut text = format!("{name}: {verdict} at {} points, {sets} of parameters\n", report.points);
+    text += &table.text();
+    text += &places(report, parameters);
+    if let Some(Change { period, u, v }) = report.not_periodic {
+        text += &format!(
+            "  remark: the motion is not the same after its period of {}: u differs by {:.2} % of its largest, v by {:.2} %\n",
+            number::exact(period),
+            100.0 * u,
+            100.0 * v
+        );
+    }
+    text + &claims.text()
+}
+
+/// The findings of one solution, a row each.
+fn table(report: &CheckReport) -> Table {
     let header =
         ["field", "compared with", "verdict", "difference", "own error", "allowed", "scale"];
     let mut table = Table::new(3, header).sparing(4..5).sparing(6..7);
-    let mut places = String::new();
     for finding in &report.findings {
         let verdict = match finding.verdict {
             Verdict::Passed => "passed",
@@ -250,27 +269,23 @@ fn text(
             format!("{:.1e}", finding.allowed / unit),
             table::error(finding.scale),
         ]);
-        if finding.verdict != Verdict::Passed {
-            places += &format!(
-                "  {} is worst at X = {:?}, t = {:?}: difference {:e}, allowed {:e}\n",
-                finding.what, finding.X, finding.t, finding.difference, finding.allowed
-            );
-            if let Some(set) = parameters.get(finding.parameter_set) {
-                let values: Vec<String> =
-                    set.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
-                places += &format!("    with {}\n", values.join(", "));
-            }
+    }
+    table
+}
+
+/// The place of each finding that did not pass.
+fn places(report: &CheckReport, parameters: &[BTreeMap<String, f64>]) -> String {
+    let mut places = String::new();
+    for finding in report.findings.iter().filter(|finding| finding.verdict != Verdict::Passed) {
+        places += &format!(
+            "  {} is worst at X = {:?}, t = {:?}: difference {:e}, allowed {:e}\n",
+            finding.what, finding.X, finding.t, finding.difference, finding.allowed
+        );
+        if let Some(set) = parameters.get(finding.parameter_set) {
+            let values: Vec<String> =
+                set.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
+            places += &format!("    with {}\n", values.join(", "));
         }
     }
-    text += &table.text();
-    text += &places;
-    if let Some(Change { period, u, v }) = report.not_periodic {
-        text += &format!(
-            "  remark: the motion is not the same after its period of {}: u differs by {:.2} % of its largest, v by {:.2} %\n",
-            number::exact(period),
-            100.0 * u,
-            100.0 * v
-        );
-    }
-    text + &claims.text()
+    places
 }

@@ -165,7 +165,8 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         if has_range(&judged) || differences.as_ref().is_some_and(|(_, judged)| has_range(judged)) {
             notes += "Rows in parentheses are outside the asymptotic range.\n";
         }
-        notes += &on_range(&judged, study.rows.len());
+        let decisive = differences.as_ref().map_or(&judged, |(_, judged)| judged);
+        notes += &on_range(decisive, study.rows.len());
         notes += &on_coarse(&judged, &study);
         if has_rounding(&judged) {
             notes += "A row at rounding has errors that rounding alone may cause; verdicts leave it out.\n";
