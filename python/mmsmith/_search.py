@@ -204,9 +204,14 @@ class Search:
     def ranked(self, tried: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
         finest = max((count for one in tried for count in self.found[" and ".join(one)]), default=0)
 
-        def key(one: tuple[str, ...]) -> tuple[bool, bool, float]:
+        table = list(self.rows)
+
+        def key(one: tuple[str, ...]) -> tuple[bool, bool, float, list[int]]:
             known = self.found[" and ".join(one)]
-            return not self.restores(one), finest not in known, size_of(known[max(known)])
+            size = size_of(known[max(known)])
+            # Mistakes that are not told apart, in the order of the table.
+            about = round(float(numpy.log(size)) / 0.02) if 0 < size < numpy.inf else size
+            return not self.restores(one), finest not in known, about, [table.index(name) for name in one]
 
         return sorted(tried, key=key)
 

@@ -21,6 +21,7 @@ mod certify;
 mod check;
 mod converge;
 mod coverage;
+mod diagnose;
 mod eval;
 mod explain;
 mod generate;
@@ -50,6 +51,7 @@ pub(crate) use certify::CertifyOptions;
 pub(crate) use check::CheckOptions;
 pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
+pub(crate) use diagnose::DiagnoseOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
 pub(crate) use generate::GenerateOptions;
@@ -148,6 +150,8 @@ pub(crate) enum Command {
     Tradeoff(TradeoffOptions),
     /// Measure errors and orders of another solver from its output files
     Score(ScoreOptions),
+    /// Find the mistake in a solver whose errors do not fall, by fields that have the opposite mistake
+    Diagnose(DiagnoseOptions),
     /// Write the script that runs a study in shards, or a run, on a cluster
     Batch(BatchOptions),
     /// Repeat the study of Wallstedt and Guilkey on both of its problems, with a report, tables, data and particle files

@@ -155,6 +155,7 @@ fn perform(arguments: &Arguments, given: &[OsString]) -> anyhow::Result<bool> {
         Command::Stability(options) => commands::stability(options),
         Command::Batch(options) => commands::batch(options),
         Command::Score(options) => commands::score(options),
+        Command::Diagnose(options) => commands::diagnose(options),
         Command::Tradeoff(options) => commands::tradeoff(options),
         Command::Reproduce(options) => commands::reproduce(options),
         Command::Completions(options) => commands::completions(options),

@@ -27,7 +27,7 @@ pub(crate) struct GenerateOptions {
 }
 
 /// Hosts, with a line about each.
-fn hosts() -> impl TypedValueParser<Value = &'static Host> {
+pub(super) fn hosts() -> impl TypedValueParser<Value = &'static Host> {
     // As people call the language.
     let alias = |name: &str| (name == "cpp").then_some("c++");
     let values = HOSTS

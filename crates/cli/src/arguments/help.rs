@@ -21,7 +21,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
 type Example = (&'static str, &'static str);
 
 /// Examples of each command.
-const EXAMPLES: [(&str, &[Example]); 17] = [
+const EXAMPLES: [(&str, &[Example]); 18] = [
     (
         "list",
         &[
@@ -112,6 +112,16 @@ const EXAMPLES: [(&str, &[Example]); 17] = [
             "mms batch slurm --shards 8 -- converge ring --cells 64,128 --out study",
             "a study in 8 shards",
         )],
+    ),
+    (
+        "diagnose",
+        &[
+            (
+                "mms diagnose bar --target c --run './run.sh {fields} {cells} {out}'",
+                "run.sh compiles with the header in {fields}, and writes a file into {out}",
+            ),
+            ("mms diagnose --list", "the mistakes that are looked for"),
+        ],
     ),
     (
         "score",

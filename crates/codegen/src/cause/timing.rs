@@ -153,10 +153,12 @@ pub(super) fn nudge(fields: &mut Fields, unused: Unused, start: f64) {
             let later = later(graph, start);
             graph.mul(hundredth, later)
         }
-        Unused::InitialVelocity | Unused::InitialDisplacement => {
+        Unused::InitialDisplacement => {
             let earlier = earlier(graph, start);
             graph.mul(hundredth, earlier)
         }
+        // It may be zero, which no factor changes.
+        Unused::InitialVelocity => return shift(fields, Timed::InitialVelocity, start, start),
     };
     let factor = graph.add(Graph::ONE, share);
     let mut scale = |vector: &mut [Expr]| {
@@ -172,6 +174,6 @@ pub(super) fn nudge(fields: &mut Fields, unused: Unused, start: f64) {
             fields.surfaces.iter_mut().for_each(|surface| scale(&mut surface.traction));
         }
         Unused::Boundary | Unused::InitialDisplacement => scale(&mut fields.u),
-        Unused::InitialVelocity => scale(&mut fields.v),
+        Unused::InitialVelocity => {}
     }
 }

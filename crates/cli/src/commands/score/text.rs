@@ -1,6 +1,8 @@
 //! A comparison in words and tables.
 
-use mmsmith_verify::{Agreement, Differences, Order, PerNorm, Quantity, Remark, Score, ScoreRow};
+use mmsmith_verify::{
+    Agreement, Convergence, Differences, Order, PerNorm, Quantity, Remark, Score, ScoreRow,
+};
 
 use crate::arguments::ScoreOptions;
 use crate::library::Selection;
@@ -149,7 +151,11 @@ pub(super) fn verdict(score: &Score) -> String {
         Some(false) => "FAILED: ",
         None => "",
     };
-    format!("\nverdict: {passed}{}\n", score.verdict.message)
+    let advice = match score.verdict.kind {
+        Convergence::DoesNotConverge => "mms diagnose names the mistake in a solver\n",
+        Convergence::Converges | Convergence::CannotTell => "",
+    };
+    format!("\nverdict: {passed}{}\n{advice}", score.verdict.message)
 }
 
 /// Errors of the recording and of the run beside it.

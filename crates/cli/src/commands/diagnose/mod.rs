@@ -1,0 +1,355 @@
+//! `mms diagnose`: which mistake a solver makes, found by fields that have the opposite mistake.
+
+mod runs;
+mod search;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use mmsmith_codegen::{CAUSES, Cause, Origin};
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify::Quantity;
+use serde_json::{Value, json};
+
+use super::with_threads;
+use crate::arguments::DiagnoseOptions;
+use crate::expect;
+use crate::json::Output;
+use crate::library::{Selection, locate};
+use crate::number;
+use crate::table::{self, Table};
+use crate::terminal;
+use runs::{Errors, Run, Solver, written_step};
+use search::{Expected, Search, Tried};
+
+/// Densities that cannot be told from a factor of another origin, and one that can.
+const LIKE_FACTORS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+const TELLING: f64 = 3.0;
+
+pub(crate) fn diagnose(options: &DiagnoseOptions) -> Result<bool> {
+    let output = Output::prepare_if(options.json.as_ref())?;
+    if options.list {
+        return list(output);
+    }
+    let (Some(name), Some(target), Some(run)) = (&options.name, options.target, &options.run)
+    else {
+        bail!("a solution, --target and --run are needed, or --list");
+    };
+    refuse(options)?;
+    let expected = expected(options)?;
+    let temporary = tempfile::tempdir().context("a folder for the runs")?;
+    let folder = options.out.clone().unwrap_or_else(|| temporary.path().to_owned());
+    let until = Instant::now() + Duration::from_secs_f64(options.seconds);
+    let found = locate(name)?;
+    let solver = |more: &[(String, f64)], part: &str| -> Result<Solver<'_>> {
+        let set: Vec<_> = options.parameters.set.iter().chain(more).cloned().collect();
+        let selection = Selection::new(name, &set)?;
+        let mut spec = found.specification()?;
+        for parameter in &mut spec.parameters {
+            if let Some(value) = selection.parameters().get(&parameter.name) {
+                parameter.default = *value;
+            }
+        }
+        Ok(Solver {
+            spec,
+            exact: selection.build()?,
+            target,
+            origin: Origin { command: "mms diagnose".into(), file: found.shown_file() },
+            build: options.build.as_deref(),
+            run,
+            folder: fresh(&folder.join(part))?,
+            until,
+            dt: options.cells.iter().copied().zip(options.dt.iter().copied()).collect(),
+        })
+    };
+    let work = || {
+        let told = examine(solver(&[], "given")?, &solver, options, &expected)?;
+        terminal::say(&told.text(options))?;
+        if let Some(output) = output {
+            output.write(&told.document(name, options))?;
+        }
+        Ok(told.passed)
+    };
+    with_threads(Some(options.jobs), work)
+}
+
+/// Refuses options that do not fit each other.
+fn refuse(options: &DiagnoseOptions) -> Result<()> {
+    if options.cells.len() < 2 || options.cells.windows(2).any(|pair| pair[0] >= pair[1]) {
+        bail!(
+            "--cells: an order takes two grids or more, the coarsest first, such as --cells 8,16"
+        );
+    }
+    if !options.dt.is_empty() && options.dt.len() != options.cells.len() {
+        bail!("--dt has {} value(s) for {} grids", options.dt.len(), options.cells.len());
+    }
+    Ok(())
+}
+
+fn expected(options: &DiagnoseOptions) -> Result<Expected> {
+    let orders = expect::of_recordings(&options.expect)?;
+    let orders = orders.into_iter().filter_map(|(field, norms)| Some((field, norms.linf?)));
+    Ok(Expected { orders: orders.collect(), tolerance: options.tolerance })
+}
+
+/// An empty folder. Fields of an earlier search would be taken for those of this one.
+fn fresh(folder: &PathBuf) -> Result<PathBuf> {
+    if folder.exists() {
+        bail!("--out: {} is there already; name another folder", folder.display());
+    }
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    // Commands may change to another folder.
+    Ok(fs::canonicalize(folder)?)
+}
+
+/// The mistakes as a table or as JSON.
+fn list(output: Option<Output>) -> Result<bool> {
+    let mut text = String::new();
+    for cause in CAUSES {
+        text += &format!("{}: {}.\n  Look at {}.\n", cause.name, cause.mistake, cause.look);
+    }
+    terminal::say(&text)?;
+    if let Some(output) = output {
+        let row = |cause: &Cause| json!({"name": cause.name, "mistake": cause.mistake, "look": cause.look});
+        output.write(&json!({
+            "schema": "mmsmith.causes/1",
+            "causes": CAUSES.iter().map(row).collect::<Vec<_>>(),
+        }))?;
+    }
+    Ok(true)
+}
+
+/// What was found.
+struct Told {
+    passed: bool,
+    right: BTreeMap<usize, Errors>,
+    causes: Vec<(&'static Cause, Option<BTreeMap<usize, Errors>>, Option<f64>)>,
+    tried: Vec<(&'static str, f64)>,
+    not_tried: BTreeMap<&'static str, String>,
+    notes: Vec<String>,
+    field: Quantity,
+}
+
+/// Runs the solver with the right fields on all grids, and learns its time steps where it tells them.
+fn with_right_fields(solver: &mut Solver<'_>, cells: &[usize]) -> Result<Vec<Run>> {
+    let runs: Vec<Run> =
+        cells.iter().map(|&cells| solver.errors(None, cells)).collect::<Result<_>>()?;
+    for (&cells, run) in cells.iter().zip(&runs) {
+        if let Some(dt) = written_step(run) {
+            solver.dt.entry(cells).or_insert(dt);
+        }
+    }
+    Ok(runs)
+}
+
+fn by_cells(cells: &[usize], runs: &[Run]) -> BTreeMap<usize, Errors> {
+    cells.iter().copied().zip(runs.iter().map(|run| run.errors.clone())).collect()
+}
+
+/// The solver with another density, where the one it has hides a mistake.
+fn seeing<'a>(
+    solver: &Solver<'a>,
+    other: &impl Fn(&[(String, f64)], &str) -> Result<Solver<'a>>,
+) -> Result<Option<Solver<'a>>> {
+    let density = match &solver.exact {
+        AnySolution::One(solution) => solution.density(),
+        AnySolution::Two(solution) => solution.density(),
+        AnySolution::Three(solution) => solution.density(),
+        _ => f64::NAN,
+    };
+    let has = |parameter: &mmsmith_spec::Parameter| {
+        parameter.name == "rho0" && parameter.default == density
+    };
+    if !LIKE_FACTORS.contains(&density) || !solver.spec.parameters.iter().any(has) {
+        return Ok(None);
+    }
+    other(&[("rho0".to_owned(), TELLING)], "density").map(Some)
+}
+
+fn examine<'a>(
+    mut given: Solver<'a>,
+    other: &impl Fn(&[(String, f64)], &str) -> Result<Solver<'a>>,
+    options: &DiagnoseOptions,
+    expected: &Expected,
+) -> Result<Told> {
+    let cells = &options.cells[..];
+    let runs = with_right_fields(&mut given, cells)?;
+    if let Some(failure) = runs.iter().find_map(|run| run.failure.as_ref())
+        && runs.iter().all(|run| run.failure.is_some())
+    {
+        bail!("--run: with the right fields no run left a result: {failure}");
+    }
+    let mut right = by_cells(cells, &runs);
+    let mut passed = expected.is_met(&right, 0.0);
+    let mut notes = vec![];
+    let mut runs = runs;
+    let field = expected.orders.keys().next().copied().unwrap_or(Quantity::Displacement);
+    if let Some(mut seeing) = seeing(&given, other)? {
+        let of_seeing = with_right_fields(&mut seeing, cells)?;
+        let errors = by_cells(cells, &of_seeing);
+        if !expected.is_met(&errors, 0.0) {
+            notes.push(match passed {
+                true => "the errors fall with the parameters given, but not with rho0 = 3: a density of 1 hides a force per volume".into(),
+                false => "mistakes were looked for with rho0 = 3, which no factor of weights looks like".to_owned(),
+            });
+            if passed {
+                right = errors;
+            }
+            passed = false;
+            (given, runs) = (seeing, of_seeing);
+        } else if passed {
+            notes.push("also with rho0 = 3".into());
+        }
+    }
+    let mut told = Told {
+        passed,
+        right,
+        causes: vec![],
+        tried: vec![],
+        not_tried: BTreeMap::new(),
+        notes,
+        field,
+    };
+    if !passed {
+        told.search(&given, &runs[0], options, expected)?;
+    }
+    Ok(told)
+}
+
+impl Told {
+    fn search(
+        &mut self,
+        solver: &Solver<'_>,
+        right: &Run,
+        options: &DiagnoseOptions,
+        expected: &Expected,
+    ) -> Result<()> {
+        let search =
+            Search { solver, expected, cells: &options.cells, not_tried: Mutex::default() };
+        let tried = search.single(right)?;
+        for Tried { trial, errors } in tried {
+            let order = Expected::order(&errors, self.field);
+            self.tried.push((trial.cause.name, order));
+            if expected.is_met(&errors, 0.0) {
+                let shift = trial.fitted.map(|dt_over_h| dt_over_h * solver.h(options.cells[0]));
+                self.causes.push((trial.cause, Some(errors), shift));
+            }
+        }
+        if self.causes.is_empty() {
+            let unused = search.unused(right)?;
+            self.causes.extend(unused.into_iter().map(|cause| (cause, None, None)));
+        }
+        if self.causes.is_empty() {
+            self.notes.push("no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into());
+        }
+        self.not_tried = search.not_tried.into_inner().unwrap_or_default();
+        Ok(())
+    }
+
+    fn order(&self) -> f64 {
+        Expected::order(&self.right, self.field)
+    }
+
+    fn text(&self, options: &DiagnoseOptions) -> String {
+        let mut table = Table::new(0, ["cells", "error", "rate"]);
+        let mut coarser: BTreeMap<usize, Errors> = BTreeMap::new();
+        for (cells, errors) in &self.right {
+            coarser.insert(*cells, errors.clone());
+            let error = errors.get(&self.field).copied().unwrap_or(f64::INFINITY);
+            let order =
+                Some(Expected::order(&coarser, self.field)).filter(|order| order.is_finite());
+            table.row([cells.to_string(), table::error(error), table::rate(order)]);
+        }
+        let mut text = format!("error of {} with the right fields\n{}\n", self.field, table.text());
+        if self.passed {
+            text += "nothing is wrong: the errors fall as expected\n";
+        }
+        for (index, (cause, errors, shift)) in self.causes.iter().take(4).enumerate() {
+            text += &format!(
+                "{}{}: {}\n",
+                if index > 0 { "or " } else { "" },
+                cause.name,
+                cause.mistake
+            );
+            text += &format!("  look at {}\n", cause.look);
+            if let Some(errors) = errors {
+                let order = Expected::order(errors, self.field);
+                text += &format!(
+                    "  order {:.2} with the right fields, {order:.2} with the opposite mistake in the fields\n",
+                    self.order()
+                );
+            }
+            if let Some(shift) = shift {
+                text += &format!(
+                    "  by {} on {} cells: is that the time step, or half of it?\n",
+                    number::rounded(*shift, 3),
+                    options.cells[0]
+                );
+            }
+        }
+        for note in &self.notes {
+            text += &format!("note: {note}\n");
+        }
+        if !self.passed {
+            text += &format!(
+                "{} mistakes were tried, {} were not\n",
+                self.tried.len(),
+                self.not_tried.len()
+            );
+        }
+        text
+    }
+
+    fn document(&self, name: &str, options: &DiagnoseOptions) -> Value {
+        let finite = |order: f64| order.is_finite().then_some(order);
+        let named = |errors: &Errors| -> BTreeMap<String, f64> {
+            errors.iter().map(|(field, error)| (field.to_string(), *error)).collect()
+        };
+        let grids = |errors: &BTreeMap<usize, Errors>| -> Value {
+            errors
+                .iter()
+                .map(|(cells, errors)| json!({"cells": cells, "errors": named(errors)}))
+                .collect()
+        };
+        let cause = |(cause, errors, shift): &(
+            &Cause,
+            Option<BTreeMap<usize, Errors>>,
+            Option<f64>,
+        )| {
+            json!({
+                "name": cause.name,
+                "mistake": cause.mistake,
+                "look": cause.look,
+                "order": errors.as_ref().and_then(|errors| finite(Expected::order(errors, self.field))),
+                "rows": errors.as_ref().map(grids),
+                "shift": shift,
+            })
+        };
+        let tried: BTreeMap<_, _> =
+            self.tried.iter().map(|(name, order)| (name, finite(*order))).collect();
+        json!({
+            "schema": "mmsmith.diagnose/1",
+            "settings": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "solution": name,
+                "target": options.target.map(|host| host.name),
+                "run": options.run,
+                "cells": options.cells,
+                "expect": options.expect,
+                "tolerance": options.tolerance,
+                "dt": options.dt,
+            },
+            "passed": self.passed,
+            "order": finite(self.order()),
+            "rows": grids(&self.right),
+            "causes": self.causes.iter().map(cause).collect::<Vec<_>>(),
+            "tried": tried,
+            "not_tried": self.not_tried,
+            "notes": self.notes,
+        })
+    }
+}

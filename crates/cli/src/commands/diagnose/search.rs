@@ -1,0 +1,315 @@
+//! Which mistake restores the order of a solver.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use anyhow::Result;
+use mmsmith_codegen::{CAUSES, Cause, Counter, Timed, Unused};
+use mmsmith_spec::Condition;
+use mmsmith_verify::Quantity;
+use rayon::prelude::*;
+
+use super::runs::{Errors, Run, Solver, Trial};
+
+/// How many mistakes are run on the second grid, and on a third one.
+const SECOND: usize = 8;
+const THIRD: usize = 3;
+/// So many mistakes are tried at a time: where one of them explains the errors, less likely ones are left out.
+const BATCH: usize = 32;
+/// A solver whose order is lower than expected by no more is run on a third grid before it is judged.
+const NEAR: f64 = 0.7;
+/// Errors of this share are alike.
+const ALIKE: f64 = 0.02;
+/// The shift that a fit begins with, in lengths of a cell over the wave speed.
+const FIRST_SHIFT: f64 = 0.2;
+/// A solver that has a time step this small beside a cell is not at fault by it.
+const SMALLEST_SHIFT: f64 = 1e-4;
+
+/// What is expected of a solver.
+pub(super) struct Expected {
+    pub(super) orders: BTreeMap<Quantity, f64>,
+    pub(super) tolerance: f64,
+}
+
+/// The errors of one trial on the grids that were run.
+pub(super) struct Tried {
+    pub(super) trial: Trial,
+    pub(super) errors: BTreeMap<usize, Errors>,
+}
+
+impl Expected {
+    /// The order of a field on the two finest grids.
+    pub(super) fn order(errors: &BTreeMap<usize, Errors>, field: Quantity) -> f64 {
+        let mut finest = errors.iter().rev();
+        let (Some((fine, of_fine)), Some((coarse, of_coarse))) = (finest.next(), finest.next())
+        else {
+            return f64::NAN;
+        };
+        let error = |errors: &Errors| errors.get(&field).copied().unwrap_or(f64::INFINITY);
+        let order = (error(of_coarse) / error(of_fine)).ln() / (*fine as f64 / *coarse as f64).ln();
+        if order.is_finite() { order } else { f64::NAN }
+    }
+
+    /// Whether the errors fall with the expected orders, but for so much.
+    pub(super) fn is_met(&self, errors: &BTreeMap<usize, Errors>, slack: f64) -> bool {
+        self.orders
+            .iter()
+            .all(|(&field, order)| Self::order(errors, field) >= order - self.tolerance - slack)
+    }
+
+    fn size(&self, errors: &Errors) -> f64 {
+        let squares = self
+            .orders
+            .keys()
+            .map(|field| errors.get(field).map_or(f64::INFINITY, |error| error * error));
+        let size = squares.sum::<f64>().sqrt();
+        if size.is_finite() { size } else { f64::INFINITY }
+    }
+}
+
+impl Tried {
+    fn finest(&self) -> &Errors {
+        static NONE: Errors = Errors::new();
+        self.errors.values().next_back().unwrap_or(&NONE)
+    }
+}
+
+/// The search with one solver.
+pub(super) struct Search<'a> {
+    pub(super) solver: &'a Solver<'a>,
+    pub(super) expected: &'a Expected,
+    pub(super) cells: &'a [usize],
+    /// Why a mistake was not looked for.
+    pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
+}
+
+impl Search<'_> {
+    fn leave_out(&self, cause: &Cause, why: &str) {
+        if let Ok(mut left_out) = self.not_tried.lock() {
+            left_out.insert(cause.name, why.to_owned());
+        }
+    }
+
+    fn knows_steps(&self) -> bool {
+        !self.solver.dt.is_empty()
+    }
+
+    fn surfaces(&self, condition: Condition) -> bool {
+        self.solver.spec.boundaries.iter().any(|boundary| boundary.condition == condition)
+    }
+
+    /// What can be tried without a fit.
+    fn trials(&self) -> Vec<Trial> {
+        let loaded = self.surfaces(Condition::PrescribedTraction);
+        let admit = |cause: &&'static Cause| {
+            if matches!(cause.counter, Counter::Unused(_)) {
+                return false;
+            }
+            let is_timed = matches!(cause.counter, Counter::Time { .. } | Counter::Impulse { .. });
+            if cause.name.starts_with("traction-") && !loaded {
+                self.leave_out(cause, "the solution prescribes no traction");
+                return false;
+            }
+            if is_timed && !self.knows_steps() {
+                if matches!(cause.counter, Counter::Impulse { .. }) {
+                    self.leave_out(
+                        cause,
+                        "the time step is not known; give it with --dt, or let the solver write it into the file {out}/dt",
+                    );
+                }
+                return false;
+            }
+            true
+        };
+        let trial = |cause| Trial { cause, fitted: None };
+        let blind = |trial: &Trial| {
+            let shows = self.solver.shows(trial, self.cells[0]);
+            if !shows {
+                self.leave_out(trial.cause, "with this solution it changes no field");
+            }
+            shows
+        };
+        CAUSES.iter().filter(admit).map(trial).filter(blind).collect()
+    }
+
+    fn run(&self, trial: Trial, cells: usize) -> Result<Option<Tried>> {
+        if !self.solver.has_time() {
+            self.leave_out(trial.cause, "there was no time for it; give more with --seconds");
+            return Ok(None);
+        }
+        let run = self.solver.errors(Some(&trial), cells)?;
+        Ok(Some(Tried { trial, errors: BTreeMap::from([(cells, run.errors)]) }))
+    }
+
+    fn run_all(&self, trials: Vec<Trial>, cells: usize) -> Result<Vec<Tried>> {
+        let tried: Result<Vec<Option<Tried>>> =
+            trials.into_par_iter().map(|trial| self.run(trial, cells)).collect();
+        Ok(tried?.into_iter().flatten().collect())
+    }
+
+    fn run_finer(&self, tried: &mut [Tried], cells: usize) -> Result<()> {
+        tried.par_iter_mut().try_for_each(|one| {
+            if self.solver.has_time() && !one.errors.contains_key(&cells) {
+                let run = self.solver.errors(Some(&one.trial), cells)?;
+                one.errors.insert(cells, run.errors);
+            }
+            Ok(())
+        })
+    }
+
+    /// The mistakes by what is left of the errors once they are countered, first those that restore the orders.
+    pub(super) fn single(&self, right: &Run) -> Result<Vec<Tried>> {
+        let coarse = self.cells[0];
+        let mut trials = self.trials();
+        if !self.knows_steps() {
+            trials.extend(self.fitted(right)?);
+        }
+        let by_size = |one: &Tried, other: &Tried| {
+            let [one, other] = [one, other].map(|tried| self.expected.size(tried.finest()));
+            one.total_cmp(&other)
+        };
+        let whole = self.expected.size(&right.errors);
+        let mut tried: Vec<Tried> = vec![];
+        while !trials.is_empty() {
+            let rest = trials.split_off(BATCH.min(trials.len()));
+            let mut batch = self.run_all(trials, coarse)?;
+            trials = rest;
+            batch.sort_by(by_size);
+            // An error that is left whole is left by a mistake that is not made.
+            let is_less = |one: &Tried| self.expected.size(one.finest()) < whole;
+            let second = SECOND.min(batch.iter().take_while(|one| is_less(one)).count());
+            for &cells in &self.cells[1..] {
+                self.run_finer(&mut batch[..second], cells)?;
+            }
+            let is_found = batch.iter().any(|one| self.expected.is_met(&one.errors, 0.0));
+            tried.extend(batch);
+            if is_found {
+                for trial in &trials {
+                    self.leave_out(
+                        trial.cause,
+                        "a mistake that is more likely explains the errors",
+                    );
+                }
+                break;
+            }
+        }
+        let is_near = |one: &Tried| self.expected.is_met(&one.errors, NEAR);
+        let last = self.cells[self.cells.len() - 1];
+        let mut near: Vec<usize> =
+            (0..tried.len()).filter(|&index| is_near(&tried[index])).collect();
+        near.sort_by(|&one, &other| by_size(&tried[one], &tried[other]));
+        for index in near.into_iter().take(THIRD) {
+            self.run_finer(&mut tried[index..=index], 2 * last)?;
+        }
+        tried.sort_by_key(|one| {
+            (!self.expected.is_met(&one.errors, 0.0), std::cmp::Reverse(one.errors.len()))
+        });
+        let restoring =
+            tried.iter().take_while(|one| self.expected.is_met(&one.errors, 0.0)).count();
+        tried[..restoring].sort_by(|one, other| {
+            let finest = |tried: &Tried| tried.errors.keys().next_back().copied();
+            let place = |tried: &Tried| {
+                CAUSES.iter().position(|cause| cause.name == tried.trial.cause.name)
+            };
+            // Mistakes that are not told apart, in the order of the table.
+            let size = |tried: &Tried| (self.expected.size(tried.finest()).ln() / ALIKE).round();
+            finest(other)
+                .cmp(&finest(one))
+                .then_with(|| size(one).total_cmp(&size(other)))
+                .then_with(|| place(one).cmp(&place(other)))
+        });
+        Ok(tried)
+    }
+
+    /// Shifts in time that leave the least of the error: the square of the error is of second degree in a small shift.
+    fn fitted(&self, right: &Run) -> Result<Vec<Trial>> {
+        let kinds = [
+            Timed::Force,
+            Timed::Inertia,
+            Timed::Boundary,
+            Timed::BoundaryVelocity,
+            Timed::InitialVelocity,
+            Timed::Traction,
+        ];
+        let loaded = self.surfaces(Condition::PrescribedTraction);
+        let of = |kind: Timed, steps: f64| {
+            CAUSES.iter().find(|cause| {
+                matches!(cause.counter, Counter::Time { of, steps: own } if of == kind && own == steps)
+            })
+        };
+        let finest = self.cells[self.cells.len() - 1];
+        let fit = |kind: &Timed| -> Result<Option<Trial>> {
+            if *kind == Timed::Traction && !loaded {
+                return Ok(None);
+            }
+            let [Some(back), Some(forth)] = [of(*kind, -1.0), of(*kind, 1.0)] else {
+                return Ok(None);
+            };
+            let Some(coarse) = self.least([back, forth], self.cells[0], right)? else {
+                return Ok(None);
+            };
+            let again = self.solver.errors(None, finest)?;
+            let fine = self.least([back, forth], finest, &again)?.unwrap_or(coarse);
+            // The error of the method itself draws the fit away, by half as much on half the cells.
+            let share = self.cells[0] as f64 / finest as f64;
+            let dt_over_h = (fine - share * coarse) / (1.0 - share);
+            let cause = if dt_over_h < 0.0 { back } else { forth };
+            Ok(Some(Trial { cause, fitted: Some(dt_over_h.abs()) }))
+        };
+        let fitted: Result<Vec<Option<Trial>>> = kinds.par_iter().map(fit).collect();
+        Ok(fitted?.into_iter().flatten().collect())
+    }
+
+    /// The shift over the length of a cell that leaves the least of the error on a grid.
+    fn least(&self, causes: [&'static Cause; 2], cells: usize, right: &Run) -> Result<Option<f64>> {
+        let first = FIRST_SHIFT / self.solver.wave_speed();
+        let mut squares = [0.0; 2];
+        for (square, cause) in squares.iter_mut().zip(causes) {
+            let trial = Trial { cause, fitted: Some(first) };
+            if !self.solver.has_time() || !self.solver.shows(&trial, cells) {
+                return Ok(None);
+            }
+            *square = self.solver.errors(Some(&trial), cells)?.root_mean_square.powi(2);
+        }
+        let [before, after] = squares;
+        let curvature = before - 2.0 * right.root_mean_square.powi(2) + after;
+        let shift = first / 2.0 * (before - after) / curvature;
+        Ok((curvature > 0.0 && shift.abs() > SMALLEST_SHIFT * first).then_some(shift))
+    }
+
+    /// The mistakes that leave a field without effect on the result.
+    pub(super) fn unused(&self, right: &Run) -> Result<Vec<&'static Cause>> {
+        let [loaded, moved] = [Condition::PrescribedTraction, Condition::PrescribedMotion]
+            .map(|condition| self.surfaces(condition));
+        let mut found: Vec<&'static Cause> = vec![];
+        for cause in CAUSES {
+            let Counter::Unused(unused) = cause.counter else { continue };
+            let can_be = match unused {
+                Unused::Traction | Unused::TractionLater => loaded,
+                Unused::Boundary => moved,
+                _ => true,
+            };
+            // What has no effect at all has none later either.
+            let is_told = found.iter().any(|known| {
+                matches!(
+                    (known.counter, unused),
+                    (Counter::Unused(Unused::Force), Unused::ForceComponent | Unused::ForceLater)
+                        | (Counter::Unused(Unused::Traction), Unused::TractionLater)
+                )
+            });
+            let guess = 0.1 * FIRST_SHIFT / self.solver.wave_speed();
+            let trial = Trial { cause, fitted: (!self.knows_steps()).then_some(guess) };
+            if !can_be
+                || is_told
+                || !self.solver.has_time()
+                || !self.solver.shows(&trial, self.cells[0])
+            {
+                continue;
+            }
+            if self.solver.errors(Some(&trial), self.cells[0])?.is_like(right) {
+                found.push(cause);
+            }
+        }
+        Ok(found)
+    }
+}
