@@ -28,7 +28,6 @@ program bar
     X = i*h
     w(i:i) = u(s, X, 0.0_dp)
     at = -dt/2
-    if (mistake == 'initial-velocity-half-step-ahead') at = 0
     vel(i:i) = v(s, X, at)
   end do
   if (mistake == 'initial-velocity-halved') vel = vel/2
