@@ -305,6 +305,14 @@ impl Selection {
         }
     }
 
+    /// Whether nothing moves, so that any time is as good as another. All solutions of the library move.
+    pub(crate) fn is_static(&self) -> bool {
+        match &self.source {
+            Source::Library(_) => false,
+            Source::File(source) => source.0.is_static(),
+        }
+    }
+
     /// The solution in double precision.
     pub(crate) fn build(&self) -> Result<AnySolution<f64>> {
         match &self.source {

@@ -165,3 +165,25 @@ fn coarse_grids_that_are_short_of_an_order_warn_and_a_wrong_order_fails() {
         assert_eq!(mms(place, &call).status, status, "{expected}");
     }
 }
+
+#[test]
+fn points_of_a_displacement_at_rest_need_no_time() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    fs::write(place.join("rest.toml"), at_rest("neo-hookean", ["A*X*Y", "A*X^2"])).unwrap();
+    fs::write(place.join("with.json"), r#"[{ "X": [0.25, 0.5], "t": 3 }]"#).unwrap();
+    fs::write(place.join("without.json"), r#"[{ "X": [0.25, 0.5] }]"#).unwrap();
+    fs::write(place.join("without.csv"), "X,Y\n0.25,0.5\n").unwrap();
+    let row = |points: &str| {
+        let called = mms(place, &format!("eval rest.toml --points {points} --json row.json"));
+        assert_eq!(called.status, 0, "{points}: {}", called.stderr);
+        read_json(&place.join("row.json"))["rows"][0].clone()
+    };
+    let expected = row("with.json");
+    for points in ["without.json", "without.csv"] {
+        assert_eq!(row(points), expected, "{points}");
+        let refused = mms(place, &format!("eval skew-2d --points {points}"));
+        assert_eq!(refused.status, 2, "{}", refused.stdout);
+        assert!(refused.stderr.contains("t is missing") || refused.stderr.contains("no column t"));
+    }
+}

@@ -523,6 +523,13 @@ impl Spec {
         Reader::new(&document, source)?.read(&document)
     }
 
+    /// Whether nothing moves: the displacement does not depend on time, and no rotation is added to it.
+    #[must_use]
+    pub fn is_static(&self) -> bool {
+        let is_time = |symbol: &Expr| self.graph.symbol_name(*symbol) == Some("t");
+        self.rotation.is_none() && !self.graph.symbols_in(&self.displacement).iter().any(is_time)
+    }
+
     /// Derives every field.
     ///
     /// # Errors

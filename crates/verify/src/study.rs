@@ -10,7 +10,6 @@ use crate::error::CaseError;
 use crate::order::Order;
 use crate::plan::plan;
 use crate::run::{Outputs, Progress, Row, Status, run};
-use crate::verdict::above_mean;
 
 /// What changes from row to row.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,6 +121,15 @@ pub fn orders_above(
         let errors: Vec<_> = errors.iter().enumerate().map(above).collect();
         Order::of(steps, &errors)
     })
+}
+
+/// The largest error that rounding may cause, in units of its root mean square: the floors are of the latter, and the largest of
+/// some thousand particles and steps lies beyond.
+pub(crate) fn above_mean(norm: Norm) -> f64 {
+    match norm {
+        Norm::Linf => 8.0,
+        Norm::L2 | Norm::L1 => 1.0,
+    }
 }
 
 /// The orders of errors, `None` where a case failed, with respect to the steps beside them.

@@ -1,7 +1,7 @@
 //! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
 //! the expected one.
 
-use mmsmith_measure::norms::{Norm, PerField, PerNorm};
+use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_mpm::total_lagrangian::{Layout, MassMatrix};
 use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain, Solution};
@@ -214,19 +214,13 @@ pub fn verdicts_above(
 ) -> PerField<PerNorm<Verdict>> {
     crate::study::each_norm(values.errors, |field, norm, errors| {
         let expected = expected[field][norm];
-        let floors: Vec<f64> =
-            values.floors.iter().map(|floor| floor[field] * above_mean(norm)).collect();
+        let floors: Vec<f64> = values
+            .floors
+            .iter()
+            .map(|floor| floor[field] * crate::study::above_mean(norm))
+            .collect();
         Verdict::above(values.steps, errors, &floors, expected, tolerance)
     })
-}
-
-/// The largest error that rounding may cause, in units of its root mean square: the floors are of the latter, and the largest of
-/// some thousand particles and steps lies beyond.
-pub(crate) fn above_mean(norm: Norm) -> f64 {
-    match norm {
-        Norm::Linf => 8.0,
-        Norm::L2 | Norm::L1 => 1.0,
-    }
 }
 
 /// The orders in `h` at a fixed CFL number that theory promises for `case`: second order in the displacement for

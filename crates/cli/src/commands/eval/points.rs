@@ -32,8 +32,10 @@ pub(super) fn place(file: Source, index: usize) -> String {
 /// The points of a file: JSON where it begins as a list or an object does, else CSV.
 pub(super) fn read(file: Source, selection: &Selection) -> Result<Vec<Point>> {
     let text = file.short_text(LONGEST)?;
+    // Where nothing moves no time needs to be given.
+    let usual_time = selection.is_static().then_some(0.0);
     if !text.trim_start().starts_with(['[', '{']) {
-        return of_csv(&text, selection.dimension()).with_context(|| file.to_string());
+        return of_csv(&text, selection.dimension(), usual_time).with_context(|| file.to_string());
     }
     let value: Value =
         serde_json::from_str(&text).with_context(|| format!("{file} is not valid JSON"))?;
@@ -41,11 +43,12 @@ pub(super) fn read(file: Source, selection: &Selection) -> Result<Vec<Point>> {
         bail!("{file}: expected a list of points, [ {FORM}, ... ]")
     };
     let entries = entries.iter().enumerate();
-    entries.map(|(index, entry)| point(entry).with_context(|| place(file, index))).collect()
+    let point = |(index, entry)| point(entry, usual_time).with_context(|| place(file, index));
+    entries.map(point).collect()
 }
 
 /// The rows of a table with columns for the coordinates and the time; letter case does not matter.
-fn of_csv(text: &str, n: usize) -> Result<Vec<Point>> {
+fn of_csv(text: &str, n: usize, usual_time: Option<f64>) -> Result<Vec<Point>> {
     let mut reader = ReaderBuilder::new().trim(Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().context("it has no line of column names")?.clone();
     let form = format!("{},t", AXES[..n].join(","));
@@ -59,7 +62,10 @@ fn of_csv(text: &str, n: usize) -> Result<Vec<Point>> {
         })
     };
     let axes = AXES[..n].iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
-    let time = column("t")?;
+    let time = match (column("t"), usual_time) {
+        (Err(_), Some(_)) => None,
+        (found, _) => Some(found?),
+    };
     let rows = reader.records().enumerate();
     rows.map(|(index, row)| {
         let row = row.with_context(|| format!("row {}", index + 1))?;
@@ -72,13 +78,14 @@ fn of_csv(text: &str, n: usize) -> Result<Vec<Point>> {
             })
         };
         let X = axes.iter().map(|column| number(*column)).collect::<Result<_>>()?;
-        Ok(Point { X, t: number(time)?, parameters: Vec::new() })
+        let t = time.map(number).transpose()?.or(usual_time).unwrap_or_default();
+        Ok(Point { X, t, parameters: Vec::new() })
     })
     .collect()
 }
 
 /// A point as JSON.
-fn point(entry: &Value) -> Result<Point> {
+fn point(entry: &Value, usual_time: Option<f64>) -> Result<Point> {
     let Value::Object(entry) = entry else { bail!("expected {FORM}") };
     if let Some(key) = entry.keys().find(|key| is_misspelt(key)) {
         bail!("unknown key '{key}'; the keys are X, t and par");
@@ -90,7 +97,11 @@ fn point(entry: &Value) -> Result<Point> {
         Some(other) => bail!("X is {other}; it must be a list of numbers"),
         None => bail!("X is missing; expected {FORM}"),
     };
-    let t = number(entry.get("t").ok_or_else(|| anyhow!("t is missing; expected {FORM}"))?, "t")?;
+    let t = match (entry.get("t"), usual_time) {
+        (Some(t), _) => number(t, "t")?,
+        (None, Some(t)) => t,
+        (None, None) => bail!("t is missing; expected {FORM}"),
+    };
     let none = Map::new();
     let parameters = match entry.get("par") {
         None => &none,
