@@ -134,13 +134,32 @@ impl Derivatives {
         if slope_of_others == Graph::ZERO {
             return None;
         }
-        let first = graph.mul(base, slope_of_others);
-        let second = graph.mul(slope, others);
-        let bracket = graph.sum([(Rational::one(), first), (exponent.clone(), second)]);
-        let single = graph.single_term(bracket)?;
+        let single = bracket(graph, (base, slope), (others, slope_of_others), exponent)?;
         let power = graph.product([(base, exponent - Rational::one())]);
         Some(graph.mul(power, single))
     }
+}
+
+/// `S f' + p S' f` as one term. The number in `S` stays apart: where `f` is such a power of the rest of `S` that the other two terms
+/// cancel as they are, roots of parameters in them do not matter.
+fn bracket(
+    graph: &mut Graph,
+    (sum, slope): (Expr, Expr),
+    (others, slope_of_others): (Expr, Expr),
+    exponent: &Rational,
+) -> Option<Expr> {
+    let Node::Sum { constant, .. } = graph.node(sum) else { return None };
+    let constant = constant.clone();
+    let number = graph.number(constant.clone());
+    let rest = graph.sub(sum, number);
+    let by_rest = graph.mul(rest, slope_of_others);
+    let by_slope = graph.mul(slope, others);
+    if graph.sum([(Rational::one(), by_rest), (exponent.clone(), by_slope)]) == Graph::ZERO {
+        return Some(graph.sum([(constant, slope_of_others)]));
+    }
+    let by_sum = graph.mul(sum, slope_of_others);
+    let bracket = graph.sum([(Rational::one(), by_sum), (exponent.clone(), by_slope)]);
+    graph.single_term(bracket)
 }
 
 /// The argument of a hyperbolic cosine.
