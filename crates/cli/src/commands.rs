@@ -14,6 +14,7 @@ mod inversion;
 mod list;
 mod picture;
 mod predict;
+mod remedy;
 mod reproduce;
 mod resume;
 mod run;

@@ -25,6 +25,7 @@ mod cost;
 mod coverage;
 mod difference;
 mod dimension;
+mod distortion;
 mod drive;
 mod error;
 mod evaluate;
@@ -39,6 +40,7 @@ mod plan;
 mod points;
 mod precision;
 mod record;
+mod remedy;
 mod run;
 mod scene;
 mod scheme;
@@ -50,6 +52,7 @@ mod temporal;
 mod total;
 mod tradeoff;
 mod updated;
+mod usual_step;
 mod verdict;
 mod whole_file;
 
@@ -62,6 +65,7 @@ pub use check::{
 pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
 pub use cost::{Cost, CostModel, Timing, time_steps};
 pub use coverage::{Part, Share, coverage, smallest_set};
+pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
@@ -77,6 +81,7 @@ pub use mmsmith_vtk::Provenance;
 pub use order::Order;
 pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
+pub use remedy::{Attempt, Remedy, remedy};
 pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
 pub use scene::{loaded_instead, needs_total_frame};
 pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
@@ -97,6 +102,7 @@ pub use tradeoff::{
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
     differences, extrapolate, families, leading, list, listed, median, pareto, tradeoff,
 };
+pub use usual_step::{LARGEST_USUAL_CFL, OnPWaves, USUAL_CFL, UsualStep, on_p_waves, usual_step};
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts, verdicts_above,

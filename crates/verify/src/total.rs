@@ -15,6 +15,7 @@ use crate::error::CaseError;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Total, grid_name};
+use crate::usual_step::two_digits;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
 /// solution says.
@@ -173,18 +174,6 @@ fn narrowest<const D: usize>(exact: &dyn Solution<f64, D>) -> f64 {
         }
         _ => 1.0,
     }
-}
-
-/// A positive number rounded down to two digits.
-fn two_digits(value: f64) -> f64 {
-    if !value.is_normal() {
-        return value;
-    }
-    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
-    // What is less than a whole number by rounding alone stays.
-    let rounded = (value / unit + 1e-9).floor();
-    // A quotient prints shorter than a product where the unit has no exact form.
-    if unit < 1.0 { rounded / (1.0 / unit).round() } else { rounded * unit }
 }
 
 /// The axis from the inner to the outer surface.

@@ -38,7 +38,7 @@ pub(crate) struct SchemeOptions {
     #[arg(long, value_enum)]
     pub(crate) grid: Option<Grid>,
     /// Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL
-    /// number itself
+    /// number itself, or a CFL number of less than 0.4
     #[arg(long, value_enum)]
     pub(crate) cfl_speed: Option<CflSpeed>,
     /// Time integrator
@@ -47,14 +47,14 @@ pub(crate) struct SchemeOptions {
     /// Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order)
     #[arg(long, value_name = "NAME", default_value_t = verify::Transfer::Flip, value_parser = str::parse::<verify::Transfer>)]
     pub(crate) transfer: verify::Transfer,
-    /// First velocity of the integrator cd
+    /// First velocity of the integrator cd; other integrators and the total Lagrangian formulation have halved alone
     #[arg(long, value_enum, default_value_t = Start::Halved)]
     pub(crate) start: Start,
     /// Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
-    /// CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation
-    /// itself, a number that suits the splines
+    /// CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest
+    /// P-waves of the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) cfl: Option<f64>,
     /// End time, in periods of the solution

@@ -10,6 +10,7 @@ use mmsmith_verify::{
 };
 use serde_json::{Value, json};
 
+use super::remedy::{Advice, Given};
 use super::scheme::Settled;
 use super::{Model, caption, inversion, settings, with_threads};
 use crate::arguments::{ConvergeOptions, SchemeOptions};
@@ -159,6 +160,9 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
             notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
         }
         notes += &way_out(&model.exact, &base, &study);
+        let given = Given::of(&options.name, &options.scheme);
+        let advice = advice(given, &model, &sweep.cases(&base), &study)?;
+        notes += &advice.as_ref().map(Advice::text).unwrap_or_default();
         let what = if differences.is_some() { "verdicts on the errors" } else { "verdicts" };
         sections
             .push((what.into(), verdict_table(&judged, step_name(&sweep), differences.is_none())));
@@ -190,6 +194,9 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
                 document["temporal"] = temporal_document(found, judged);
             }
             document["passed"] = json!(passed);
+            if let Some(advice) = &advice {
+                document["advice"] = advice.document();
+            }
             output.write(&document)?;
         }
         if let Some(file) = values {
@@ -614,6 +621,20 @@ pub(super) fn stops(study: &Study) -> String {
             format!("STOPPED with {} cells, CFL {:.4}: {}\n", row.cells, row.cfl, row.status)
         })
         .collect()
+}
+
+/// What runs in place of the first case that stopped; nothing where none did.
+fn advice(
+    given: Given<'_>,
+    model: &Model,
+    cases: &[Case],
+    study: &Study,
+) -> Result<Option<Advice>> {
+    let failed = |(_, row): &(&Case, &Row)| row.status.passed() == Some(false);
+    match cases.iter().zip(&study.rows).find(failed) {
+        Some((case, row)) => Advice::seek(given, model, case, row),
+        None => Ok(None),
+    }
 }
 
 /// Where a lattice that follows a curved boundary in steps has an order below one, what would cure it.

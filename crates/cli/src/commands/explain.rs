@@ -1,6 +1,7 @@
 //! `mms explain`: what a solution models, which parts of a solver it exercises, and what its body force costs.
 
 mod compare;
+mod deformation;
 
 use anyhow::{Result, bail};
 use mmsmith_expr::{Expr, OperationCount};
@@ -19,6 +20,7 @@ use crate::library::{Selection, Subject, specification};
 use crate::table::Table;
 use crate::{number, terminal};
 use compare::Comparison;
+use deformation::Deformation;
 
 pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
@@ -33,8 +35,11 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let predicted = predict::on_grids(&model, &settled.case).map_err(|error| error.to_string());
     let words = settled.choice();
     let blind = blind::measure(&selection)?;
+    let deformation = Deformation::of(&options.name, &model, &settled)?;
+    let told = deformation.as_ref().map(Deformation::text).unwrap_or_default();
     terminal::say(
         &(text(&spec, &exercises, &blind, &cost)
+            + &told
             + &exact_elements(degree)
             + &runs(&predicted, &words)),
     )?;
@@ -48,6 +53,9 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     if let Some(output) = output {
         let mut document = document(&spec, degree, &exercises, &cost, &predicted);
         document["blind_spots"] = json!(blind);
+        if let Some(deformation) = &deformation {
+            document["deformation"] = deformation.document();
+        }
         if let Some(compared) = &compared {
             document["compared"] = json!(compared);
         }

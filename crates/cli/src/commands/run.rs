@@ -12,6 +12,7 @@ use mmsmith_verify::{
 use serde_json::{Value, json};
 
 use super::picture::Picture;
+use super::remedy::{Advice, Given};
 use super::scheme::Settled;
 use super::{Model, caption, inversion, resume, settings, with_threads};
 use crate::arguments::RunOptions;
@@ -98,17 +99,26 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
             }
         };
         processes::tell_traffic(&traffic);
-        terminal::say(
-            &(settled.choice()
-                + &caption(&selection, settled, extent)
-                + &text(&row, Units::of(&selection))),
-        )?;
+        let caption = caption(&selection, settled, extent);
+        let told = text(&row, Units::of(&selection));
+        terminal::say(&(settled.choice() + &caption + &told))?;
         let inverted = match row.status.passed() {
             Some(false) => inversion::measure(&selection)?,
             _ => None,
         };
         if let Some(told) = &inverted {
             terminal::say(&format!("{}\n", told.text()))?;
+        }
+        // Nothing runs a motion that turns the body inside out.
+        let advice = match inverted {
+            Some(_) => None,
+            None => {
+                let given = Given::of(&options.name, &options.scheme);
+                Advice::seek(given, &model, &case, &row)?
+            }
+        };
+        if let Some(advice) = &advice {
+            terminal::say(&advice.text())?;
         }
         if let Some(frames) = &frames {
             let list = frames.folder.join(format!("{}.pvd", frames.name));
@@ -136,6 +146,9 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
             });
             if let Some(inverted) = &inverted {
                 document["inverted"] = json!(inverted);
+            }
+            if let Some(advice) = &advice {
+                document["advice"] = advice.document();
             }
             if let Some(moments) = &moments {
                 document["history"] = history_document(moments);

@@ -5,14 +5,16 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
-    self as verify, Case, CaseError, CflSpeed, Coordinates, GridPose, Integrator, Parts, Placement,
-    Scheme, Shape, Stepping, Total, Transfer, Updated,
+    self as verify, Case, CaseError, CflSpeed, Coordinates, GridPose, Integrator,
+    LARGEST_USUAL_CFL, Parts, Placement, Scheme, Shape, Stepping, Total, Transfer, USUAL_CFL,
+    Updated, UsualStep, usual_step,
 };
 
-use crate::arguments::{Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Weights};
+use crate::arguments::{
+    Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Start, Weights,
+};
+use crate::number;
 
-/// The default CFL number, unless mms chose the formulation for the solution.
-pub(super) const USUAL_CFL: f64 = 0.4;
 /// The default number of cells.
 const USUAL_CELLS: usize = 32;
 /// The same for a solid of three dimensions in a total Lagrangian formulation that was not asked for, whose cells have 64 particles each.
@@ -33,6 +35,8 @@ pub(super) struct Settled {
     pub(super) chosen: Option<Choice>,
     /// Conditions in whose place the traction of the exact motion acts.
     pub(super) loaded: Vec<Boundary>,
+    /// The CFL number of the fastest P-waves with the usual step, where a shorter one was taken for that.
+    pub(super) too_long: Option<f64>,
 }
 
 /// A total Lagrangian formulation that was not asked for.
@@ -60,6 +64,7 @@ impl Settled {
             json: None,
             chosen: None,
             loaded: Vec::new(),
+            too_long: None,
         }
     }
 
@@ -75,25 +80,43 @@ impl Settled {
             Some(frame) => frame == Frame::Total,
             None => needed.is_some() && !says_updated(options),
         };
+        refuse_start(options, is_total)?;
         let scheme = if is_total {
             Scheme::Total(total(options, exact)?)
         } else {
             Scheme::Updated(updated(options)?)
         };
         let speed = options.cfl_speed.map(CflSpeed::from);
+        let said = UsualStep {
+            cfl: options.cfl.unwrap_or(USUAL_CFL),
+            speed: speed.unwrap_or(CflSpeed::Bar),
+            too_long: None,
+        };
+        let step = match options.cfl {
+            Some(_) => said,
+            // What cannot be told from here is refused when the case is looked at.
+            None => usual_step(exact, &scheme, options.periods, speed).unwrap_or(said),
+        };
         let case = Case {
             scheme,
             cells: USUAL_CELLS,
             per_cell: options.ppc.unwrap_or_else(|| per_cell(&scheme)),
-            cfl: options.cfl.unwrap_or(USUAL_CFL),
-            cfl_speed: speed.unwrap_or(CflSpeed::Bar),
+            cfl: step.cfl,
+            cfl_speed: step.speed,
             periods: options.periods,
             extent: options.extent.map(Into::into),
         };
         let SchemeOptions { precision, threads, ref json, .. } = *options;
         let loaded = verify::loaded_instead(exact, &case);
-        let mut settled =
-            Self { case, precision, threads, json: json.clone(), chosen: None, loaded };
+        let mut settled = Self {
+            case,
+            precision,
+            threads,
+            json: json.clone(),
+            chosen: None,
+            loaded,
+            too_long: step.too_long,
+        };
         if let Scheme::Total(scheme) = scheme
             && (options.frame.is_none() || options.shape.is_none())
         {
@@ -105,6 +128,7 @@ impl Settled {
             // What cannot be told from here is refused when the case is looked at.
             if cfl_is_chosen && let Ok(cfl) = scheme.usual_cfl(exact, speed) {
                 (settled.case.cfl, settled.case.cfl_speed) = (cfl, speed);
+                settled.too_long = None;
             }
             settled.chosen = Some(Choice { scheme, reason, cfl_is_chosen });
         }
@@ -114,7 +138,7 @@ impl Settled {
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.
     pub(super) fn choice(&self) -> String {
         let Some(Choice { scheme, reason, cfl_is_chosen }) = &self.chosen else {
-            return self.loads();
+            return self.loads() + &self.step();
         };
         let Case { cfl, cfl_speed, per_cell, .. } = self.case;
         let degree = match scheme.degree {
@@ -151,7 +175,22 @@ impl Settled {
         if *cfl_is_chosen {
             text += &format!(" --cfl {cfl} --cfl-speed {cfl_speed}");
         }
-        text + "\n"
+        text + "\n" + &self.step()
+    }
+
+    /// Lines about a step that is shorter than the usual one, and why; empty where it is the usual one, or was given.
+    fn step(&self) -> String {
+        let Some(too_long) = self.too_long else { return String::new() };
+        let Case { cfl, cfl_speed, .. } = self.case;
+        let waves = match cfl_speed {
+            CflSpeed::Bar => "bar waves",
+            CflSpeed::PWave => "P-waves",
+        };
+        let too_long = number::rounded(too_long, 2);
+        format!(
+            "CFL {cfl} on {waves}: the usual {USUAL_CFL} would be {too_long} on the fastest P-waves of this motion, more than \
+             {LARGEST_USUAL_CFL}\n  as with --cfl {cfl} --cfl-speed {cfl_speed}\n"
+        )
     }
 
     /// A line about tractions in place of other conditions; empty where there are none.
@@ -170,6 +209,7 @@ fn says_updated(options: &SchemeOptions) -> bool {
     options.shape.is_some_and(|shape| shape.degree().is_none())
         || options.integrator != Integrator::Cd
         || options.transfer != Transfer::Flip
+        || options.start != Start::Halved
         || matches!(options.layout, Some(Layout::BodyFitted | Layout::Clipped))
         || options.offset != 0.0
         || is_moved(options)
@@ -250,6 +290,28 @@ fn refuse_pose(options: &SchemeOptions) -> Result<()> {
 
 fn stepping(options: &SchemeOptions) -> Stepping {
     Stepping::new(options.integrator, options.start.into())
+}
+
+/// Refuses a start for integrators that have none to choose.
+fn refuse_start(options: &SchemeOptions, is_total: bool) -> Result<()> {
+    let start = verify::Start::from(options.start);
+    if start == verify::Start::Halved {
+        return Ok(());
+    }
+    if is_total {
+        bail!(
+            "--start {start}: the total Lagrangian formulation starts from the exact velocity at time zero; leave --start out, or write \
+             --formulation updated-lagrangian --integrator cd --start {start}"
+        );
+    }
+    let integrator = options.integrator;
+    if integrator != Integrator::Cd {
+        bail!(
+            "--start {start}: the integrator {integrator} starts from the velocity at time zero, and only cd has a first velocity to \
+             choose; leave --start out, or write --integrator cd --start {start}"
+        );
+    }
+    Ok(())
 }
 
 fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {

@@ -11,7 +11,9 @@ use mmsmith_verify::{
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::scheme::{Settled, USUAL_CFL};
+use mmsmith_verify::USUAL_CFL;
+
+use super::scheme::Settled;
 use super::{Model, caption, converge, settings, with_threads};
 use crate::arguments::{SchemeOptions, StabilityOptions};
 use crate::csv;

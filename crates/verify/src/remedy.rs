@@ -1,0 +1,175 @@
+//! Settings that run where others stop: tried, not guessed.
+
+use mmsmith_mpm::{Shape, Transfer};
+use mmsmith_runtime::{AnySolution, Domain};
+
+use crate::case::{Arithmetic, Case, CflSpeed};
+use crate::error::CaseError;
+use crate::plan::plan;
+use crate::run::{Outputs, Status, run};
+use crate::scheme::{GridPose, Placement, Scheme, Total, Updated};
+use crate::usual_step::{stable_cfl, usual_step};
+
+/// Particles times steps of one attempt, at most.
+const MOST_WORK: f64 = 6e6;
+
+/// A case that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attempt {
+    /// The case.
+    pub case: Case,
+    /// How it ended.
+    pub status: Status,
+    /// The largest error of `u` until then, a length.
+    pub error: f64,
+}
+
+/// Attempts to run a solution whose case stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remedy {
+    /// The number of cells that they were made on: that of the case, or fewer where that is much work.
+    pub cells: usize,
+    /// The attempts, in order; no more are made once one has run.
+    pub attempts: Vec<Attempt>,
+}
+
+impl Remedy {
+    /// The attempt that ran, if one did.
+    #[must_use]
+    pub fn found(&self) -> Option<&Attempt> {
+        self.attempts.last().filter(|attempt| attempt.status == Status::Ok)
+    }
+}
+
+/// Tries other settings for a case that stopped, or whose errors exceed the motion, one after the other until one runs: a shorter step,
+/// another transfer, other weights, layouts that follow the body, and the total Lagrangian formulation; last a quarter of the step where it
+/// was short already. On fewer cells the settings of
+/// the case itself come first.
+///
+/// The attempts depend on the case alone, and their work is bounded.
+///
+/// # Errors
+///
+/// [`CaseError::Interrupted`]; settings that cannot be run are left out.
+pub fn remedy(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    stopped: &Case,
+) -> Result<Remedy, CaseError> {
+    let cells = affordable(exact, arithmetic, stopped);
+    let itself = (cells != stopped.cells).then_some(*stopped);
+    let mut remedy = Remedy { cells, attempts: Vec::new() };
+    for case in itself.into_iter().chain(candidates(exact, stopped)) {
+        let case = Case { cells, ..case };
+        let is_known = case == *stopped || remedy.attempts.iter().any(|own| own.case == case);
+        if is_known || !is_cheap(exact, arithmetic, &case) {
+            continue;
+        }
+        let mut quiet = |_| {};
+        let row = match run(exact, arithmetic, &case, &mut Outputs::new(&mut quiet)) {
+            Ok(row) => row,
+            Err(interrupted @ CaseError::Interrupted { .. }) => return Err(interrupted),
+            Err(_) => continue,
+        };
+        remedy.attempts.push(Attempt { case, status: row.status, error: row.errors.u.linf });
+        if remedy.found().is_some() {
+            break;
+        }
+    }
+    Ok(remedy)
+}
+
+/// Whether a case is little work. A shorter step than that of the case that stopped may take more than it.
+fn is_cheap(exact: &AnySolution<f64>, arithmetic: Arithmetic<'_>, case: &Case) -> bool {
+    plan(exact, arithmetic, case)
+        .is_ok_and(|plan| plan.particles * plan.steps as f64 <= 8.0 * MOST_WORK)
+}
+
+/// The largest number of cells, at most that of the case, on which it is little work.
+fn affordable(exact: &AnySolution<f64>, arithmetic: Arithmetic<'_>, case: &Case) -> usize {
+    let mut cells = case.cells;
+    loop {
+        let work = plan(exact, arithmetic, &Case { cells, ..*case })
+            .map(|plan| plan.particles * plan.steps as f64);
+        match work {
+            Ok(work) if work > MOST_WORK && cells > 4 => cells = (cells / 2).max(4),
+            // A count that fits the body, below one that does not.
+            Err(_) if cells > 1 => cells -= 1,
+            _ => return cells,
+        }
+    }
+}
+
+/// The settings to try, in order.
+fn candidates(exact: &AnySolution<f64>, stopped: &Case) -> Vec<Case> {
+    let mut all = Vec::new();
+    let shortened = with_stable_step(exact, *stopped);
+    all.extend(shortened);
+    if let Scheme::Updated(updated) = &stopped.scheme {
+        let base = shortened.unwrap_or(*stopped);
+        let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
+        all.extend(updated_candidates(exact, updated).into_iter().map(scheme));
+    } else {
+        let usual = Case { scheme: Scheme::Updated(Updated::default()), per_cell: 2, ..*stopped };
+        let base = with_usual_step(exact, usual).unwrap_or(usual);
+        let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
+        all.push(base);
+        all.extend(updated_candidates(exact, &Updated::default()).into_iter().map(scheme));
+    }
+    all.extend(total_candidate(exact, stopped));
+    if shortened.is_none() {
+        // Says whether the step has anything to do with it.
+        all.push(Case { cfl: 0.25 * stopped.cfl, ..*stopped });
+    }
+    all
+}
+
+/// Schemes of the updated formulation, from those that change little.
+fn updated_candidates(exact: &AnySolution<f64>, own: &Updated) -> Vec<Updated> {
+    let apic = Transfer::Apic;
+    let lattice = Placement::Lattice { offset: 0.0 };
+    let clipped = Placement::Clipped { offset: 0.0, pose: GridPose::default() };
+    let cpdi2 = |placement, transfer| Updated { shape: Shape::Cpdi2, placement, transfer, ..*own };
+    let mut all = vec![Updated { transfer: apic, ..*own }];
+    if matches!(own.placement, Placement::Lattice { .. }) {
+        all.extend([cpdi2(lattice, own.transfer), cpdi2(lattice, apic)]);
+    }
+    if matches!(exact, AnySolution::Two(s) if matches!(s.domain(), Domain::Annulus { .. })) {
+        all.push(cpdi2(Placement::BodyFitted, apic));
+    }
+    if !matches!(exact, AnySolution::One(_)) {
+        all.push(cpdi2(clipped, apic));
+        let (shape, transfer) = (Shape::Bspline2, Transfer::Xpic(2));
+        all.push(Updated { shape, transfer, placement: clipped, ..*own });
+    }
+    all
+}
+
+/// The total formulation with cubic splines, as it is chosen for a solution.
+fn total_candidate(exact: &AnySolution<f64>, stopped: &Case) -> Option<Case> {
+    let layout = Total::layout_for(exact);
+    let coordinates = Total::coordinates_for(exact);
+    let total = Total { layout, coordinates, ..Total::of_degree(3) };
+    let per_cell = match layout {
+        mmsmith_mpm::total_lagrangian::Layout::Gauss => total.degree + 1,
+        mmsmith_mpm::total_lagrangian::Layout::Lattice => 2,
+    };
+    let cfl_speed = CflSpeed::PWave;
+    let cfl = total.usual_cfl(exact, cfl_speed).ok()?;
+    Some(Case { scheme: Scheme::Total(total), per_cell, cfl, cfl_speed, ..*stopped })
+}
+
+/// The case with the step that a run has which is given none.
+fn with_usual_step(exact: &AnySolution<f64>, case: Case) -> Option<Case> {
+    let usual = usual_step(exact, &case.scheme, case.periods, None).ok()?;
+    Some(Case { cfl: usual.cfl, cfl_speed: usual.speed, ..case })
+}
+
+/// The case with a step that the fastest waves of the motion allow, where its own is longer.
+fn with_stable_step(exact: &AnySolution<f64>, case: Case) -> Option<Case> {
+    let stable = |speed| stable_cfl(exact, &case.scheme, case.periods, speed).ok();
+    let is_long = case.cfl > 1.01 * stable(case.cfl_speed)?;
+    let cfl_speed = CflSpeed::PWave;
+    let cfl = stable(cfl_speed)?;
+    is_long.then_some(Case { cfl, cfl_speed, ..case })
+}

@@ -1,0 +1,225 @@
+//! The time step of a run that is given none, and what steps are on the fastest waves of a motion.
+
+use mmsmith_mpm::Law;
+use mmsmith_runtime::{AnySolution, Solution};
+use nalgebra::{SMatrix, SVector};
+
+use crate::case::{Case, CflSpeed, law};
+use crate::dimension::in_dimension;
+use crate::error::CaseError;
+use crate::points;
+use crate::precision::Precision;
+use crate::run::Row;
+use crate::scheme::Scheme;
+
+/// The CFL number of runs that are given none: that of the original study, on bar waves.
+pub const USUAL_CFL: f64 = 0.4;
+
+/// The largest CFL number on the fastest P-waves of a motion that a run has without being asked for it.
+///
+/// The updated formulation is stable up to 0.83 and more with all weights but linear ones (`mms stability` over shapes in the plane and in
+/// space, on a lattice and clipped, for `nu = 0.47`); the rest is room for what samples of the motion do not see.
+pub const LARGEST_USUAL_CFL: f64 = 0.6;
+
+/// The CFL number of a run that is given none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UsualStep {
+    /// The number.
+    pub cfl: f64,
+    /// The speed that it refers to.
+    pub speed: CflSpeed,
+    /// The number that 0.4 would have been on the fastest P-waves, where it is less for that.
+    pub too_long: Option<f64>,
+}
+
+/// The CFL number of a run by `scheme` until so many periods that is given none, and at most the speed that it refers to: [`USUAL_CFL`], and where
+/// that is more than [`LARGEST_USUAL_CFL`] on the fastest P-waves of the motion, a number with which the scheme is stable.
+///
+/// # Errors
+///
+/// [`CaseError`] for a material that the solver has no law for.
+pub fn usual_step(
+    exact: &AnySolution<f64>,
+    scheme: &Scheme,
+    periods: f64,
+    said: Option<CflSpeed>,
+) -> Result<UsualStep, CaseError> {
+    let speed = said.unwrap_or(CflSpeed::Bar);
+    let on_fastest = USUAL_CFL
+        * in_dimension!(
+            exact,
+            |s| fastest_p_wave(s, periods)? / speed.of(s)?,
+            else return Err(CaseError::Dimension)
+        );
+    if on_fastest <= LARGEST_USUAL_CFL || !on_fastest.is_finite() {
+        return Ok(UsualStep { cfl: USUAL_CFL, speed, too_long: None });
+    }
+    let speed = said.unwrap_or(CflSpeed::PWave);
+    let cfl = stable_cfl(exact, scheme, periods, speed)?;
+    Ok(UsualStep { cfl, speed, too_long: Some(on_fastest) })
+}
+
+/// A CFL number with which a scheme is stable until so many periods: [`LARGEST_USUAL_CFL`] on the fastest P-waves of the motion, and
+/// with splines of the total Lagrangian formulation what suits their degree.
+///
+/// # Errors
+///
+/// [`CaseError`] for a material that the solver has no law for.
+pub(crate) fn stable_cfl(
+    exact: &AnySolution<f64>,
+    scheme: &Scheme,
+    periods: f64,
+    speed: CflSpeed,
+) -> Result<f64, CaseError> {
+    match scheme {
+        Scheme::Total(total) => total.usual_cfl(exact, speed),
+        Scheme::Updated(_) => in_dimension!(
+            exact,
+            |s| Ok(two_digits(LARGEST_USUAL_CFL * speed.of(s)? / fastest_p_wave(s, periods)?)),
+            else Err(CaseError::Dimension)
+        ),
+    }
+}
+
+/// A time step as CFL numbers on P-waves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnPWaves {
+    /// Of the undeformed solid.
+    pub at_rest: f64,
+    /// The fastest of the motion.
+    pub fastest: f64,
+}
+
+/// The time step of a row on P-waves.
+///
+/// # Errors
+///
+/// [`CaseError`] for a material that the solver has no law for.
+pub fn on_p_waves(exact: &AnySolution<f64>, case: &Case, row: &Row) -> Result<OnPWaves, CaseError> {
+    in_dimension!(
+        exact,
+        |s| {
+            let cfl = |speed: f64| row.dt * speed / row.h;
+            let fastest = fastest_p_wave(s, case.periods)?;
+            Ok(OnPWaves { at_rest: cfl(CflSpeed::PWave.of(s)?), fastest: cfl(fastest) })
+        },
+        else Err(CaseError::Dimension)
+    )
+}
+
+/// The speed of the fastest waves along the axes in the deformed body, at sampled places and times of the exact motion and at rest.
+pub(crate) fn fastest_p_wave<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    periods: f64,
+) -> Result<f64, CaseError>
+where
+    f64: Precision<D>,
+{
+    const SAMPLES: usize = 256;
+    let law = law::<f64, D>(exact.law())?;
+    let at_rest = CflSpeed::PWave.of(exact)?;
+    // Periodic motion repeats.
+    let span = exact.period() * periods.min(1.0);
+    let modulus = (0..SAMPLES)
+        .filter_map(|n| points::interior(&exact.domain(), span, n))
+        .map(|(X, t)| largest_modulus(&law, &exact.deformation_gradient(&X, t)))
+        .fold(0.0, f64::max);
+    Ok(at_rest.max((modulus / exact.density()).sqrt()))
+}
+
+/// The largest eigenvalue of the acoustic tensors `A` of waves along the axes in a body deformed by `F`, per volume at rest: the speed of
+/// a wave is the root of its quotient by the reference density. Zero where the law has no finite stress.
+fn largest_modulus<const D: usize>(law: &Law<f64, D>, F: &SMatrix<f64, D, D>) -> f64
+where
+    f64: Precision<D>,
+{
+    let along = |axis: usize| -> Option<f64> {
+        let normal = F.row(axis).transpose();
+        let step = 1e-6 / normal.norm().max(1.0);
+        let mut tensor = SMatrix::<f64, D, D>::zeros();
+        for j in 0..D {
+            let mut change = SMatrix::<f64, D, D>::zeros();
+            change.set_row(j, &(normal.transpose() * step));
+            let stresses = [F + change, F - change].map(|F| law.first_piola_kirchhoff(&F));
+            let [Some(above), Some(below)] = stresses else { return None };
+            tensor.set_column(j, &((above - below) * normal / (2.0 * step)));
+        }
+        Some(largest_eigenvalue(&tensor))
+    };
+    (0..D).filter_map(along).filter(|modulus| modulus.is_finite()).fold(0.0, f64::max)
+}
+
+/// The largest eigenvalue of a symmetric tensor of positive ones, by powers.
+fn largest_eigenvalue<const D: usize>(tensor: &SMatrix<f64, D, D>) -> f64 {
+    // No axis of symmetry lies across it.
+    let mut direction = SVector::<f64, D>::from_fn(|i, _| 1.0 + 0.3 * i as f64).normalize();
+    for _ in 0..24 {
+        let next = tensor * direction;
+        match next.try_normalize(f64::MIN_POSITIVE) {
+            Some(next) => direction = next,
+            None => return 0.0,
+        }
+    }
+    direction.dot(&(tensor * direction))
+}
+
+/// A positive number rounded down to two digits.
+pub(crate) fn two_digits(value: f64) -> f64 {
+    if !value.is_normal() {
+        return value;
+    }
+    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
+    // What is less than a whole number by rounding alone stays.
+    let rounded = (value / unit + 1e-9).floor();
+    // A quotient prints shorter than a product where the unit has no exact form.
+    if unit < 1.0 { rounded / (1.0 / unit).round() } else { rounded * unit }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scheme::Updated;
+
+    fn usual(name: &str, given: &[(&str, f64)]) -> UsualStep {
+        let exact = mmsmith_solutions::build::<f64>(name, given).unwrap().unwrap();
+        usual_step(&exact, &Scheme::Updated(Updated::default()), 1.0, None).unwrap()
+    }
+
+    /// The stiffer the solid is against bars of it, the less of the usual step is left; where that is stable it stays.
+    #[test]
+    fn the_usual_step_follows_the_fastest_waves() {
+        for (name, given) in [
+            ("axis-aligned", &[][..]),
+            ("axis-aligned-1d", &[]),
+            ("axis-aligned-3d", &[]),
+            ("ring", &[]),
+            ("ring-nu", &[]),
+        ] {
+            let found = usual(name, given);
+            assert_eq!(
+                found,
+                UsualStep { cfl: 0.4, speed: CflSpeed::Bar, too_long: None },
+                "{name}"
+            );
+        }
+        for (nu, least, most) in [(0.47, 0.9, 1.4), (0.499, 5.0, 9.0), (-0.95, 1.3, 2.5)] {
+            let found = usual("axis-aligned", &[("nu", nu)]);
+            let too_long = found.too_long.unwrap();
+            assert!((least..most).contains(&too_long), "{nu}: {found:?}");
+            assert!(found.cfl <= 0.6 && found.speed == CflSpeed::PWave, "{nu}: {found:?}");
+        }
+        // A motion that compresses strongly is stiffer than the solid at rest.
+        let [mild, strong] =
+            [0.01, 0.28].map(|A| usual("axis-aligned", &[("nu", 0.48), ("A", A)]).cfl);
+        assert!(strong < 0.8 * mild, "{strong} {mild}");
+    }
+
+    #[test]
+    fn waves_of_a_solid_at_rest_have_the_p_wave_modulus() {
+        let exact = mmsmith_solutions::build::<f64>("axis-aligned-3d", &[]).unwrap().unwrap();
+        let AnySolution::Three(exact) = exact else { panic!("it is solid") };
+        let law = law::<f64, 3>(exact.law()).unwrap();
+        let modulus = largest_modulus(&law, &SMatrix::identity());
+        assert!((modulus / law.p_wave_modulus() - 1.0).abs() < 1e-6, "{modulus}");
+    }
+}
