@@ -47,7 +47,7 @@ pub(crate) struct SchemeOptions {
     /// Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order)
     #[arg(long, value_name = "NAME", default_value_t = verify::Transfer::Flip, value_parser = str::parse::<verify::Transfer>)]
     pub(crate) transfer: verify::Transfer,
-    /// First velocity of the integrator cd; other integrators and the total Lagrangian formulation have halved alone
+    /// First velocity of the integrator cd in the updated Lagrangian formulation; refused elsewhere
     #[arg(long, value_enum, default_value_t = Start::Halved)]
     pub(crate) start: Start,
     /// Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1

@@ -60,7 +60,9 @@ impl Advice {
             let is_long = fastest > 1.01 * LARGEST_USUAL_CFL;
             let [at_rest, fastest] = [at_rest, fastest].map(|cfl| number::rounded(cfl, 2));
             let judged = match is_long {
-                true => format!("steps are safe up to {LARGEST_USUAL_CFL} there; --cfl and --cfl-speed p-wave set them"),
+                true => format!(
+                    "steps are safe up to {LARGEST_USUAL_CFL} there; --cfl and --cfl-speed p-wave set them"
+                ),
                 false => "the waves allow such a step".into(),
             };
             text += &format!(
