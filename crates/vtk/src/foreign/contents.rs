@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::cells::CellEntries;
 use super::numbers::{Base64, ByteOrder, Kind, MOST_NUMBERS, Number, Packing, decode, parse};
 
 /// What a file holds, as places in its bytes.
@@ -21,6 +22,7 @@ pub(super) struct Piece {
     pub(super) particles: usize,
     pub(super) points: Entry,
     pub(super) arrays: Vec<Entry>,
+    pub(super) cells: CellEntries,
 }
 
 /// The data behind all XML elements.

@@ -1,5 +1,6 @@
 //! The arrays of legacy `.vtk` files, in text or binary.
 
+use super::cells::CellEntries;
 use super::contents::{Contents, Entry, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
@@ -22,6 +23,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
     let mut fields = vec![];
     let mut points: Option<(usize, Entry)> = None;
     let mut arrays = vec![];
+    let mut cells = CellEntries::default();
     // The tuples of the arrays that come next, and whether they belong to points.
     let mut section: Option<(usize, bool)> = None;
     while let Some(keyword) = scan.keyword()? {
@@ -47,8 +49,10 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             }
             ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", _) => {
                 let (first, second) = (scan.count(&keyword)?, scan.count(&keyword)?);
+                let is_mesh = keyword == "CELLS";
                 if major < 5 {
-                    scan.array(&keyword, Kind::I32, 1, second)?;
+                    let nodes = scan.array(&keyword, Kind::I32, 1, second)?;
+                    cells.nodes = is_mesh.then_some(nodes);
                 } else {
                     for (part, count) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
                         let found = scan.word()?;
@@ -56,13 +60,17 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                             return Err(format!("{keyword}: {found:?} where {part} should be"));
                         }
                         let kind = scan.kind(part)?;
-                        scan.array(part, kind, 1, count)?;
+                        let found = scan.array(part, kind, 1, count)?;
+                        match part {
+                            "OFFSETS" => cells.ends = is_mesh.then_some(found),
+                            _ => cells.nodes = is_mesh.then_some(found),
+                        }
                     }
                 }
             }
             ("CELL_TYPES", _) => {
                 let count = scan.count("CELL_TYPES")?;
-                scan.array("CELL_TYPES", Kind::I32, 1, count)?;
+                cells.types = Some(scan.array("CELL_TYPES", Kind::I32, 1, count)?);
             }
             ("METADATA", _) => scan.skip_paragraph(),
             ("POINT_DATA", _) => section = Some((scan.count("POINT_DATA")?, true)),
@@ -110,7 +118,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
         packing: Packing::plain(ByteOrder::Big),
         appended: None,
         fields,
-        pieces: vec![Piece { particles, points, arrays }],
+        pieces: vec![Piece { particles, points, arrays, cells }],
     })
 }
 

@@ -7,6 +7,7 @@
 //! Nothing is allocated on the word of a file: sizes that a file declares are held against each other and against what
 //! is there before the numbers are decoded. Files beyond [`LARGEST_FILE`] are refused unread.
 
+mod cells;
 mod contents;
 mod legacy;
 mod numbers;
@@ -19,6 +20,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use thiserror::Error;
+
+pub use cells::Cells;
 
 use crate::Provenance;
 use contents::{Contents, Entry};
@@ -399,6 +402,18 @@ impl Snapshot {
             }
             Data::Table { .. } => Ok(self.floats(table::POINTS)?.unwrap_or_default()),
         }
+    }
+
+    /// The cells of a mesh; `None` where the file has none, or damaged ones.
+    #[must_use]
+    pub fn cells(&self) -> Option<Cells> {
+        let Data::File { bytes, contents } = &self.data else { return None };
+        let (mut cells, mut first) = (Cells::default(), 0);
+        for piece in &contents.pieces {
+            cells.extend(contents, bytes, &piece.cells, first)?;
+            first += piece.particles;
+        }
+        Some(cells)
     }
 
     /// The numbers of an array, one particle after the other; `None` where there is no such array.

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
+use super::cells::CellEntries;
 use super::contents::{Appended, Contents, Entry, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
@@ -54,7 +55,8 @@ enum Section {
     Field,
     Points,
     PointData,
-    /// Cells and their data, which say nothing about particles.
+    Cells,
+    /// Data of cells, which say nothing about particles.
     Other,
 }
 
@@ -63,6 +65,8 @@ struct Open {
     particles: usize,
     points: Option<Entry>,
     arrays: Vec<Entry>,
+    count: usize,
+    cells: CellEntries,
 }
 
 /// Finds the arrays of a `.vtu` or `.vtp` file.
@@ -99,11 +103,14 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             b"FieldData" if !is_empty => section = Section::Field,
             b"Points" if !is_empty => section = Section::Points,
             b"PointData" if !is_empty => section = Section::PointData,
+            b"Cells" if !is_empty => section = Section::Cells,
             b"Piece" => {
                 let tag = Tag::new(element)?;
                 // vtkio leaves the count out where it is zero.
                 let particles = tag.count("NumberOfPoints")?.unwrap_or(0);
-                piece = Some(Open { particles, points: None, arrays: vec![] });
+                let count = tag.count("NumberOfCells")?.unwrap_or(0);
+                let cells = CellEntries::default();
+                piece = Some(Open { particles, points: None, arrays: vec![], count, cells });
                 if is_empty {
                     close(piece.take(), contents.as_mut())?;
                 }
@@ -125,6 +132,16 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                     }
                     (Section::PointData, Some(piece)) => {
                         piece.arrays.push(entry(&tag, text, piece.particles)?);
+                    }
+                    (Section::Cells, Some(piece)) => {
+                        // Whoever wants no cells is not troubled by damaged ones.
+                        let found = entry(&tag, text, piece.count).ok();
+                        match tag.get("Name") {
+                            Some("types") => piece.cells.types = found,
+                            Some("offsets") => piece.cells.ends = found,
+                            Some("connectivity") => piece.cells.nodes = found,
+                            _ => (),
+                        }
                     }
                     _ => (),
                 }
@@ -194,7 +211,8 @@ fn close(piece: Option<Open>, contents: Option<&mut Contents>) -> Result<(), Str
         return Ok(());
     }
     let points = piece.points.ok_or("a piece has no points")?;
-    contents.pieces.push(Piece { particles: piece.particles, points, arrays: piece.arrays });
+    let Open { particles, arrays, cells, .. } = piece;
+    contents.pieces.push(Piece { particles, points, arrays, cells });
     Ok(())
 }
 
