@@ -86,8 +86,9 @@ pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
 pub use scene::{loaded_instead, needs_total_frame};
 pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{
-    AgainstError, Agreement, Convergence, DifferenceRow, Differences, Input, Judgement, Points,
-    Quantity, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, against,
+    AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Input,
+    Integrated, IntegratedOrders, Judgement, LawRow, LawVerdict, Points, Quantity, Remark,
+    Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, against,
     compare_recordings, score,
 };
 pub use stability::{

@@ -7,11 +7,14 @@
 mod against;
 mod arrays;
 mod differences;
+mod elements;
 mod error;
 mod findings;
 mod found;
 mod frame;
+mod integrated;
 mod judgement;
+mod law;
 mod options;
 mod points;
 mod quantity;
@@ -27,7 +30,9 @@ pub use arrays::Role;
 pub use differences::{DifferenceRow, Differences, compare_recordings};
 pub use error::ScoreError;
 pub use findings::Remark;
+pub use integrated::{Integrated, IntegratedOrders};
 pub use judgement::{Convergence, Judgement};
+pub use law::{Deformation, LawRow, LawVerdict};
 pub use options::{Input, Points, Resolution, ScoreOptions};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
@@ -42,6 +47,7 @@ use serde::Serialize;
 
 use crate::dimension::in_dimension;
 use crate::order::Order;
+use crate::precision::Precision;
 
 /// What all recordings gave.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -50,6 +56,8 @@ pub struct Score {
     pub rows: Vec<ScoreRow>,
     /// The orders with respect to `h`, where there are several rows.
     pub orders: Option<BTreeMap<Quantity, PerNorm<Order>>>,
+    /// The orders of errors integrated over the elements of meshes.
+    pub integrated_orders: Option<IntegratedOrders>,
     /// Whether they converge.
     pub verdict: Judgement,
 }
@@ -75,10 +83,13 @@ fn score_in<const D: usize>(
     exact: &dyn Solution<f64, D>,
     inputs: &[Input],
     options: &ScoreOptions,
-) -> Result<Score, ScoreError> {
+) -> Result<Score, ScoreError>
+where
+    f64: Precision<D>,
+{
     let decision = decide(exact, inputs, options)?;
     let row = |(input, taken)| recording(exact, input, options, taken);
-    let rows = inputs.iter().zip(&decision.taken).map(row).collect::<Result<Vec<_>, _>>()?;
+    let mut rows = inputs.iter().zip(&decision.taken).map(row).collect::<Result<Vec<_>, _>>()?;
     let errors = rows.iter().map(|row| (row.h, row.is_whole().then_some(&row.errors)));
     let orders = orders(&errors.collect::<Vec<_>>());
     let mut verdict = Judgement::of(&rows, options);
@@ -88,7 +99,30 @@ fn score_in<const D: usize>(
             verdict.doubt("it depends on whether points are reference or current positions; --points tells it");
         }
     }
-    Ok(Score { rows, orders, verdict })
+    conclude(&mut rows, &verdict);
+    let of_meshes = rows.iter().map(|row| (row.h, row.integrated.filter(|_| row.is_whole())));
+    let integrated_orders = IntegratedOrders::of(&of_meshes.collect::<Vec<_>>());
+    Ok(Score { rows, orders, integrated_orders, verdict })
+}
+
+/// Says of each field that is another one whether the motion has it too.
+fn conclude(rows: &mut [ScoreRow], verdict: &Judgement) {
+    if verdict.kind == Convergence::CannotTell {
+        return;
+    }
+    let of_motion = match verdict.not_converging.contains(&Quantity::Displacement) {
+        true => "u does not converge: the solver's forces are of it",
+        false => "u converges: it is written so, the motion is not of it",
+    };
+    for row in rows {
+        let other = row.law.iter().filter(|law| law.verdict == LawVerdict::Another);
+        let others: Vec<_> = other.filter_map(|law| law.hypothesis).collect();
+        let is_told =
+            |kind: &str| kind.strip_prefix("law-").is_some_and(|name| others.contains(&name));
+        for finding in row.findings.iter_mut().filter(|finding| is_told(finding.kind)) {
+            finding.message += &format!("; {of_motion}");
+        }
+    }
 }
 
 /// The errors of a recording, by quantity and norm.

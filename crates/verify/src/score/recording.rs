@@ -15,6 +15,8 @@ use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
 use super::found::Found;
 use super::frame::{FrameErrors, FrameReader, Identities};
+use super::integrated::{Integrated, Mesh};
+use super::law::{self, Witnesses};
 use super::options::{Input, Resolution, ScoreOptions};
 use super::points::Taken;
 use super::quantity::Quantity;
@@ -22,6 +24,7 @@ use super::reference::{Scheme, scheme};
 use super::row::{EXCEEDS_MOTION, ScoreRow, Source};
 use super::scales::{Grain, Scales};
 use super::times::{TIME_SLACK, any_velocity_time, open};
+use crate::precision::Precision;
 
 /// A recording, and how its frames are read.
 pub(super) struct Opened<const D: usize> {
@@ -142,6 +145,7 @@ struct Totals {
     density_from_rest: PerNorm<f64>,
     displacement: PerNorm<f64>,
     scales: Scales,
+    integrated: Option<Integrated>,
     /// The frames that have each field.
     compared: [usize; 8],
     h: f64,
@@ -154,11 +158,15 @@ impl Totals {
         exact: &dyn Solution<f64, D>,
         resolution: Resolution,
         reader: &mut FrameReader<'_, D>,
+        witnesses: &mut Witnesses<D>,
     ) -> Result<Self, ScoreError> {
         let mut totals = Self { h: f64::NAN, ..Self::default() };
+        let mut mesh = None;
         for (index, frame) in opened.found.timed.iter().enumerate() {
-            let data = reader.frame(&open(&frame.file)?, frame.time, index)?;
+            let snapshot = open(&frame.file)?;
+            let data = reader.frame(&snapshot, frame.time, index)?;
             if index == 0 {
+                mesh = Mesh::new(&snapshot, data.X.len(), opened.found.timed.len());
                 totals.h = match resolution {
                     Resolution::Cells(cells) => exact.cell_length() / cells as f64,
                     Resolution::Length(length) => length,
@@ -170,7 +178,12 @@ impl Totals {
             }
             totals.scales.add(exact, &data.X, frame.time);
             totals.add(&data.errors(exact, frame.time));
+            witnesses.add(&data, frame.time);
+            if let Some(mesh) = &mut mesh {
+                mesh.add(exact, index, &data, frame.time);
+            }
         }
+        totals.integrated = mesh.and_then(|mesh| mesh.largest);
         Ok(totals)
     }
 
@@ -273,11 +286,15 @@ pub(super) fn recording<const D: usize>(
     input: &Input,
     options: &ScoreOptions,
     taken: &Taken,
-) -> Result<ScoreRow, ScoreError> {
+) -> Result<ScoreRow, ScoreError>
+where
+    f64: Precision<D>,
+{
     let mut remarks = Remarks::default();
     let opened = Opened::new(exact, input, options, taken, &mut remarks)?;
     let mut reader = opened.reader(exact, options, &mut remarks);
-    let totals = Totals::of(&opened, exact, input.resolution, &mut reader)?;
+    let mut witnesses = Witnesses::new(opened.found.timed.len());
+    let totals = Totals::of(&opened, exact, input.resolution, &mut reader, &mut witnesses)?;
     totals.tell_missing(&opened.found.chosen, opened.found.timed.len(), &mut remarks);
     totals.tell_transposed(&mut remarks);
     opened.tell_provenance(options, &mut remarks);
@@ -286,6 +303,10 @@ pub(super) fn recording<const D: usize>(
     totals.tell_overflow(&mut remarks);
     totals.tell_excess(&mut remarks);
     tell_several(&input.paths, &mut remarks);
+    let chosen = &opened.found.chosen;
+    let rounding =
+        |field: Quantity| chosen.head(field.role()).map_or(0.0, grain_of).max(f64::EPSILON);
+    let law = law::compare(exact, &witnesses, &rounding, &mut remarks);
     if input.resolution == Resolution::Estimated {
         let what = "h is estimated, as the spacing of as many points spread evenly over their bounding box; --cells or \
                     --h tells it";
@@ -311,6 +332,8 @@ pub(super) fn recording<const D: usize>(
         status: status(&findings),
         errors: totals.errors(),
         exact_displacement: totals.displacement.l2,
+        integrated: totals.integrated,
+        law,
         floors: totals.scales.floors(exact, &opened.grain()),
         findings,
     })

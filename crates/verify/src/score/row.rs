@@ -6,6 +6,8 @@ use mmsmith_measure::norms::PerNorm;
 use serde::Serialize;
 
 use super::findings::Remark;
+use super::integrated::Integrated;
+use super::law::LawRow;
 use super::quantity::Quantity;
 
 /// Where reference positions and displacements are from.
@@ -68,6 +70,11 @@ pub struct ScoreRow {
     pub errors: BTreeMap<Quantity, PerNorm<f64>>,
     /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
     pub exact_displacement: f64,
+    /// Of a mesh, the errors of u and its gradient integrated over the elements, the largest over the frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integrated: Option<Integrated>,
+    /// Recorded stresses, J and density against the law at the recorded deformation.
+    pub law: Vec<LawRow>,
     /// For each field the error that rounding alone may cause, of the files' numbers too.
     #[serde(skip)]
     pub floors: BTreeMap<Quantity, f64>,

@@ -63,6 +63,9 @@ pub(super) fn document(selection: &Selection, options: &ScoreOptions, score: &Sc
     if let Some(orders) = &score.orders {
         document["orders"] = json!(orders);
     }
+    if let Some(orders) = &score.integrated_orders {
+        document["integrated_orders"] = json!(orders);
+    }
     document["verdict"] = json!(score.verdict);
     document["passed"] = json!(score.verdict.passed);
     document

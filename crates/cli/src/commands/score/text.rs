@@ -62,11 +62,32 @@ pub(super) fn text(selection: &Selection, score: &Score) -> String {
             for (field, table) in &tables {
                 text += &format!("\nerror of {}\n{}", named(*field, units), table.text());
             }
+            text += &integrated(score).unwrap_or_default();
             let has = "A wider terminal and --json have them.";
             text += &table::on_left_out(tables.iter().map(|(_, table)| table), has);
         }
     }
     text
+}
+
+/// The errors integrated over the elements of meshes; nothing where there are none.
+fn integrated(score: &Score) -> Option<String> {
+    let orders = score.integrated_orders.as_ref()?;
+    let mut table = Table::new(0, ["cells", "h", "l2", "rate", "h1", "rate"]);
+    for (index, row) in score.rows.iter().enumerate() {
+        let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
+        let mut line = vec![cells, table::error(row.h)];
+        for (order, of) in [(&orders.l2, 0), (&orders.h1, 1)] {
+            let value = row.integrated.map_or(f64::NAN, |errors| [errors.l2, errors.h1][of]);
+            let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
+            line.extend([table::error(value), table::rate(local)]);
+        }
+        table.row(line);
+    }
+    let fit = |order: &Order| [String::new(), table::rate(order.fit)];
+    let label = ["fit in h".to_owned(), String::new()];
+    table.row(label.into_iter().chain(fit(&orders.l2)).chain(fit(&orders.h1)));
+    Some(format!("\nerror of u over the elements, and of its gradient (h1)\n{}", table.text()))
 }
 
 /// A field with the unit of its errors, where it is known.
