@@ -135,7 +135,7 @@ where
         ];
         let of_laws = laws.into_iter().filter(|(kind, _)| !self.has_name(&kind["law-".len()..]));
         let of_laws = of_laws.map(|(kind, material)| (kind, Variant::Law(Law::from(material))));
-        let pressures: [(_, fn(f64) -> f64); 3] = [
+        let pressures: [(_, OfVolume); 3] = [
             ("law-pressure-j-squared", |J| 0.5 * (J * J - 1.0)),
             ("law-pressure-j-times", |J| J * (J - 1.0)),
             ("law-pressure-linear", |J| J - 1.0),
@@ -170,6 +170,9 @@ where
     }
 }
 
+/// The factor of `lambda` in a pressure, from J.
+type OfVolume = fn(f64) -> f64;
+
 /// A law in place of the right one.
 pub(super) enum Variant<const D: usize> {
     Law(Law<f64, D>),
@@ -178,7 +181,7 @@ pub(super) enum Variant<const D: usize> {
     /// `P = mu (F - at_rest F^-T) + lambda of_J(J) F^-T`.
     NeoHookean {
         own: Lame,
-        of_J: fn(f64) -> f64,
+        of_J: OfVolume,
         at_rest: f64,
     },
 }

@@ -12,12 +12,15 @@ use crate::score::quantity::Quantity;
 /// A number that a file may hold in place of the right one: of `J`, `tr H` and the density at rest.
 struct Number {
     hypothesis: Hypothesis,
-    value: fn([f64; 3]) -> f64,
+    value: Value,
 }
 
-const fn number(kind: &'static str, words: &'static str, value: fn([f64; 3]) -> f64) -> Number {
+const fn number(kind: &'static str, words: &'static str, value: Value) -> Number {
     Number { hypothesis: Hypothesis { kind, words }, value }
 }
+
+/// A number from `J`, `tr H` and the density at rest.
+type Value = fn([f64; 3]) -> f64;
 
 /// What may stand for `J`.
 const VOLUME_RATIOS: &[Number] = &[
@@ -44,7 +47,7 @@ pub(super) fn rows<const D: usize>(
     rounding: Rounding<'_>,
     remarks: &mut Remarks,
 ) -> Vec<LawRow> {
-    let fields: [(_, _, fn([f64; 3]) -> f64, _); 2] = [
+    let fields: [(_, _, Value, _); 2] = [
         (Quantity::VolumeRatio, "det F", |[J, ..]| J, VOLUME_RATIOS),
         (Quantity::Density, "rho0/det F", |[J, _, density]| density / J, DENSITIES),
     ];
@@ -61,7 +64,7 @@ pub(super) fn rows<const D: usize>(
         if recorded.is_empty() {
             continue;
         }
-        let error = |value: fn([f64; 3]) -> f64| {
+        let error = |value: Value| {
             let mut sums = Sums::default();
             for (recorded, at) in &recorded {
                 let expected = value(*at);
