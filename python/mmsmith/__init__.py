@@ -1,36 +1,49 @@
 """Manufactured solutions for large-deformation solid mechanics.
 
-`load` gives the exact fields of a solution at arrays of points. `run`, `converge`, `stability`, `tradeoff` and `score` do what the
-commands of `mms` do. `orders` and `assert_order` judge a solver of your own, `audit` judges the test that judges it, and
-`diagnose` finds the mistake in a solver whose errors do not fall.
+`load` gives the exact fields of a solution at arrays of points. `run`, `converge`, `stability`, `tradeoff`, `score`, `check` and
+`explain` do what the commands of `mms` do. `orders` and `assert_order` judge a solver of your own, `audit` judges the test that judges it,
+and `diagnose` finds the mistake in a solver whose errors do not fall.
 """
 
 from mmsmith import _mmsmith
 from mmsmith._audit import Audit, audit
+from mmsmith._commands import check, converge, explain, run, score, stability, tradeoff
 from mmsmith._diagnose import Cause, Diagnosis, causes, diagnose
+from mmsmith._invoke import command
 from mmsmith._mmsmith import Error, NoEffect, __version__
-from mmsmith._orders import Orders, assert_order, measure, orders
-from mmsmith._solution import Annulus, Box, Points, Solution, load
-from mmsmith._studies import command, converge, run, score, stability, tradeoff
+from mmsmith._orders import NotPassed, Orders, assert_order, measure, orders
+from mmsmith._results import Check, Convergence, Result, Run, Score, Stability, Tradeoff
+from mmsmith._solution import Annulus, Box, Constant, Points, Solution, load
 
 __all__ = [
     "Annulus",
     "Audit",
     "Box",
     "Cause",
+    "Check",
+    "Constant",
+    "Convergence",
     "Diagnosis",
     "Error",
     "NoEffect",
+    "NotPassed",
     "Orders",
     "Points",
+    "Result",
+    "Run",
+    "Score",
     "Solution",
+    "Stability",
+    "Tradeoff",
     "__version__",
     "assert_order",
     "audit",
     "causes",
+    "check",
     "command",
     "converge",
     "diagnose",
+    "explain",
     "faults",
     "load",
     "measure",

@@ -35,10 +35,12 @@ FAULTS = (
 
 def check_order(solver: Solver, solution: Solution, cells: Sequence[int], tolerance: float, norm: str, expected: Mapping[str, float]) -> None:
     """The test that the pytest fixture and `audit` run: a solver's orders on several grids."""
+    __tracebackhide__ = True
     results = [solver(solution, count) for count in cells]
     errors = [measure(solution, result, norm) if "X" in result else result for result in results]
     by_field = {field: [row[field] for row in errors] for field in errors[0]}
-    require(orders([solution.cell_length / count for count in cells], by_field), expected, tolerance)
+    about = f"{solution.name} on {', '.join(map(str, cells))} cells"
+    require(orders([solution.cell_length / count for count in cells], by_field), expected, tolerance, about)
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
 from mmsmith import _mmsmith
-from mmsmith._solution import Points, Solution
+from mmsmith._solution import Constant, Points, Solution, time_of
 
 Array = NDArray[numpy.float64]
 
@@ -50,9 +51,12 @@ class Handed(Solution):
         self.calls: list[tuple[str, float]] = []
 
     @property
-    def period(self) -> float:
+    def period(self) -> Constant:
         """The time in which the motion repeats, or a part of it."""
-        return self._fields.period * self._share
+        return Constant(self._fields.period * self._share)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError("this solution cannot be sent to other processes: what the solver asks it for is seen in this one alone")
 
     def ask(self, letter: str, X: Array, t: float) -> Array:
         """The field that the solver is given."""
@@ -68,12 +72,12 @@ class Handed(Solution):
         kind, _, surface = letter.partition(":")
         return self._changed.traction(surface, X, t) if surface else Solution._field(self._changed, kind, X, t, None)
 
-    def _field(self, letter: str, X: ArrayLike, t: float, out: Array | None) -> Array:
-        return _into(out, self.ask(letter, self._positions(X), float(t)))
+    def _field(self, letter: str, X: ArrayLike, t: float | ArrayLike, out: Array | None) -> Array:
+        return _into(out, self.ask(letter, self._positions(X), time_of(t)))
 
-    def traction(self, surface: str, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def traction(self, surface: str, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Traction P N at points of a surface, force per reference area."""
-        return _into(out, self.ask(f"traction:{surface}", self._positions(X), float(t)))
+        return _into(out, self.ask(f"traction:{surface}", self._positions(X), time_of(t)))
 
     def points(self, X: ArrayLike) -> Points:
         """The solution at points that stay."""
@@ -82,7 +86,7 @@ class Handed(Solution):
 
 class _HandedPoints(Points):
     def __init__(self, handed: Handed, X: Array) -> None:
-        super().__init__(handed._fields.at(X), *X.shape)
+        super().__init__(handed._fields.at(X.reshape(-1, handed.dimension)), X.shape, handed.density)
         self._handed = handed
         self._X = X
 

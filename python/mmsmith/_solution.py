@@ -1,16 +1,24 @@
 """Exact fields at arrays of points."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
-from mmsmith import _mmsmith
-from mmsmith._studies import command
+from mmsmith import _commands, _mmsmith
 
 Array = NDArray[numpy.float64]
+
+
+class Constant(float):
+    """A number that may be called for itself, since it is a method in the modules that `mms gen` writes: `s.density()`."""
+
+    def __call__(self) -> float:
+        """The number."""
+        return float(self)
 
 
 @dataclass(frozen=True)
@@ -29,12 +37,19 @@ class Annulus:
     outer: float
 
 
+Shape = TypeVar("Shape", Box, Annulus)
+
+
 class Solution:
     """A manufactured solution, its parameters fixed.
 
-    Positions `X` are reference positions, an array of shape (n, dimension); `t` is a time. The fields of n points are arrays of
-    shape (n, dimension) for u, v, a and b, (n, dimension, dimension) for H, F and P, and (n,) for J. Units are those of the
-    specification. `out` takes the values where it is given: an array of float64, C-contiguous, of the shape of the result.
+    Positions `X` are reference positions, an array of shape (n, dimension), or of any shape whose last axis has the coordinates; `t` is
+    a time, or an array with a time for each point. The fields of n points are arrays of shape (n, dimension) for u, v, a and b,
+    (n, dimension, dimension) for H, F and P, and (n,) for J. Units are those of the specification. `out` takes the values where it is
+    given: an array of float64, C-contiguous, of the shape of the result.
+
+    The NumPy module that `mms gen` writes has the same names, constants as methods: `s.density()` works with both. The constants of the
+    law and the tractions have names of their own too, as there: `s.mu()`, `s.X_upper_traction(X, t)`.
     """
 
     def __init__(self, fields: _mmsmith.Fields, source: str, given: dict[str, float]) -> None:
@@ -42,49 +57,63 @@ class Solution:
         self._source = source
         self._given = given
 
-    def u(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def u(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Displacement, a length."""
         return self._field("u", X, t, out)
 
-    def v(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def v(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Velocity."""
         return self._field("v", X, t, out)
 
-    def a(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def a(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Acceleration."""
         return self._field("a", X, t, out)
 
-    def b(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def b(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Body force per unit mass: rho0 a = Div P + rho0 b."""
         return self._field("b", X, t, out)
 
-    def H(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def H(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Displacement gradient, H[p, i, J] = du_i/dX_J."""
         return self._field("H", X, t, out)
 
-    def F(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def F(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Deformation gradient, I + H."""
         return self._field("F", X, t, out)
 
-    def P(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def P(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """First Piola-Kirchhoff stress, P[p, i, J]: force in direction i per reference area with normal J."""
         return self._field("P", X, t, out)
 
-    def J(self, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def J(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """det F."""
         return self._field("J", X, t, out)
 
-    def traction(self, surface: str, X: ArrayLike, t: float, out: Array | None = None) -> Array:
+    def rho0_b(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
+        """Body force per unit reference volume."""
+        return _product(self.density, self.b(X, t, out))
+
+    def static_force(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
+        """-Div P, the force per reference volume that holds the deformation of time t at rest."""
+        return _static(self.density, self.b(X, t, out), self.a(X, t))
+
+    def sigma(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
+        """Cauchy stress, P F^T/J."""
+        return _cauchy(self.P(X, t, out), self.F(X, t), self.J(X, t))
+
+    def S(self, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
+        """Second Piola-Kirchhoff stress, F^-1 P."""
+        return _second(self.P(X, t, out), self.F(X, t))
+
+    def traction(self, surface: str, X: ArrayLike, t: float | ArrayLike, out: Array | None = None) -> Array:
         """Traction P N at points of a surface, force per reference area: `inner`, `outer`, `X-lower`, `Y-upper` and so on."""
         X = self._positions(X)
-        out = _result(out, X.shape, X)
-        self._fields.traction(surface, X, _time(t), out)
-        return out
+        return _evaluated(lambda X, t, out: self._fields.traction(surface, X, t, out), X, t, _result(out, X.shape, X))
 
     def points(self, X: ArrayLike) -> "Points":
         """The solution at points that stay: what depends on these alone is computed once."""
         X = self._positions(X)
-        return Points(self._fields.at(X), *X.shape)
+        return Points(self._fields.at(X.reshape(-1, self.dimension)), X.shape, self.density)
 
     def sample(self, n: int, seed: int = 0) -> Array:
         """Reference positions within the body, of shape (n, dimension), evenly spread; the same for the same seed."""
@@ -108,15 +137,8 @@ class Solution:
         """
         return Solution(self._fields.with_fault(fault), self._source, self._given)
 
-    def check(self, **options: Any) -> dict[str, Any]:
-        """`mms check`: every field compared with the one below it; a dict with `passed`."""
-        return command("check", self, **options)
-
-    def explain(self, **options: Any) -> dict[str, Any]:
-        """`mms explain`: what the solution models and exercises, with the defaults of its parameters."""
-        if self.fault is not None:
-            self._words()
-        return command("explain", self._source, **options)
+    check = _commands.check
+    explain = _commands.explain
 
     @property
     def name(self) -> str:
@@ -163,53 +185,133 @@ class Solution:
         return self._fields.law
 
     @property
+    def lambda_(self) -> Constant:
+        """First Lame constant, of a law that has it."""
+        return self._law_constant("lambda")
+
+    @property
+    def mu(self) -> Constant:
+        """Shear modulus, of a law that has it."""
+        return self._law_constant("mu")
+
+    def lower(self) -> list[float]:
+        """The corner of a box with the smallest coordinates."""
+        return list(self._shape_of(Box).lower)
+
+    def upper(self) -> list[float]:
+        """The corner of a box with the largest coordinates."""
+        return list(self._shape_of(Box).upper)
+
+    def inner(self) -> float:
+        """The inner radius of a ring or a shell."""
+        return self._shape_of(Annulus).inner
+
+    def outer(self) -> float:
+        """The outer radius of a ring or a shell."""
+        return self._shape_of(Annulus).outer
+
+    @property
     def law_name(self) -> str:
         """The constitutive law, by the name that specifications use."""
         return self._fields.law_name
 
     @property
-    def density(self) -> float:
+    def density(self) -> Constant:
         """Mass per reference volume."""
-        return self._fields.density
+        return Constant(self._fields.density)
 
     @property
-    def wave_speed(self) -> float:
+    def wave_speed(self) -> Constant:
         """The speed that CFL numbers refer to."""
-        return self._fields.wave_speed
+        return Constant(self._fields.wave_speed)
 
     @property
-    def period(self) -> float:
+    def period(self) -> Constant:
         """The time in which the motion repeats."""
-        return self._fields.period
+        return Constant(self._fields.period)
 
     @property
-    def cell_length(self) -> float:
+    def cell_length(self) -> Constant:
         """The length that a number of cells divides."""
-        return self._fields.cell_length
+        return Constant(self._fields.cell_length)
 
     def __repr__(self) -> str:
         given = "".join(f", {name}={value!r}" for name, value in self._given.items())
         fault = "" if self.fault is None else f".with_fault({self.fault!r})"
         return f"mmsmith.load({self._source!r}{given}){fault}"
 
-    def _words(self) -> list[str]:
+    def __eq__(self, other: object) -> bool:
+        return self._identity() == other._identity() if isinstance(other, Solution) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._identity())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._source, self._given, self.fault)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._law_names(), *self._tractions()]
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):
+            # Before there are fields nothing can be looked up in them.
+            if name.startswith("_"):
+                raise AttributeError(name)
+            if name in self._law_names():
+                return self._law_constant(name)
+            if name in self._tractions():
+                surface = self._tractions()[name]
+                return lambda X, t, out=None: self.traction(surface, X, t, out)
+            raise AttributeError(f"the solution {self.name} has no '{name}'")
+
+    def _identity(self) -> tuple[Any, ...]:
+        return (self._source, tuple(sorted(self.parameters.items())), self.fault)
+
+    def _law_names(self) -> list[str]:
+        return [name for name in self.law if name != "lambda"]
+
+    def _tractions(self) -> dict[str, str]:
+        """The surfaces by the names that their tractions have in generated code."""
+        domain = self.domain
+        faces = [f"{axis}-{side}" for axis in "XYZ"[: self.dimension] for side in ("lower", "upper")]
+        surfaces = faces if isinstance(domain, Box) else ["inner", "outer", *(face for face in faces if face in self.boundaries)]
+        return {f"{surface.replace('-', '_')}_traction": surface for surface in surfaces}
+
+    def _law_constant(self, name: str) -> Constant:
+        if name not in self.law:
+            raise AttributeError(f"the law of {self.name} has no {name}; it has {', '.join(self.law) or 'no constants'}")
+        return Constant(self.law[name])
+
+    def _shape_of(self, shape: type[Shape]) -> Shape:
+        domain = self.domain
+        if not isinstance(domain, shape):
+            kind = "a box: it has lower() and upper()" if isinstance(domain, Box) else "no box: it has inner() and outer()"
+            raise _mmsmith.Error(f"the body of {self.name} is {kind}")
+        return domain
+
+    def _words(self, command: str) -> list[str]:
         """The words of a command line that mean this solution."""
         if self.fault is not None:
             raise _mmsmith.Error(f"{self!r} is no solution that a command can take: its fields have a fault")
+        if command not in _commands.WITH_SET:
+            # An explanation is of the defaults.
+            if self._given and command != "explain":
+                raise _mmsmith.Error(f"mms {command} takes no values of parameters; give it {self._source!r} in place of {self!r}")
+            return [self._source]
         return [self._source, *(f"--set={name}={value!r}" for name, value in self._given.items())]
 
-    def _field(self, letter: str, X: ArrayLike, t: float, out: Array | None) -> Array:
+    def _field(self, letter: str, X: ArrayLike, t: float | ArrayLike, out: Array | None) -> Array:
         X = self._positions(X)
-        out = _result(out, _shape(letter, *X.shape), X)
-        self._fields.evaluate(letter, X, _time(t), out)
-        return out
+        out = _result(out, _shape(letter, X.shape), X)
+        return _evaluated(lambda X, t, out: self._fields.evaluate(letter, X, t, out), X, t, out)
 
     def _positions(self, X: ArrayLike) -> Array:
         X = numpy.asarray(X)
         if not numpy.can_cast(X.dtype, numpy.float64, "safe"):
             raise TypeError(f"X has the type {X.dtype}; it must be float64, or a type of numbers that float64 holds")
-        if X.ndim != 2 or X.shape[1] != self.dimension:
-            expected = f"(n, {self.dimension}), a row for each point"
+        if X.ndim == 0 or X.shape[-1] != self.dimension:
+            expected = f"(n, {self.dimension}), a row for each point, or (..., {self.dimension})"
             raise ValueError(f"X has the shape {X.shape}; {self.name} has {self.dimension} dimensions: it must be {expected}")
         return numpy.ascontiguousarray(X, dtype=numpy.float64)
 
@@ -220,9 +322,10 @@ class Points:
     The fields have the shapes of `Solution`'s. b equals that of `Solution` but for rounding; the others have the same bits.
     """
 
-    def __init__(self, fields: _mmsmith.FieldsAtPoints, count: int, dimension: int) -> None:
+    def __init__(self, fields: _mmsmith.FieldsAtPoints, shape: tuple[int, ...], density: float) -> None:
         self._fields = fields
-        self._shape = (count, dimension)
+        self._shape = shape
+        self._density = density
 
     def u(self, t: float, out: Array | None = None) -> Array:
         """Displacement, a length."""
@@ -256,12 +359,28 @@ class Points:
         """det F."""
         return self._field("J", t, out)
 
+    def rho0_b(self, t: float, out: Array | None = None) -> Array:
+        """Body force per unit reference volume."""
+        return _product(self._density, self.b(t, out))
+
+    def static_force(self, t: float, out: Array | None = None) -> Array:
+        """-Div P, the force per reference volume that holds the deformation of time t at rest."""
+        return _static(self._density, self.b(t, out), self.a(t))
+
+    def sigma(self, t: float, out: Array | None = None) -> Array:
+        """Cauchy stress, P F^T/J."""
+        return _cauchy(self.P(t, out), self.F(t), self.J(t))
+
+    def S(self, t: float, out: Array | None = None) -> Array:
+        """Second Piola-Kirchhoff stress, F^-1 P."""
+        return _second(self.P(t, out), self.F(t))
+
     def __len__(self) -> int:
         return self._shape[0]
 
     def _field(self, letter: str, t: float, out: Array | None) -> Array:
-        out = _result(out, _shape(letter, *self._shape), None)
-        self._fields.evaluate(letter, _time(t), out)
+        out = _result(out, _shape(letter, self._shape), None)
+        self._fields.evaluate(letter, time_of(t), out)
         return out
 
 
@@ -276,15 +395,63 @@ def load(name: str | os.PathLike[str], /, **parameters: float) -> Solution:
     return Solution(_mmsmith.Fields(source, given), source, given)
 
 
-def _shape(letter: str, count: int, dimension: int) -> tuple[int, ...]:
+def _restored(source: str, given: dict[str, float], fault: str | None) -> Solution:
+    """A solution that was pickled."""
+    solution = load(source, **given)
+    return solution if fault is None else solution.with_fault(fault)
+
+
+def _shape(letter: str, positions: tuple[int, ...]) -> tuple[int, ...]:
     if letter == "J":
-        return (count,)
-    return (count, dimension, dimension) if letter in "HFP" else (count, dimension)
+        return positions[:-1]
+    return (*positions, positions[-1]) if letter in "HFP" else positions
 
 
-def _time(t: float) -> float:
+def _evaluated(evaluate: Callable[[Array, float, Array], None], X: Array, t: float | ArrayLike, out: Array) -> Array:
+    """The values at points in any arrangement, at one time or each at its own."""
+    points = X.reshape(-1, X.shape[-1])
+    if numpy.ndim(t) == 0:
+        evaluate(points, time_of(t), out)
+        return out
     try:
-        return float(t)
+        times = numpy.broadcast_to(numpy.asarray(t, dtype=numpy.float64), X.shape[:-1]).ravel()
+    except ValueError:
+        given = f"t has the shape {numpy.shape(t)}"
+        raise TypeError(f"{given}; it must be one number, or an array with a number for each point, {X.shape[:-1]}") from None
+    values = out.reshape(len(points), -1)
+    for time in numpy.unique(times):
+        chosen = times == time if time == time else numpy.isnan(times)
+        part = numpy.empty((int(chosen.sum()), values.shape[1]))
+        evaluate(numpy.ascontiguousarray(points[chosen]), float(time), part)
+        values[chosen] = part
+    return out
+
+
+def _product(density: float, b: Array) -> Array:
+    b *= density
+    return b
+
+
+def _static(density: float, b: Array, a: Array) -> Array:
+    b -= a
+    b *= density
+    return b
+
+
+def _cauchy(P: Array, F: Array, J: Array) -> Array:
+    P[...] = numpy.einsum("...ik,...jk->...ij", P, F) / J[..., None, None]
+    return P
+
+
+def _second(P: Array, F: Array) -> Array:
+    P[...] = numpy.linalg.solve(F, P)
+    return P
+
+
+def time_of(t: float | ArrayLike) -> float:
+    """The one time that is meant for all points."""
+    try:
+        return float(t)  # type: ignore[arg-type]
     except TypeError:
         raise TypeError(f"t is {t!r}; it must be one number: all points are evaluated at the same time") from None
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import pytest
 
 from mmsmith._audit import Solver, check_order
+from mmsmith._orders import no_errors_of
 from mmsmith._solution import Array, Solution, load
 
 
@@ -53,6 +54,10 @@ def manufactured(request: pytest.FixtureRequest) -> Manufactured:
     orders = dict(mark.kwargs)
     cells = orders.pop("cells", (8, 16, 32))
     tolerance, norm = orders.pop("tolerance", 0.1), orders.pop("norm", "linf")
+    for name, order in orders.items():
+        if not isinstance(order, (int, float)):
+            said = f"@pytest.mark.manufactured(..., {name}={order!r}): {order!r} is no order"
+            pytest.fail(f"{said}; {no_errors_of(name, list('uvFP'))}", pytrace=False)
     (solution,) = mark.args
     if not isinstance(solution, Solution):
         solution = load(solution)

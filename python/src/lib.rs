@@ -3,7 +3,7 @@
 //! Arrays come from the part in Python, which has checked their shapes and types; a wrong one is an exception here too, but
 //! says less.
 
-use mmsmith_cli::Refusal;
+use mmsmith_cli::{Refusal, Watch};
 use mmsmith_codegen::{CAUSES, Cause, Counter, Fault, NoEffect as Unchanged, Steps};
 use mmsmith_interpret::{Arrays, ArraysAtPoints, Quantity, interpret_staged};
 use mmsmith_runtime::{AnySolution, Domain, Law, Solution, Surface};
@@ -353,15 +353,22 @@ const PATIENCE: u32 = 40;
 /// As the main thread of a program has: specifications are trees.
 const STACK: usize = 8 << 20;
 
-/// Does a command and prints nothing; false where a check failed.
+/// Does a command and prints nothing; false where a check failed. Now and then `progress` is called with the share that is done and the
+/// case under way.
 #[pyfunction]
-fn call(py: Python<'_>, words: Vec<OsString>) -> PyResult<bool> {
+fn call(py: Python<'_>, words: Vec<OsString>, progress: Option<Py<PyAny>>) -> PyResult<bool> {
     let (sender, receiver) = mpsc::channel();
+    let watch = Arc::new(Watch::default());
+    let watched = Arc::clone(&watch);
     let work = move || {
         // Nobody waits any more for a command that was left to itself.
-        let _ = sender.send(mmsmith_cli::call(words));
+        let _ = sender.send(mmsmith_cli::call(words, &watched));
     };
     thread::Builder::new().stack_size(STACK).spawn(work)?;
+    let tell = || match (&progress, watch.take()) {
+        (Some(progress), Some(report)) => progress.call1(py, (report.share, report.what)).map(drop),
+        _ => Ok(()),
+    };
     let receiver = Mutex::new(receiver);
     let wait = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK);
     loop {
@@ -372,19 +379,21 @@ fn call(py: Python<'_>, words: Vec<OsString>) -> PyResult<bool> {
                     Refusal::Interrupted => PyKeyboardInterrupt::new_err(()),
                 });
             }
-            Err(RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| {
-                py.detach(|| {
-                    let is_under_way = || matches!(wait(), Err(RecvTimeoutError::Timeout));
-                    for _ in 0..PATIENCE {
-                        // Between two simulations there is none to end.
-                        mmsmith_verify::interrupt();
-                        if !is_under_way() {
-                            break;
+            Err(RecvTimeoutError::Timeout) => {
+                py.check_signals().and_then(|()| tell()).inspect_err(|_| {
+                    py.detach(|| {
+                        let is_under_way = || matches!(wait(), Err(RecvTimeoutError::Timeout));
+                        for _ in 0..PATIENCE {
+                            // Between two simulations there is none to end.
+                            mmsmith_verify::interrupt();
+                            if !is_under_way() {
+                                break;
+                            }
                         }
-                    }
-                    mmsmith_verify::allow();
-                });
-            })?,
+                        mmsmith_verify::allow();
+                    });
+                })?
+            }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err("the command ended without a result"));
             }

@@ -1,6 +1,10 @@
 """Fields at arrays of points: bits, shapes, refusals, threads."""
 
+import importlib.util
+import inspect
 import json
+import multiprocessing
+import pickle
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -119,7 +123,11 @@ def test_not_a_number_stays_where_it_is():
 
 REFUSALS = [
     (lambda ring, X: ring.b(X[:, :1], 0.0), ValueError, r"X has the shape \(9, 1\); ring has 2 dimensions: it must be \(n, 2\)"),
-    (lambda ring, X: ring.b(X[0], 0.0), ValueError, r"shape \(2,\)"),
+    (lambda ring, X: ring.b(3.0, 0.0), ValueError, r"shape \(\)"),
+    (lambda ring, X: ring.b(X, [0.0, 1.0]), TypeError, r"t has the shape \(2,\); it must be one number, or an array .*\(9,\)"),
+    (lambda ring, X: ring.lower(), mmsmith.Error, r"no box: it has inner\(\) and outer\(\)"),
+    (lambda ring, X: ring.dimensoin, AttributeError, "ring has no 'dimensoin'"),
+    (lambda ring, X: mmsmith.load("bar", rho0=2.0).kappa, AttributeError, "bar has no 'kappa'"),
     (lambda ring, X: ring.points(X.T), ValueError, r"shape \(2, 9\)"),
     (lambda ring, X: ring.b(X.astype(complex), 0.0), TypeError, "X has the type complex128"),
     (lambda ring, X: ring.b([["a", "b"]], 0.0), TypeError, "X has the type <U1"),
@@ -176,6 +184,54 @@ def test_threads_share_a_solution():
     with ThreadPoolExecutor(8) as pool:
         together = list(pool.map(lambda t: (ring.b(X, t).tobytes(), at.F(t).tobytes()), times))
     assert together == alone
+
+
+# With laws and bodies of different kinds.
+MODULES = ["ring", "skew-2d", "sphere-shell", *(ROOT / "tests/data/specs/materials" / f"{name}.toml" for name in ("skew-2d-yeoh", "axis-aligned-3d-ogden"))]
+
+
+@pytest.mark.parametrize("name", MODULES, ids=lambda name: Path(name).stem)
+def test_what_is_written_for_the_numpy_module_runs_with_the_package(name, tmp_path):
+    assert mmsmith.command("gen", name, target="numpy", out=tmp_path).passed
+    (path,) = tmp_path.glob("*.py")
+    found = importlib.util.spec_from_file_location("generated", path)
+    generated = importlib.util.module_from_spec(found)
+    found.loader.exec_module(generated)
+    module, package = generated.Solution(), mmsmith.load(name)
+    X = package.sample(12)
+    t = 0.3 * package.period()
+    # The strain energy is no field of the package.
+    public = [name for name in dir(module) if name[0].islower() and name not in ("par", "fixed") or len(name) == 1 and name != "W"]
+    assert {"density", "period", "wave_speed", "cell_length", "rho0_b", "static_force", "sigma", "S"} <= set(public)
+    arrangements = [(X, t), (X.reshape(3, 4, -1), t), (X[0], t), (X, numpy.linspace(0, t, 12))]
+    for name in public:
+        method = getattr(module, name)
+        if len(inspect.signature(method).parameters) == 0:
+            assert numpy.allclose(getattr(package, name)(), method(), rtol=1e-14), name
+            assert name in dir(package)
+            continue
+        for X_given, t_given in arrangements:
+            exact, values = method(X_given, t_given), getattr(package, name)(X_given, t_given)
+            assert values.shape == exact.shape, name
+            assert numpy.allclose(values, exact, rtol=1e-11, atol=1e-11 * abs(exact).max()), name
+    assert package.density == package.density() and isinstance(package.density, float)
+    at = package.points(X)
+    for name in ("rho0_b", "static_force", "sigma", "S"):
+        assert numpy.allclose(getattr(at, name)(t), getattr(package, name)(X, t), rtol=1e-9, atol=1e-9 * abs(getattr(package, name)(X, t)).max())
+
+
+def test_equal_solutions_are_equal_and_can_be_sent_to_other_processes():
+    ring, same = mmsmith.load("ring", A=0.05), mmsmith.load("ring", A=0.05)
+    others = [mmsmith.load("ring"), mmsmith.load("skew-2d"), ring.with_fault("body-force-sign"), "ring"]
+    assert ring == same and hash(ring) == hash(same) and all(ring != other for other in others)
+    assert mmsmith.load("ring", A=mmsmith.load("ring").parameters["A"]) == mmsmith.load("ring")
+    X = ring.sample(20)
+    for solution in (ring, others[2]):
+        sent = pickle.loads(pickle.dumps(solution))
+        assert sent == solution and sent.b(X, 1e-3).tobytes() == solution.b(X, 1e-3).tobytes()
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        (far,) = pool.starmap(ring.b, [(X, 1e-3)])
+    assert far.tobytes() == ring.b(X, 1e-3).tobytes()
 
 
 def test_faults_change_what_they_say():

@@ -66,7 +66,7 @@ pub(crate) use scheme::{
 pub(crate) use score::ScoreOptions;
 pub(crate) use shared::KeepOptions;
 pub(crate) use stability::StabilityOptions;
-pub(crate) use texts::{CompletionsOptions, ManOptions};
+pub(crate) use texts::{CompletionsOptions, ManOptions, ReferenceOptions};
 pub(crate) use tradeoff::{Against, TradeoffOptions};
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
@@ -162,7 +162,7 @@ pub(crate) enum Command {
     Man(ManOptions),
     /// Write the whole command line as Markdown
     #[command(hide = true)]
-    Reference,
+    Reference(ReferenceOptions),
 }
 
 /// Where solutions are found, for the help and the book.

@@ -14,6 +14,7 @@ mod inversion;
 mod list;
 mod picture;
 mod predict;
+mod python;
 mod remedy;
 mod reproduce;
 mod resume;
@@ -51,7 +52,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Precision, word};
 use crate::library::Selection;
-use crate::{memory, number, processes, terminal};
+use crate::{memory, number, processes, progress, terminal};
 use scheme::Settled;
 
 /// A solution in the precisions that a simulation of it needs.
@@ -188,5 +189,5 @@ fn with_threads<R: Send>(
         .num_threads(processes::threads(threads))
         .build()
         .context("--threads: cannot start the threads")?
-        .install(work)
+        .install(progress::watched_as_here(work))
 }

@@ -32,6 +32,7 @@ mod terminal;
 mod units;
 
 use std::ffi::OsString;
+use std::sync::Arc;
 
 use clap::FromArgMatches;
 
@@ -39,6 +40,7 @@ use arguments::{Arguments, Command, color_of, line};
 use interruption::{INTERRUPTED, is_interrupted};
 
 pub use interruption::end_on_signals;
+pub use progress::{Report, Watch};
 
 /// Does what a command line asks for; its first word is the program's name. Gives the exit status.
 ///
@@ -85,19 +87,22 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
 }
 
 /// As [`run`], for programs that call it as a function: nothing is printed from then on, and the process goes on. Results are in
-/// the files that the command line names. True unless a check failed.
+/// the files that the command line names, and how far the work is in `watch`. True unless a check failed.
 ///
 /// # Errors
 ///
 /// [`Refusal`] where [`run`] would end with the status 2 or 130.
-pub fn call(given: impl IntoIterator<Item = OsString>) -> Result<bool, Refusal> {
+pub fn call(
+    given: impl IntoIterator<Item = OsString>,
+    watch: &Arc<Watch>,
+) -> Result<bool, Refusal> {
     terminal::silence();
     let given: Vec<_> = given.into_iter().collect();
     let arguments = read(&given).map_err(|refusal| {
         let text = refusal.render().to_string();
         Refusal::Failed(text.trim_start_matches("error: ").trim_end().to_owned())
     })?;
-    perform(&arguments, &given).map_err(|error| match is_interrupted(&error) {
+    watch.over(|| perform(&arguments, &given)).map_err(|error| match is_interrupted(&error) {
         true => Refusal::Interrupted,
         false => Refusal::Failed(message(&error)),
     })
@@ -160,6 +165,6 @@ fn perform(arguments: &Arguments, given: &[OsString]) -> anyhow::Result<bool> {
         Command::Reproduce(options) => commands::reproduce(options),
         Command::Completions(options) => commands::completions(options),
         Command::Man(options) => commands::man(options),
-        Command::Reference => commands::reference(),
+        Command::Reference(options) => commands::reference(options),
     }
 }

@@ -1,6 +1,6 @@
-//! A progress bar for long work, on standard error, and only where a person sees it.
+//! A progress bar for long work, on standard error, and only where a person sees it; or reports to a program that called for the work.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::io::{IsTerminal, stderr};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -12,6 +12,75 @@ use crate::terminal;
 
 /// The bar counts thousandths, since work is known as a share.
 const LENGTH: u64 = 1000;
+
+/// How far a piece of work is, for the thread that waits for it.
+#[derive(Debug, Default)]
+pub struct Watch {
+    latest: Mutex<Latest>,
+}
+
+/// The last report, and when it was made.
+#[derive(Debug, Default)]
+struct Latest {
+    report: Option<Report>,
+    made: Option<Instant>,
+}
+
+/// How far a piece of work is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The share that is done, from zero to one.
+    pub share: f64,
+    /// The case under way.
+    pub what: String,
+}
+
+/// Between two reports so much time passes: to form them costs more than some steps do.
+const BETWEEN_REPORTS: Duration = Duration::from_millis(100);
+
+thread_local! {
+    /// The watch of the work that this thread does.
+    static WATCH: RefCell<Option<Arc<Watch>>> = const { RefCell::new(None) };
+}
+
+impl Watch {
+    /// The last report, unless it has been taken before.
+    #[must_use]
+    pub fn take(&self) -> Option<Report> {
+        self.latest().report.take()
+    }
+
+    /// Does work whose bars report to this watch.
+    pub(crate) fn over<R>(self: &Arc<Self>, work: impl FnOnce() -> R) -> R {
+        watched(Some(Arc::clone(self)), work)
+    }
+
+    fn is_due(&self) -> bool {
+        self.latest().made.is_none_or(|made| made.elapsed() >= BETWEEN_REPORTS)
+    }
+
+    fn report(&self, share: f64, what: String) {
+        *self.latest() =
+            Latest { report: Some(Report { share, what }), made: Some(Instant::now()) };
+    }
+
+    fn latest(&self) -> std::sync::MutexGuard<'_, Latest> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Work for another thread, watched as that of this thread is.
+pub(crate) fn watched_as_here<R>(work: impl FnOnce() -> R) -> impl FnOnce() -> R {
+    let watch = WATCH.with_borrow(Option::clone);
+    move || watched(watch, work)
+}
+
+fn watched<R>(watch: Option<Arc<Watch>>, work: impl FnOnce() -> R) -> R {
+    let before = WATCH.replace(watch);
+    let result = work();
+    WATCH.replace(before);
+    result
+}
 
 /// A bar that nobody sees unless standard error is a terminal; or, of such a bar, the stretch that a part of the work fills.
 pub(crate) struct Bar {
@@ -36,6 +105,7 @@ pub(crate) fn clear() {
 /// The line on the terminal.
 struct Line {
     bar: ProgressBar,
+    watch: Option<Arc<Watch>>,
     begun: Instant,
     /// The seconds that the work will take, where that is known from the start.
     predicted_s: Option<f64>,
@@ -71,7 +141,8 @@ impl Bar {
         {
             bar.set_style(style.progress_chars("=> "));
         }
-        let line = Line { bar, begun: Instant::now(), predicted_s, first: OnceLock::new() };
+        let watch = WATCH.with_borrow(Option::clone);
+        let line = Line { bar, watch, begun: Instant::now(), predicted_s, first: OnceLock::new() };
         line.bar.set_message(name.to_owned());
         line.bar.set_prefix(in_words(left(Duration::ZERO, predicted_s, 0.0)));
         // What the bar says is complete before it is first drawn.
@@ -90,8 +161,8 @@ impl Bar {
         from + share.clamp(0.0, 1.0) * (to - from)
     }
 
-    /// Whether nobody sees it.
-    pub(crate) fn is_hidden(&self) -> bool {
+    /// Whether no terminal shows it.
+    fn is_hidden(&self) -> bool {
         self.line.bar.is_hidden()
     }
 
@@ -108,11 +179,14 @@ impl Bar {
 
     /// Shows the share of the work that is done, with the message that `what` gives.
     pub(crate) fn show_share(&self, what: impl FnOnce() -> String, share: f64) {
+        let (line, share) = (&self.line, self.at(share));
+        if let Some(watch) = line.watch.as_deref().filter(|watch| watch.is_due()) {
+            return watch.report(share, what());
+        }
         // Formatting a message costs more than some steps do.
         if self.is_hidden() {
             return;
         }
-        let (line, share) = (&self.line, self.at(share));
         let elapsed = line.begun.elapsed();
         let (since, before) = *line.first.get_or_init(|| (elapsed, share));
         let time = match line.predicted_s {
@@ -191,6 +265,23 @@ mod tests {
 
     fn seconds(elapsed_s: u64, predicted_s: Option<f64>, share: f64) -> Option<f64> {
         left(Duration::from_secs(elapsed_s), predicted_s, share).map(|left| left.as_secs_f64())
+    }
+
+    #[test]
+    fn a_watch_is_told_of_the_work_under_it_alone_and_of_each_state_once() {
+        let watch = Arc::new(Watch::default());
+        watch.over(|| {
+            let bar = Bar::new("two parts");
+            bar.part(0.5, 1.0).show_share(|| "the second".into(), 0.5);
+            // Too soon to be worth a message.
+            bar.show_share(|| panic!("no message is formed"), 0.9);
+            let elsewhere = watched_as_here(|| Bar::new("a part").line.watch.is_some());
+            assert!(std::thread::scope(|scope| scope.spawn(elsewhere).join().is_ok_and(|is| is)));
+        });
+        assert_eq!(watch.take(), Some(Report { share: 0.75, what: "the second".into() }));
+        assert_eq!(watch.take(), None);
+        Bar::new("other work").show_share(|| "elsewhere".into(), 0.1);
+        assert_eq!(watch.take(), None);
     }
 
     #[test]

@@ -18,3 +18,10 @@ pub(crate) struct ManOptions {
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
 }
+
+#[derive(Args)]
+pub(crate) struct ReferenceOptions {
+    /// As functions of the Python package
+    #[arg(long)]
+    pub(crate) python: bool,
+}

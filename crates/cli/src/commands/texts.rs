@@ -7,7 +7,8 @@ use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
 use mmsmith_solutions::CATALOGUE;
 
-use crate::arguments::{CompletionsOptions, ManOptions, examples, line};
+use super::python;
+use crate::arguments::{CompletionsOptions, ManOptions, ReferenceOptions, examples, line};
 use crate::json::Output;
 use crate::terminal;
 
@@ -52,10 +53,14 @@ pub(crate) fn man(options: &ManOptions) -> Result<bool> {
     Ok(true)
 }
 
-/// Says the whole command line as Markdown.
-pub(crate) fn reference() -> Result<bool> {
+/// Says the whole command line as Markdown, or as functions of the Python package.
+pub(crate) fn reference(options: &ReferenceOptions) -> Result<bool> {
     let mut whole = line();
     whole.build();
+    if options.python {
+        terminal::print(python::module(&whole).as_bytes())?;
+        return Ok(true);
+    }
     let mut text = String::from("# Commands\n\n");
     text += &described(&whole);
     for command in whole.get_subcommands().filter(|command| is_told(command)) {
