@@ -20,6 +20,12 @@ class Constant(float):
         """The number."""
         return float(self)
 
+    # Type checkers hold a number of another class for unequal to whole numbers otherwise.
+    def __eq__(self, other: object) -> bool:
+        return float(self) == other
+
+    __hash__ = float.__hash__
+
 
 @dataclass(frozen=True)
 class Box:
