@@ -11,7 +11,7 @@ from mmsmith._invoke import Named, Progress, invoke, named
 from mmsmith._results import Check, Convergence, Result, Run, Score, Stability, Tradeoff
 
 #: The commands that write JSON.
-WITH_JSON = frozenset({"list", "check", "explain", "coverage", "eval", "run", "converge", "stability", "tradeoff", "score"})
+WITH_JSON = frozenset({"list", "explain", "coverage", "check", "eval", "run", "converge", "stability", "tradeoff", "score"})
 
 #: The commands that take values of parameters.
 WITH_SET = frozenset({"check", "gen", "eval", "run", "converge", "stability", "tradeoff", "score"})
@@ -28,17 +28,17 @@ def check(
     json: str | os.PathLike[str] | None = None,
     progress: Progress = None,
 ) -> Check:
-    """Compare every field of a solution with the field below it; all solutions when none is named.
+    """Check every field by numerical differentiation: v against du/dt, F against du/dX, b against a - Div P/rho0.
 
     Args:
         solutions: What `load` gave, names, or paths of specifications.
-        points: Number of sample points in the body and on each surface [default: 300], or with thorough of points that are drawn in each
-            class of inputs before the search [default: 300, or 30 with seconds].
-        thorough: Search for the largest rounding error of every field against arbitrary precision instead: among ordinary inputs, tiny
+        points: Number of sample points in the body and on each surface; with thorough of points drawn in each class of inputs before the
+            search. Default: 300; 30 with seconds.
+        thorough: Search for the largest rounding error of every field, by comparison with arbitrary precision: among ordinary inputs, tiny
             amplitudes, late times, at the boundary, near inversion, near and far from the origin.
-        seconds: Search for so long in each solution [default: 128 evaluations for each point drawn].
-        state: Keep the state of each search in this folder, and go on where it was.
-        set: Give a parameter another value than its default.
+        seconds: Time of the search in each solution. Default: 128 evaluations for each point drawn.
+        state: Keep the state of each search in this folder, and continue from the state there.
+        set: Value of a parameter, in place of its default.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
@@ -55,11 +55,11 @@ def explain(
     json: str | os.PathLike[str] | None = None,
     progress: Progress = None,
 ) -> Result:
-    """Tell what a solution models, what it exercises, and what its body force costs.
+    """Describe a solution: its formulas, the terms of the momentum balance that it tests, the cost of a run.
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
-        compare: Run five schemes on 64, 128 and 256 cells for a part of a period too, and tell what they take beside what is predicted.
+        compare: Compare predicted and measured times: five schemes on 64, 128 and 256 cells, for a part of a period.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
@@ -109,9 +109,8 @@ def run(
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
-        cells: Number of cells along the solution's cell length; where nothing is said 32, and 16 for a solid in three dimensions in a total
-            frame that is not given either.
-        shape: Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation.
+        cells: Number of cells along the solution's cell length. Default: 32; 16 in 3D if mms chose the total Lagrangian formulation itself.
+        shape: Shape functions: the weights between particles and grid. Default: gimp; bspline3 in the total Lagrangian formulation.
             `linear`: Hat functions at the particle's point.
             `ugimp`: GIMP weights of fixed size.
             `gimp`: GIMP weights that follow the particle's stretch.
@@ -121,77 +120,75 @@ def run(
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).
             `bspline5`: Quintic splines (total Lagrangian).
-        formulation: Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total Lagrangian,
-            with those of the reference configuration throughout. Where nothing is said the updated one, and the total one for a solution
-            with a condition that only that one models.
+        formulation: Formulation: updated Lagrangian evaluates the shape functions in the current configuration in every step, total
+            Lagrangian once in the reference configuration. Default: updated-lagrangian; total-lagrangian if only this formulation can model
+            a boundary condition of the solution.
             `updated-lagrangian`: Updated Lagrangian: weights anew in each step, from the current configuration.
             `total-lagrangian`: Total Lagrangian: weights once, from the reference configuration.
-        mass: Mass matrix of the total Lagrangian formulation; consistent where nothing is said.
+        mass: Mass matrix of the total Lagrangian formulation. Default: consistent.
             `lumped`: Row sums on the diagonal.
             `consistent`: Integrated over the particles.
-        composition: Order of the symmetric composition of leapfrog in the total Lagrangian formulation; where nothing is said 4, and 6 for
-            splines of degree 4 and 5.
+        composition: Order of time stepping in the total Lagrangian formulation, by a symmetric composition of leapfrog steps. Default: 4; 6
+            for splines of degree 4 and 5.
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
-        layout: Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted and clipped ones in the updated
-            one only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held
-            between sliding walls.
+        layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
+            only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.
             `body-fitted`: Polar cells of equal angle that end at the rims (rings, updated Lagrangian).
             `clipped`: A lattice clipped with the boundary of the body: polygons or polyhedra on shared corners (updated Lagrangian, not on
                 a line).
             `gauss`: Gauss-Legendre points (total Lagrangian).
-        grid: Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total Lagrangian
-            formulation.
+        grid: Coordinates of the background grid. Default: cartesian; in the total Lagrangian formulation polar for rings and spherical for
+            shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
-            total Lagrangian formulation that is not.
-            `bar`: That of waves in a bar, sqrt(E/rho0), unless the solution has its own.
-            `p-wave`: That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
+            itself.
+            `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
+            `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.
             `musl`: Update stress last, with the velocity projected again.
             `usavg`: Stress updated by halves, before the forces and after.
             `cd`: Centred differences.
-        transfer: Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order. Default:
-            flip.
-        start: First velocity of the cd integrator; others ignore it. Default: halved.
+        transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
+            Default: flip.
+        start: First velocity of the integrator cd. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
-        ppc: Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points.
-        cfl: Time step times wave speed over grid spacing; where nothing is said 0.4, and one that suits the splines in a total frame that
-            is not given either.
-        periods: End time in periods of the solution. Default: 1.
-        extent: How much of a ring or a shell is modelled; the part between planes of symmetry where there are such.
-            `quarter`: The part between the planes of symmetry.
+        ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
+            number that suits the splines.
+        periods: End time, in periods of the solution. Default: 1.
+        extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
+            `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
             `full`: All of it.
-        offset: Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5. Default: 0.
-        grid_angle: Angle of the background grid against the body in degrees, counter-clockwise; particles are then clipped with its
-            boundary. Default: 0.
-        grid_shift: Shift of the background grid against the body along each axis, in cells from -1 to 1; particles are then clipped with
-            its boundary. Default: 0.
+        offset: Shift of the lattice of particles along every axis, in particle distances, from -0.5 to 0.5. Default: 0.
+        grid_angle: Angle from the body to the background grid in degrees, counter-clockwise. Particles are then clipped at the boundary of
+            the body. Default: 0.
+        grid_shift: Shift of the background grid along each axis, in cells, from -1 to 1. Particles are then clipped at the boundary of the
+            body. Default: 0.
         precision: Precision of the solver; errors are always measured in f64. Default: f64.
             `f64`: Double.
             `f32`: Single.
-        set: Give a parameter another value than its default.
-        threads: Number of threads; all cores when left out.
+        set: Value of a parameter, in place of its default.
+        threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
         vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder.
         frames: Number of particle files, spread evenly from the first state to the last. Default: 20.
-        checkpoint: Write all that the next step needs to this folder every so often; after a kill, `mms resume DIR` goes on from there.
+        checkpoint: Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one.
         every: Steps between checkpoints. Default: 1000.
-        history: Write errors of u, energies and momentum of the particles and of the exact motion over time to this file as comma-separated
-            values, at up to 1000 evenly spread steps; json then has them too.
-        plot: Draw the energy gained and lost against the exact motion over time to this SVG file.
-        picture: Draw the particles, coloured by their Cauchy stress, to this SVG file; those in space as they are seen along the third
-            axis.
-        at: The time of the picture in periods of the solution, at most periods; the end when left out.
-        stress: The stress that gives the particles of the picture their colours. Default: von-mises.
+        history: Write errors of u, energies and momentum over time to this CSV file, of the particles and of the exact motion, at up to
+            1000 evenly spread steps; json then has them too.
+        plot: Draw the difference of the energy from the exact one over time to this SVG file.
+        picture: Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis.
+        at: Time of the picture in periods of the solution, at most periods. Default: the end of the run.
+        stress: Stress that the colours of the picture show. Default: von-mises.
             `von-mises`: Von Mises' equivalent stress.
             `pressure`: Pressure, positive in compression.
             `xx`: Normal stress along the first axis.
@@ -250,20 +247,20 @@ def converge(
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
-        cells: Cell counts, separated by commas; one of them with cfls.
-        cfls: CFL numbers, separated by commas, for orders in time on one grid.
-        expect: Orders to be met in place of those that theory promises: a number for u, or by field and norm, such as u=2,F=1,P.l1=1. With
-            cfls they are orders in time, of the differences on one grid. A missed order, promised or asked for, gives exit status 1.
-        tolerance: How far the order on the finest pair may be from the expected one; 0.1 when left out.
-        out: Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it stopped, and
-            several processes may share one.
-        shard: Compute those cases alone that fall to shard I of N, by predicted cost, and write no table: the shards of a study run on as
-            many machines, in any order, and the same command without this option prints the table. mms batch writes the script.
+        cells: Numbers of cells, separated by commas: at least two for an order, three for a verdict on it; one with cfls.
+        cfls: CFL numbers, separated by commas: orders in time on one grid.
+        expect: Expected orders: a number for u, or by field and norm, such as u=2,F=1,P.l1=1; with cfls orders in time, of the differences
+            on one grid. A missed order gives exit status 1. Default: the orders of theory.
+        tolerance: Largest distance of the order on the finest pair of grids from the expected order. Default: 0.1.
+        out: Keep every finished case in this folder, and read finished cases from it: a study that was killed continues where it stopped,
+            and several processes may share the folder.
+        shard: Compute only the cases of shard I of N, of about equal predicted cost, and write no table. The shards of a study run on as
+            many machines, in any order; the same command without this option prints the table. mms batch writes the script.
         plot: Draw the displacement error to this SVG file.
         csv: Write the tables to this file as comma-separated values.
         markdown: Write the tables to this Markdown file.
         latex: Write the tables to this LaTeX file, for the package booktabs.
-        shape: Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation.
+        shape: Shape functions: the weights between particles and grid. Default: gimp; bspline3 in the total Lagrangian formulation.
             `linear`: Hat functions at the particle's point.
             `ugimp`: GIMP weights of fixed size.
             `gimp`: GIMP weights that follow the particle's stretch.
@@ -273,65 +270,64 @@ def converge(
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).
             `bspline5`: Quintic splines (total Lagrangian).
-        formulation: Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total Lagrangian,
-            with those of the reference configuration throughout. Where nothing is said the updated one, and the total one for a solution
-            with a condition that only that one models.
+        formulation: Formulation: updated Lagrangian evaluates the shape functions in the current configuration in every step, total
+            Lagrangian once in the reference configuration. Default: updated-lagrangian; total-lagrangian if only this formulation can model
+            a boundary condition of the solution.
             `updated-lagrangian`: Updated Lagrangian: weights anew in each step, from the current configuration.
             `total-lagrangian`: Total Lagrangian: weights once, from the reference configuration.
-        mass: Mass matrix of the total Lagrangian formulation; consistent where nothing is said.
+        mass: Mass matrix of the total Lagrangian formulation. Default: consistent.
             `lumped`: Row sums on the diagonal.
             `consistent`: Integrated over the particles.
-        composition: Order of the symmetric composition of leapfrog in the total Lagrangian formulation; where nothing is said 4, and 6 for
-            splines of degree 4 and 5.
+        composition: Order of time stepping in the total Lagrangian formulation, by a symmetric composition of leapfrog steps. Default: 4; 6
+            for splines of degree 4 and 5.
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
-        layout: Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted and clipped ones in the updated
-            one only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held
-            between sliding walls.
+        layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
+            only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.
             `body-fitted`: Polar cells of equal angle that end at the rims (rings, updated Lagrangian).
             `clipped`: A lattice clipped with the boundary of the body: polygons or polyhedra on shared corners (updated Lagrangian, not on
                 a line).
             `gauss`: Gauss-Legendre points (total Lagrangian).
-        grid: Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total Lagrangian
-            formulation.
+        grid: Coordinates of the background grid. Default: cartesian; in the total Lagrangian formulation polar for rings and spherical for
+            shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
-            total Lagrangian formulation that is not.
-            `bar`: That of waves in a bar, sqrt(E/rho0), unless the solution has its own.
-            `p-wave`: That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
+            itself.
+            `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
+            `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.
             `musl`: Update stress last, with the velocity projected again.
             `usavg`: Stress updated by halves, before the forces and after.
             `cd`: Centred differences.
-        transfer: Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order. Default:
-            flip.
-        start: First velocity of the cd integrator; others ignore it. Default: halved.
+        transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
+            Default: flip.
+        start: First velocity of the integrator cd. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
-        ppc: Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points.
-        cfl: Time step times wave speed over grid spacing; where nothing is said 0.4, and one that suits the splines in a total frame that
-            is not given either.
-        periods: End time in periods of the solution. Default: 1.
-        extent: How much of a ring or a shell is modelled; the part between planes of symmetry where there are such.
-            `quarter`: The part between the planes of symmetry.
+        ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
+            number that suits the splines.
+        periods: End time, in periods of the solution. Default: 1.
+        extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
+            `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
             `full`: All of it.
-        offset: Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5. Default: 0.
-        grid_angle: Angle of the background grid against the body in degrees, counter-clockwise; particles are then clipped with its
-            boundary. Default: 0.
-        grid_shift: Shift of the background grid against the body along each axis, in cells from -1 to 1; particles are then clipped with
-            its boundary. Default: 0.
+        offset: Shift of the lattice of particles along every axis, in particle distances, from -0.5 to 0.5. Default: 0.
+        grid_angle: Angle from the body to the background grid in degrees, counter-clockwise. Particles are then clipped at the boundary of
+            the body. Default: 0.
+        grid_shift: Shift of the background grid along each axis, in cells, from -1 to 1. Particles are then clipped at the boundary of the
+            body. Default: 0.
         precision: Precision of the solver; errors are always measured in f64. Default: f64.
             `f64`: Double.
             `f32`: Single.
-        set: Give a parameter another value than its default.
-        threads: Number of threads; all cores when left out.
+        set: Value of a parameter, in place of its default.
+        threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
@@ -387,27 +383,31 @@ def stability(
     Args:
         solution: What `load` gave, a name, or the path of a specification.
         cells: Number of cells along the solution's cell length. Default: 32.
-        over: What to vary, one or two of them: NAME=VALUE,VALUE,... with the name amplitude, units (mass, length where L is one, and time
-            change by powers of two), a parameter of the solution, or cells, ppc, offset, periods, precision, shape, integrator, start.
-        width: How close the stable and the unstable CFL number come, on P-waves, whose number is the larger one. Default: 0.01.
-        lower: CFL number to start from; an eighth of P-waves' when left out. It is halved until it is stable.
-        upper: CFL number that is thought unstable; P-waves' own when left out. It is raised until it is unstable.
-        error_multiple: A run is unstable with an error of u above this multiple of a reference run's, at an eighth of P-waves' time step.
-            Default: 10.
-        energy_rate: A run is unstable if it gains, in a period, more than this multiple of the exact motion's largest energy. Default: 1.
-        at: Judge the run at this CFL number alone; exit status 1 if it is unstable.
-        search: Look for failures among random settings with CFL numbers up to cfl on P-waves, which are believed stable; exit status 1 if
+        over: Setting to vary, as NAME=VALUE,VALUE,...; at most two. Names: amplitude; units (mass, length if the solution has a length L,
+            and time change by powers of two); a parameter of the solution; cells, ppc, offset, periods, precision, shape, integrator,
+            start.
+        width: Largest distance between the stable and the unstable CFL number, on the speed of P-waves. Default: 0.01.
+        lower: CFL number to start from; halved until a run is stable. Default: 1/8 of the number at which a P-wave crosses one cell in one
+            step.
+        upper: CFL number that is expected to be unstable; raised until a run is. Default: the number at which a P-wave crosses one cell in
+            one step.
+        error_multiple: A run is unstable if its error of u exceeds this multiple of the error of the reference run, at CFL 0.125 on
+            P-waves. Default: 10.
+        energy_rate: A run is unstable if its energy, in excess of the exact energy and of the reference run's excess, grows faster than
+            this multiple of the largest exact energy per period. Default: 1.
+        at: Run at this CFL number only; exit status 1 if the run is unstable.
+        search: Look for unstable runs among random settings with CFL numbers up to cfl on P-waves, which should be stable; exit status 1 if
             there are any.
             `random`: Settings drawn from a seed.
         samples: Number of random settings. Default: 100.
         seed: Seed of the random settings. Default: 1.
         plot: Draw the limits to this SVG file: a line over one setting, a map over two.
         csv: Write the table to this file as comma-separated values.
-        out: Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it stopped, and
-            several processes may share one.
-        shard: Compute those cases alone that fall to shard I of N, by predicted cost, and write no table: the shards of a study run on as
-            many machines, in any order, and the same command without this option prints the table. mms batch writes the script.
-        shape: Weights between particles and grid; where nothing is said gimp, and bspline3 in the total Lagrangian formulation.
+        out: Keep every finished case in this folder, and read finished cases from it: a study that was killed continues where it stopped,
+            and several processes may share the folder.
+        shard: Compute only the cases of shard I of N, of about equal predicted cost, and write no table. The shards of a study run on as
+            many machines, in any order; the same command without this option prints the table. mms batch writes the script.
+        shape: Shape functions: the weights between particles and grid. Default: gimp; bspline3 in the total Lagrangian formulation.
             `linear`: Hat functions at the particle's point.
             `ugimp`: GIMP weights of fixed size.
             `gimp`: GIMP weights that follow the particle's stretch.
@@ -417,65 +417,64 @@ def stability(
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).
             `bspline5`: Quintic splines (total Lagrangian).
-        formulation: Formulation: updated Lagrangian, with the weights of the current configuration anew in each step, or total Lagrangian,
-            with those of the reference configuration throughout. Where nothing is said the updated one, and the total one for a solution
-            with a condition that only that one models.
+        formulation: Formulation: updated Lagrangian evaluates the shape functions in the current configuration in every step, total
+            Lagrangian once in the reference configuration. Default: updated-lagrangian; total-lagrangian if only this formulation can model
+            a boundary condition of the solution.
             `updated-lagrangian`: Updated Lagrangian: weights anew in each step, from the current configuration.
             `total-lagrangian`: Total Lagrangian: weights once, from the reference configuration.
-        mass: Mass matrix of the total Lagrangian formulation; consistent where nothing is said.
+        mass: Mass matrix of the total Lagrangian formulation. Default: consistent.
             `lumped`: Row sums on the diagonal.
             `consistent`: Integrated over the particles.
-        composition: Order of the symmetric composition of leapfrog in the total Lagrangian formulation; where nothing is said 4, and 6 for
-            splines of degree 4 and 5.
+        composition: Order of time stepping in the total Lagrangian formulation, by a symmetric composition of leapfrog steps. Default: 4; 6
+            for splines of degree 4 and 5.
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
-        layout: Where the particles lie; Gauss points in the total Lagrangian formulation only, body-fitted and clipped ones in the updated
-            one only. Where nothing is said a lattice, and Gauss points in the total Lagrangian formulation for a body that is not held
-            between sliding walls.
+        layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
+            only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.
             `body-fitted`: Polar cells of equal angle that end at the rims (rings, updated Lagrangian).
             `clipped`: A lattice clipped with the boundary of the body: polygons or polyhedra on shared corners (updated Lagrangian, not on
                 a line).
             `gauss`: Gauss-Legendre points (total Lagrangian).
-        grid: Coordinates of the background grid; where nothing is said polar for rings and spherical for shells in the total Lagrangian
-            formulation.
+        grid: Coordinates of the background grid. Default: cartesian; in the total Lagrangian formulation polar for rings and spherical for
+            shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Speed that the CFL number refers to; where nothing is said bar, and p-wave with a number that is not given either in a
-            total Lagrangian formulation that is not.
-            `bar`: That of waves in a bar, sqrt(E/rho0), unless the solution has its own.
-            `p-wave`: That of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
+            itself.
+            `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
+            `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.
             `musl`: Update stress last, with the velocity projected again.
             `usavg`: Stress updated by halves, before the forces and after.
             `cd`: Centred differences.
-        transfer: Velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... with a filter of that order. Default:
-            flip.
-        start: First velocity of the cd integrator; others ignore it. Default: halved.
+        transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
+            Default: flip.
+        start: First velocity of the integrator cd. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
-        ppc: Particles in a cell along each direction; where nothing is said 2, and one more than the degree with Gauss points.
-        cfl: Time step times wave speed over grid spacing; where nothing is said 0.4, and one that suits the splines in a total frame that
-            is not given either.
-        periods: End time in periods of the solution. Default: 1.
-        extent: How much of a ring or a shell is modelled; the part between planes of symmetry where there are such.
-            `quarter`: The part between the planes of symmetry.
+        ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
+            number that suits the splines.
+        periods: End time, in periods of the solution. Default: 1.
+        extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
+            `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
             `full`: All of it.
-        offset: Shift of the particles' lattice along every axis, in units of their distance, from -0.5 to 0.5. Default: 0.
-        grid_angle: Angle of the background grid against the body in degrees, counter-clockwise; particles are then clipped with its
-            boundary. Default: 0.
-        grid_shift: Shift of the background grid against the body along each axis, in cells from -1 to 1; particles are then clipped with
-            its boundary. Default: 0.
+        offset: Shift of the lattice of particles along every axis, in particle distances, from -0.5 to 0.5. Default: 0.
+        grid_angle: Angle from the body to the background grid in degrees, counter-clockwise. Particles are then clipped at the boundary of
+            the body. Default: 0.
+        grid_shift: Shift of the background grid along each axis, in cells, from -1 to 1. Particles are then clipped at the boundary of the
+            body. Default: 0.
         precision: Precision of the solver; errors are always measured in f64. Default: f64.
             `f64`: Double.
             `f32`: Single.
-        set: Give a parameter another value than its default.
-        threads: Number of threads; all cores when left out.
+        set: Value of a parameter, in place of its default.
+        threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
@@ -507,18 +506,18 @@ def tradeoff(
     shard: str | None = None,
     progress: Progress = None,
 ) -> Tradeoff:
-    """Measure error against cost over all schemes that fit, name the cheapest setting for an error, and say what each setting buys.
+    """Measure error against cost over all schemes that fit, and name the cheapest setting for an error.
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
-        budget: Time for everything, such as 90s, 2m or 1h; it is used up, for timings repeated if for nothing better. Default: 2m.
-        cells: Run every scheme that fits on these cell counts, whatever that takes, in place of a sweep within a budget; cases so stated
-            can be shared out with shard.
+        budget: Time of the whole command, such as 90s, 2m or 1h; what is left is used to repeat timings. Default: 2m.
+        cells: Run every scheme that fits on these numbers of cells, in place of a sweep within a budget; such cases can be distributed with
+            shard.
         cfls: CFL numbers for cells. Default: 0.4.
-        tolerance: Name the cheapest setting with at most this error, and run it once more to confirm it; exit status 1 if there is none.
-        time: Name the most accurate setting whose steps take at most this time, and run it once more to confirm it; exit status 1 if there
-            is none.
-        field: Field whose error counts. Errors of u are divided by the amplitude A where the solution has one. Default: u.
+        tolerance: Name the cheapest setting with at most this error, and run it once more to confirm; exit status 1 if there is none.
+        time: Name the most accurate setting whose steps take at most this time, and run it once more to confirm; exit status 1 if there is
+            none.
+        field: Field whose error is compared. Errors of u are divided by the amplitude A, if the solution has this parameter. Default: u.
             `u`: Displacement.
             `v`: Velocity.
             `f`: Deformation gradient.
@@ -527,22 +526,22 @@ def tradeoff(
             `linf`: Largest over particles.
             `l2`: Root of the mean square.
             `l1`: Mean.
-        against: Cost that the error is held against. Default: wall.
+        against: Cost. Default: wall.
             `wall`: Wall-clock time of the steps.
             `cpu`: Processor time of the steps.
             `steps`: Number of steps.
             `memory`: Memory, estimated.
-        periods: End time in periods of the solution. Default: 1.
-        threads: Number of threads; 1 when left out, and all cores for comparison.
-        set: Give a parameter another value than its default.
+        periods: End time, in periods of the solution. Default: 1.
+        threads: Number of threads. Default: 1, and all cores for comparison.
+        set: Value of a parameter, in place of its default.
         json: Keep the JSON of the result in this file.
         csv: Write all settings to this file as comma-separated values.
         plot: Draw error against cost, with the front, to this SVG file.
         advice: Write a page of advice to this Markdown file, with the figure behind each sentence.
-        out: Keep every finished case in this folder, and take from it what is there: a study that was killed goes on where it stopped, and
-            several processes may share one.
-        shard: Compute those cases alone that fall to shard I of N, by predicted cost, and write no table: the shards of a study run on as
-            many machines, in any order, and the same command without this option prints the table. mms batch writes the script.
+        out: Keep every finished case in this folder, and read finished cases from it: a study that was killed continues where it stopped,
+            and several processes may share the folder.
+        shard: Compute only the cases of shard I of N, of about equal predicted cost, and write no table. The shards of a study run on as
+            many machines, in any order; the same command without this option prints the table. mms batch writes the script.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
     """
@@ -562,6 +561,8 @@ def score(
     periods: float | None = None,
     cells: int | Iterable[int] | None = None,
     h: float | Iterable[float] | None = None,
+    expect: float | str | Mapping[str, float] | None = None,
+    tolerance: float | None = None,
     differences: float | Iterable[float] | None = None,
     against: str | None = None,
     cfl: float | None = None,
@@ -570,29 +571,32 @@ def score(
     json: str | os.PathLike[str] | None = None,
     progress: Progress = None,
 ) -> Score:
-    """Measure errors and orders of what another solver wrote (.vtu, .vtp, .vtk, .pvd, .csv).
+    """Measure errors and orders of another solver from its output files.
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
         files: The recordings, one for each resolution: lists, folders, or files.
         each: Each file is a recording of its own.
-        map: What an array is that has no usual name. Roles: displacement, velocity, deformation_gradient, first_piola_kirchhoff, cauchy,
+        map: Role of an array that has no usual name. Roles: displacement, velocity, deformation_gradient, first_piola_kirchhoff, cauchy,
             kirchhoff, J, density, reference_position, id.
-        points: What the points of the files are. Default: auto.
+        points: Meaning of the points in the files. Default: auto.
             `auto`: Reference positions if they stay while displacements change, else current ones.
             `current`: Current positions.
             `reference`: Reference positions.
-        time: The time of single frames that do not tell it.
-        velocity_lag: By how much velocities lag behind their frame's time: half a time step for staggered schemes. Default: 0.
-        periods: The time in which frames are expected, in periods of the solution. Default: 1.
+        time: Time of a single frame that does not state it.
+        velocity_lag: Time by which velocities lag behind their frame: half a time step in staggered schemes. Default: 0.
+        periods: Time in which frames are expected, in periods of the solution. Default: 1.
         cells: Cell counts along the solution's cell length, one for each recording.
-        h: Mesh sizes, one for each recording; estimated from the particles when neither is given.
-        differences: Compare each recording with the next one instead of the exact solution, for orders in time: they differ in nothing but
-            the time steps, which these are, each the same part of the one before.
-        against: Run mms itself with this shape function and integrator on the same grids, and compare the errors digit by digit.
-        cfl: Time step times wave speed over grid spacing of those runs, as of the recordings. Default: 0.4.
-        set: Give a parameter another value than its default.
-        threads: Number of threads; all cores when left out.
+        h: Mesh sizes, one for each recording. Default: estimated from the particles.
+        expect: Orders to be met: a number for u, or by field and norm, such as u=2,v=1,cauchy.l2=1. A missed order gives exit status 1.
+            Default: the error of every recorded field must fall, with an L2 order of at least 0.5.
+        tolerance: How far the order on the finest pair may be from the expected one. Default: 0.1.
+        differences: Orders in time: compare each recording with the next one in place of the exact solution. The recordings differ in their
+            time steps only; the values are these steps, in a constant ratio.
+        against: Run mms with this shape function and integrator on the same grids, and compare the errors digit by digit.
+        cfl: CFL number of the runs for against. Default: 0.4.
+        set: Value of a parameter, in place of its default.
+        threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.

@@ -305,7 +305,7 @@ def interpolating(solution, cells):
     """A "solver" whose error is the curvature of the exact motion over a cell, and one hundredth of b, which it reads as a force."""
     h = solution.cell_length / cells
     X, t = solution.sample(200), 0.3 * solution.period
-    right = mmsmith.load(solution.name)
+    right = mmsmith.load(solution.name, **solution.parameters)
     off = 0.01 * (solution.b(X, t) - right.b(X, t)) / abs(right.b(X, t)).max()
     return {"X": X, "t": t, "u": solution.u(X, t) * (1 + h**2) + off}
 
