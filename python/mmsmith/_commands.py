@@ -11,10 +11,10 @@ from mmsmith._invoke import Named, Progress, invoke, named
 from mmsmith._results import Check, Convergence, Result, Run, Score, Stability, Tradeoff
 
 #: The commands that write JSON.
-WITH_JSON = frozenset({"list", "explain", "coverage", "check", "eval", "run", "converge", "stability", "tradeoff", "score"})
+WITH_JSON = frozenset({"list", "explain", "coverage", "check", "eval", "run", "converge", "stability", "tradeoff", "score", "diagnose"})
 
 #: The commands that take values of parameters.
-WITH_SET = frozenset({"check", "gen", "eval", "run", "converge", "stability", "tradeoff", "score"})
+WITH_SET = frozenset({"check", "gen", "eval", "run", "converge", "stability", "tradeoff", "score", "diagnose"})
 
 
 @named
@@ -146,7 +146,7 @@ def run(
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself.
+            itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
@@ -157,13 +157,13 @@ def run(
             `cd`: Centred differences.
         transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
             Default: flip.
-        start: First velocity of the integrator cd. Default: halved.
+        start: First velocity of the integrator cd in the updated Lagrangian formulation; refused elsewhere. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
-        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
-            number that suits the splines.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
+            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
@@ -296,7 +296,7 @@ def converge(
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself.
+            itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
@@ -307,13 +307,13 @@ def converge(
             `cd`: Centred differences.
         transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
             Default: flip.
-        start: First velocity of the integrator cd. Default: halved.
+        start: First velocity of the integrator cd in the updated Lagrangian formulation; refused elsewhere. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
-        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
-            number that suits the splines.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
+            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
@@ -443,7 +443,7 @@ def stability(
             `polar`: Radius and angle.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself.
+            itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
         integrator: Time integrator. Default: cd.
@@ -454,13 +454,13 @@ def stability(
             `cd`: Centred differences.
         transfer: Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order).
             Default: flip.
-        start: First velocity of the integrator cd. Default: halved.
+        start: First velocity of the integrator cd in the updated Lagrangian formulation; refused elsewhere. Default: halved.
             `exact`: The exact velocity half a step before time zero.
             `data`: Velocity and acceleration at time zero.
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
-        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4; if mms chose the total Lagrangian formulation itself, a
-            number that suits the splines.
+        cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
+            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
