@@ -56,7 +56,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 } else {
                     for (part, count) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
                         let found = scan.word()?;
-                        if found != part {
+                        if !found.eq_ignore_ascii_case(part) {
                             return Err(format!("{keyword}: {found:?} where {part} should be"));
                         }
                         let kind = scan.kind(part)?;
@@ -221,7 +221,7 @@ impl<'a> Scan<'a> {
         }
         let (components, tuples) = (self.count(name)?, self.count(name)?);
         let kind = self.word()?;
-        if kind == "string" && !self.is_binary {
+        if kind.eq_ignore_ascii_case("string") && !self.is_binary {
             self.line()?;
             for _ in 0..tuples.saturating_mul(components) {
                 if self.at == self.bytes.len() {
@@ -251,7 +251,7 @@ impl<'a> Scan<'a> {
                     }
                 };
                 let before = self.at;
-                if self.keyword()? == Some("LOOKUP_TABLE") {
+                if self.keyword()?.is_some_and(|word| word.eq_ignore_ascii_case("LOOKUP_TABLE")) {
                     self.word()?;
                 } else {
                     // One byte back is the end of the line, which the array expects.
@@ -306,6 +306,7 @@ fn unescape(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::foreign::Cells;
 
     fn refused(text: &str) -> String {
         contents(text.as_bytes()).expect_err("it is accepted")
@@ -334,6 +335,46 @@ mod tests {
             (contents.fields[0].name.as_str(), numbers(&contents.fields[0])),
             ("TimeValue", vec![0.5])
         );
+    }
+
+    #[test]
+    fn kinds_and_keywords_are_read_in_any_case() {
+        let body = "POINTS 2 double\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nCELL_TYPES 1\n3\nPOINT_DATA 2\n\
+                    SCALARS sigma_xx float 1\nLOOKUP_TABLE default\n5 6\nVECTORS u double\n1 2 3 4 5 6\n";
+        let lower = body.to_ascii_lowercase();
+        let upper = body.to_ascii_uppercase();
+        for text in [body, &lower, &upper].map(|body| format!("{HEAD}{body}")) {
+            let contents = contents(text.as_bytes()).unwrap();
+            let piece = &contents.pieces[0];
+            let found: Vec<_> = piece.arrays.iter().map(|a| (a.components, a.kind)).collect();
+            assert_eq!(found, [(1, Kind::F32), (3, Kind::F64)], "{text}");
+            let numbers = |entry| contents.numbers::<f64>(text.as_bytes(), entry).unwrap();
+            assert_eq!(numbers(&piece.arrays[0]), [5.0, 6.0]);
+        }
+    }
+
+    #[test]
+    fn cells_are_read_with_counts_among_their_nodes_and_with_ends() {
+        let points = "POINTS 4 double\n0 0 0 1 0 0 1 1 0 0 1 0\n";
+        let old = format!("{HEAD}{points}CELLS 2 8\n4 0 1 2 3\n2 0 1\nCELL_TYPES 2\n9 3\n");
+        let new = format!(
+            "{}{points}CELLS 3 6\nOFFSETS vtktypeint64\n0 4 6\nCONNECTIVITY vtktypeint64\n0 1 2 3 0 1\nCELL_TYPES 2\n9 3\n",
+            HEAD.replace("4.2", "5.1")
+        );
+        let expected: [(u8, &[usize]); 2] = [(9, &[0, 1, 2, 3]), (3, &[0, 1])];
+        for text in [old, new] {
+            let contents = contents(text.as_bytes()).unwrap();
+            let mut cells = Cells::default();
+            cells.extend(&contents, text.as_bytes(), &contents.pieces[0].cells, 0).unwrap();
+            assert_eq!(cells.iter().collect::<Vec<_>>(), expected);
+            let mut shifted = Cells::default();
+            shifted.extend(&contents, text.as_bytes(), &contents.pieces[0].cells, 7).unwrap();
+            assert_eq!(shifted.iter().next(), Some((9, &[7, 8, 9, 10][..])));
+        }
+        let damaged = format!("{HEAD}{points}CELLS 1 3\n4 0 1\nCELL_TYPES 1\n9\n");
+        let contents = contents(damaged.as_bytes()).unwrap();
+        let entries = &contents.pieces[0].cells;
+        assert!(Cells::default().extend(&contents, damaged.as_bytes(), entries, 0).is_none());
     }
 
     #[test]

@@ -40,9 +40,9 @@ impl Kind {
         })
     }
 
-    /// By its name in legacy files.
+    /// By its name in legacy files, which VTK reads in any case.
     pub(super) fn of_legacy(name: &str) -> Option<Self> {
-        Some(match name {
+        Some(match name.to_ascii_lowercase().as_str() {
             "float" => Self::F32,
             "double" => Self::F64,
             "char" | "signed_char" => Self::I8,
@@ -50,7 +50,7 @@ impl Kind {
             "short" => Self::I16,
             "unsigned_short" => Self::U16,
             // VTK writes its own identities as 32 bits, whatever it was built with.
-            "int" | "vtkIdType" | "vtkidtype" => Self::I32,
+            "int" | "vtkidtype" => Self::I32,
             "unsigned_int" => Self::U32,
             "long" | "long_long" | "vtktypeint64" => Self::I64,
             "unsigned_long" | "unsigned_long_long" | "vtktypeuint64" => Self::U64,
