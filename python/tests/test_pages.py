@@ -101,6 +101,34 @@ def test_the_program_for_febio_writes_its_input_and_reads_its_output(tmp_path):
     assert done.returncode == 0 and done.stdout.endswith("order 2.00\n"), done.stdout + done.stderr
 
 
+def test_the_case_for_openfoam_is_written_and_its_output_scored(tmp_path):
+    for name in ("plate.toml", "case.sh"):
+        (tmp_path / name).write_text(saved("hosts/openfoam.md", name), encoding="utf-8")
+    (tmp_path / "recording.py").write_text(program("hosts/openfoam.md"), encoding="utf-8")
+    plate = mmsmith.load(tmp_path / "plate.toml")
+    parameters = plate.parameters
+    for n in (16, 32):
+        subprocess.run(["sh", "-e", "case.sh", str(n)], cwd=tmp_path, check=True, capture_output=True)
+        case = tmp_path / f"plate-{n}"
+        files = [path for path in case.rglob("*") if path.is_file()]
+        assert len(files) == 10
+        for path in files:
+            text = re.sub(r"//[^\n]*|/\*.*?\*/|\"[^\"]*\"", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+            assert all(text.count(opened) == text.count(closed) for opened, closed in ("{}", "()", "[]") if path.suffix != ".h"), path
+        material = (case / "constant/mechanicalProperties").read_text(encoding="utf-8")
+        assert all(f"{sign} {{ type uniform; value {parameters[name]:g}; }}" in material for sign, name in (("rho", "rho0"), ("nu", "nu"), ("E", "E")))
+        # As OpenFOAM writes it.
+        centres = [((i + 0.5) / n, (j + 0.5) / n) for j in range(n) for i in range(n)]
+        D = plate.u(centres, 0.0) + 1e-3 / n**2
+        rows = "\n".join(f"({x!r} {y!r} 0)" for x, y in D.tolist())
+        (case / "1").mkdir()
+        (case / "1/D").write_text(f"internalField   nonuniform List<vector> \n{n * n}\n(\n{rows}\n)\n;\nboundaryField {{}}\n", encoding="utf-8")
+        subprocess.run([sys.executable, "recording.py", str(n)], cwd=tmp_path, check=True)
+    score = next(line for block in blocks("hosts/openfoam.md") for line in block["text"].splitlines() if line.startswith("mms score"))
+    done = subprocess.run(["sh", "-c", score], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_input_for_moose_fits_the_generated_file(tmp_path):
     mmsmith.command("gen", "skew-2d", target="moose", out=tmp_path)
     generated = (tmp_path / "skew_2d.i").read_text(encoding="utf-8")
