@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::cells::CellEntries;
 use super::numbers::{Base64, ByteOrder, Kind, MOST_NUMBERS, Number, Packing, decode, parse};
 
 /// What a file holds, as places in its bytes.
@@ -22,7 +21,47 @@ pub(super) struct Piece {
     pub(super) particles: usize,
     pub(super) points: Entry,
     pub(super) arrays: Vec<Entry>,
-    pub(super) cells: CellEntries,
+    /// Its cells, kind by kind as files of polygons list them.
+    pub(super) cells: Vec<Cells>,
+    pub(super) cell_arrays: Vec<Entry>,
+}
+
+impl Piece {
+    /// The number of its cells.
+    pub(super) fn cell_count(&self) -> usize {
+        self.cells.iter().map(|cells| cells.count).sum()
+    }
+}
+
+/// Cells over the points of a piece.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    pub(super) count: usize,
+    pub(super) nodes: Nodes,
+    pub(super) kinds: Kinds,
+}
+
+/// How a file lists the nodes of its cells.
+#[derive(Clone, Debug)]
+pub(super) enum Nodes {
+    /// Before the nodes of each cell stands their number.
+    Counted(Entry),
+    /// The place behind each cell's last node.
+    Ends { ends: Entry, nodes: Entry },
+    /// The place of each cell's first node, and the number of all.
+    Offsets { offsets: Entry, nodes: Entry },
+}
+
+/// Where the kinds of cells stand, as VTK numbers them.
+#[derive(Clone, Debug)]
+pub(super) enum Kinds {
+    /// In an array.
+    Given(Entry),
+    /// Points, lines, strips or polygons, by the section of the file.
+    Vertices,
+    Lines,
+    Strips,
+    Polygons,
 }
 
 /// The data behind all XML elements.

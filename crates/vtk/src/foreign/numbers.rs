@@ -40,7 +40,7 @@ impl Kind {
         })
     }
 
-    /// By its name in legacy files, which VTK reads in any case.
+    /// By its name in legacy files, in any case: MATLAB scripts write `FLOAT`, and VTK reads it.
     pub(super) fn of_legacy(name: &str) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_str() {
             "float" => Self::F32,
@@ -140,6 +140,11 @@ pub(super) fn to_whole(value: f64) -> Result<i64, String> {
     } else {
         Err(format!("{value:?} is no whole number that a double holds exactly"))
     }
+}
+
+/// A place in a list.
+pub(super) fn to_index(value: i64) -> Result<usize, String> {
+    usize::try_from(value).map_err(|_| format!("{value} is no place in a list"))
 }
 
 /// All numbers of a payload, whose length must be right.

@@ -1,15 +1,18 @@
 //! Particles in comma-separated values.
 
-use std::collections::{BTreeMap, HashSet};
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 
+use super::components::{Incomplete, Joined, Source, join};
 use super::numbers::to_whole;
 
 /// The columns of a CSV file, and the rows that belong to one time each.
 #[derive(Debug)]
 pub(super) struct Table {
-    pub(super) arrays: Vec<Columns>,
+    pub(super) arrays: Vec<Joined>,
+    names: Vec<String>,
     columns: Vec<Vec<f64>>,
     /// How many digits the numbers of each column have.
     digits: Vec<Digits>,
@@ -25,58 +28,51 @@ pub(super) struct Rows {
     pub(super) range: Range<usize>,
 }
 
-/// The columns that make up one array.
-#[derive(Debug)]
-pub(super) struct Columns {
-    pub(super) name: String,
-    /// Their indices, component by component.
-    indices: Vec<usize>,
-}
-
-/// The name of the array that holds the positions.
-pub(super) const POINTS: &str = "Points";
-/// The name of the array that holds reference positions given by `X`, `Y`, `Z`.
-const REFERENCE: &str = "X";
-
 impl Table {
     /// Reads a file with one header line.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let delimiter = delimiter(bytes)?;
+        let (bytes, delimiter) = prepared(bytes)?;
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .delimiter(delimiter)
-            .from_reader(bytes);
+            .from_reader(&*bytes);
         let header = reader.headers().map_err(|cause| cause.to_string())?.clone();
-        let mut columns: Vec<Vec<f64>> = vec![vec![]; header.len()];
-        let mut digits = vec![Digits::default(); header.len()];
+        let names: Vec<String> = header.iter().map(str::to_owned).collect();
+        let mut filled = Filled::new(names)?;
         let mut record = csv::StringRecord::new();
         while reader.read_record(&mut record).map_err(|cause| damage(&cause, &header))? {
-            for (index, (column, word)) in columns.iter_mut().zip(&record).enumerate() {
-                let value = number(word, delimiter).map_err(|hint| {
-                    let line = record.position().map_or(0, csv::Position::line);
-                    format!("line {line}, column `{}`: {word:?} is no number{hint}", &header[index])
-                })?;
-                digits[index].count(word);
-                column.push(value);
-            }
+            let line = record.position().map_or(0, csv::Position::line);
+            filled.row(record.iter(), delimiter, line)?;
         }
-        let arrays = group(&header)?;
-        let time =
-            header.iter().position(|name| ["t", "time", "Time", "TimeValue"].contains(&name));
-        let rows = columns.first().map_or(0, Vec::len);
-        let frames = frames(time.map(|time| &columns[time][..]), rows)?;
-        Ok(Self { arrays, columns, digits, frames })
+        let time = header.iter().position(|name| TIMES.contains(&name));
+        let rows = filled.columns.first().map_or(0, Vec::len);
+        let frames = frames(time.map(|time| &filled.columns[time][..]), rows)?;
+        filled.table(frames)
     }
 
-    fn find(&self, name: &str) -> Option<&Columns> {
+    /// The numbers of a column.
+    pub(super) fn column(&self, name: &str) -> Option<&[f64]> {
+        let index = self.names.iter().position(|column| column == name)?;
+        Some(&self.columns[index])
+    }
+
+    /// The names of the columns.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn find(&self, name: &str) -> Option<&Joined> {
         self.arrays.iter().find(|array| array.name == name)
     }
 
     /// The components of an array in some rows, row by row.
     pub(super) fn floats(&self, name: &str, rows: Range<usize>) -> Option<Vec<f64>> {
-        let indices = &self.find(name)?.indices;
-        let row = |row| indices.iter().map(move |index| self.columns[*index][row]);
+        let components = &self.find(name)?.components;
+        let value = move |source: &Option<Source>, row: usize| {
+            source.map_or(0.0, |source| self.columns[source.array][row])
+        };
+        let row = |row| components.iter().map(move |source| value(source, row));
         Some(rows.flat_map(row).collect())
     }
 
@@ -87,16 +83,130 @@ impl Table {
     ) -> Option<Result<Vec<i64>, String>> {
         Some(self.floats(name, rows)?.into_iter().map(to_whole).collect())
     }
+
+    /// The digits of the longest number of an array, where its columns tell.
+    pub(super) fn digits(&self, array: &Joined) -> Option<usize> {
+        let columns = array.components.iter().flatten();
+        columns.filter_map(|source| self.digits[source.array].most()).max()
+    }
+}
+
+/// The names of a column of times.
+const TIMES: [&str; 5] = ["t", "time", "Time", "TIME", "TimeValue"];
+
+/// Columns while rows are read.
+pub(super) struct Filled {
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+    digits: Vec<Digits>,
+}
+
+impl Filled {
+    pub(super) fn new(names: Vec<String>) -> Result<Self, String> {
+        let mut seen = HashSet::new();
+        if let Some(name) =
+            names.iter().find(|name| !name.is_empty() && !seen.insert(name.as_str()))
+        {
+            return Err(format!(
+                "the column `{name}` stands twice in the header: rename or remove one of the two"
+            ));
+        }
+        let (columns, digits) = (vec![vec![]; names.len()], vec![Digits::default(); names.len()]);
+        Ok(Self { names, columns, digits })
+    }
+
+    /// The names of the columns.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Takes the words of a line.
+    pub(super) fn row<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a str>,
+        delimiter: u8,
+        line: u64,
+    ) -> Result<(), String> {
+        for (index, (column, word)) in self.columns.iter_mut().zip(words).enumerate() {
+            let value = number(word, delimiter).map_err(|hint| {
+                format!("line {line}, column `{}`: {word:?} is no number{hint}", self.names[index])
+            })?;
+            self.digits[index].count(word, value);
+            column.push(value);
+        }
+        Ok(())
+    }
+
+    /// The table of all rows.
+    pub(super) fn table(self, frames: Vec<Rows>) -> Result<Table, String> {
+        let Self { names, columns, digits } = self;
+        let heads: Vec<_> = names.iter().map(|name| (name.as_str(), 1)).collect();
+        let (arrays, incomplete) = join(&heads);
+        if let Some(Incomplete { name, members }) = incomplete.first() {
+            return Err(format!(
+                "the {} column(s) {} are no complete vector or tensor `{name}`",
+                members.len(),
+                members.join(", ")
+            ));
+        }
+        Ok(Table { arrays, names, columns, digits, frames })
+    }
 }
 
 /// More columns than a table of particles has.
 const MOST_COLUMNS: usize = 10_000;
 
-/// The character between the columns: comma, semicolon or tab, the one that the header has most often.
+/// The text with its header as the first line and one character between columns, and that character.
+///
+/// `numpy.savetxt` writes the header as a comment, and blanks between columns by default.
+fn prepared(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, u8), String> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = uncommented(bytes);
+    let delimiter = delimiter(bytes)?;
+    if delimiter != b' ' {
+        return Ok((Cow::Borrowed(bytes), delimiter));
+    }
+    let mut spaced = Vec::with_capacity(bytes.len());
+    for line in bytes.split(|byte| *byte == b'\n') {
+        let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        for (index, word) in words.enumerate() {
+            if index > 0 {
+                spaced.push(b'\t');
+            }
+            spaced.extend_from_slice(word);
+        }
+        spaced.push(b'\n');
+    }
+    Ok((Cow::Owned(spaced), b'\t'))
+}
+
+/// The text from its header on, where that is a comment: the last one before a line that begins with a number.
+fn uncommented(bytes: &[u8]) -> &[u8] {
+    let mut comment = None;
+    let mut at = 0;
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+        let text = line.trim_ascii();
+        if let Some(header) = text.strip_prefix(b"#") {
+            comment = Some(
+                &bytes[at + line.len() - line.trim_ascii_start().len()
+                    + (text.len() - header.len())..],
+            );
+        } else if !text.is_empty() {
+            let end = text.iter().position(|byte| b",;\t ".contains(byte)).unwrap_or(text.len());
+            let first = std::str::from_utf8(&text[..end]).unwrap_or_default();
+            let is_number = number(first, b';').is_ok();
+            return comment.filter(|_| is_number).unwrap_or(bytes);
+        }
+        at += line.len();
+    }
+    bytes
+}
+
+/// The character between the columns: comma, semicolon or tab, the one that the header has most often, else a blank.
 fn delimiter(bytes: &[u8]) -> Result<u8, String> {
     let lines = bytes.split(|byte| *byte == b'\n');
     let header = lines.into_iter().find(|line| !line.trim_ascii().is_empty() && line[0] != b'#');
-    let header = header.unwrap_or_default();
+    let header = header.unwrap_or_default().trim_ascii();
     let count = |delimiter: u8| header.iter().filter(|byte| **byte == delimiter).count();
     // Of equals the last one is taken, which is the comma.
     let (count, delimiter) = [b'\t', b';', b',']
@@ -107,7 +217,10 @@ fn delimiter(bytes: &[u8]) -> Result<u8, String> {
     if count >= MOST_COLUMNS {
         return Err(format!("it has {} columns; at most {MOST_COLUMNS} are read", count + 1));
     }
-    Ok(delimiter)
+    match count == 0 && !header.contains(&b'"') && header.contains(&b' ') {
+        true => Ok(b' '),
+        false => Ok(delimiter),
+    }
 }
 
 /// A number with a decimal point, or with a decimal comma where commas do not separate columns; else the reason, to be added
@@ -143,46 +256,52 @@ fn damage(cause: &csv::Error, header: &csv::StringRecord) -> String {
 }
 
 /// How many significant digits numbers have, as they are written.
+///
+/// Multiples of a power of two, as the coordinates of many grids are, have few digits and lose none: they are left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Digits {
     /// Numbers with a fraction or an exponent.
     fractions: usize,
     /// The most digits that one of them has.
     most: usize,
+    /// The numbers that have the most digits.
+    longest: usize,
 }
 
 impl Digits {
     /// As many numbers with a fraction tell the digits of all: fewer may happen to be short.
     const ENOUGH: usize = 8;
+    /// Fewer digits are those of a grid, such as 0.05.
+    const FEWEST: usize = 4;
 
-    pub(super) fn count(&mut self, word: &str) {
+    pub(super) fn count(&mut self, word: &str, value: f64) {
         let mantissa = word.split(['e', 'E', 'd', 'D']).next().unwrap_or_default();
-        if !word.contains(['.', ',', 'e', 'E']) {
+        if !word.contains(['.', ',', 'e', 'E']) || is_whole(mantissa, value) {
             return;
         }
         let significant =
             mantissa.bytes().filter(u8::is_ascii_digit).skip_while(|digit| *digit == b'0').count();
-        if significant > 0 {
-            self.fractions += 1;
-            self.most = self.most.max(significant);
+        if significant == 0 {
+            return;
         }
+        self.fractions += 1;
+        if significant > self.most {
+            (self.most, self.longest) = (significant, 0);
+        }
+        self.longest += usize::from(significant == self.most);
     }
 
-    /// The digits of the longest number, where there are enough to tell.
+    /// The digits of the longest number, where there are enough to tell and half of them are as long: these have been cut.
     pub(super) fn most(self) -> Option<usize> {
-        (self.fractions >= Self::ENOUGH).then_some(self.most)
+        let is_cut = self.most >= Self::FEWEST && 2 * self.longest >= self.fractions;
+        (self.fractions >= Self::ENOUGH && is_cut).then_some(self.most)
     }
 }
 
-impl Columns {
-    pub(super) fn components(&self) -> usize {
-        self.indices.len()
-    }
-
-    /// The digits of the longest number of an array, where its columns tell.
-    pub(super) fn digits(&self, table: &Table) -> Option<usize> {
-        self.indices.iter().filter_map(|index| table.digits[*index].most()).max()
-    }
+/// Whether a number that ends with its last digit is a multiple of a power of two.
+fn is_whole(mantissa: &str, value: f64) -> bool {
+    const FINEST: f64 = 4_194_304.0;
+    !mantissa.ends_with('0') && (value * FINEST).fract() == 0.0
 }
 
 /// Successive rows of one time are a frame.
@@ -211,93 +330,6 @@ fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
     Ok(frames)
 }
 
-/// What a component's ending means: its row and column, or its index alone.
-fn component(ending: &str) -> Option<Component> {
-    let axis = |c: u8| b"xyz".iter().position(|a| *a == c.to_ascii_lowercase());
-    let digit = |c: u8| b"123".iter().position(|a| *a == c);
-    match ending.as_bytes() {
-        [c] => axis(*c).map(Component::Vector),
-        [i, j] => {
-            let pair = axis(*i).zip(axis(*j)).or_else(|| digit(*i).zip(digit(*j)));
-            pair.map(|(i, j)| Component::Tensor(i, j))
-        }
-        _ => None,
-    }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Component {
-    Index(usize),
-    Vector(usize),
-    Tensor(usize, usize),
-}
-
-/// The array and the component that a column's name stands for; `None` where it is an array by itself.
-fn split(column: &str) -> Option<(&str, Component)> {
-    match column {
-        "x" | "y" | "z" => return Some((POINTS, component(column)?)),
-        "X" | "Y" | "Z" => return Some((REFERENCE, component(column)?)),
-        _ => (),
-    }
-    // As ParaView's table writer and many scripts name components.
-    if let Some((name, index)) = column.rsplit_once(':') {
-        return index.parse().ok().map(|index| (name, Component::Index(index)));
-    }
-    if let Some((name, ending)) = column.rsplit_once('_') {
-        let known = component(ending);
-        let index = || ending.parse().ok().filter(|index| *index < 9).map(Component::Index);
-        return known.or_else(index).map(|component| (name, component));
-    }
-    let is_short = matches!(column.as_bytes().first(), Some(b'u' | b'v' | b'F' | b'P'));
-    let ending = column.get(1..).filter(|_| is_short)?;
-    component(ending).map(|component| (&column[..1], component))
-}
-
-fn group(header: &csv::StringRecord) -> Result<Vec<Columns>, String> {
-    let mut order: Vec<&str> = vec![];
-    let mut members: BTreeMap<&str, Vec<(Component, usize)>> = BTreeMap::new();
-    for (index, column) in header.iter().enumerate() {
-        let (name, component) = split(column).unwrap_or((column, Component::Index(0)));
-        if !members.contains_key(name) {
-            order.push(name);
-        }
-        members.entry(name).or_default().push((component, index));
-    }
-    let mut arrays = vec![];
-    for name in order {
-        let mut components = members.remove(name).unwrap_or_default();
-        components.sort_unstable();
-        let width = match components.len() {
-            4 => 2,
-            9 => 3,
-            _ => 1,
-        };
-        let is_whole = components.iter().enumerate().all(|(at, (component, _))| match component {
-            Component::Index(index) | Component::Vector(index) => *index == at,
-            Component::Tensor(i, j) => width * i + j == at,
-        });
-        let columns: Vec<_> =
-            components.iter().map(|(_, index)| (&header[*index], *index)).collect();
-        if is_whole {
-            let indices = columns.into_iter().map(|(_, index)| index).collect();
-            arrays.push(Columns { name: name.to_owned(), indices });
-        } else if [POINTS, REFERENCE, "u", "v", "F", "P"].contains(&name) {
-            let (size, columns): (_, Vec<_>) =
-                (columns.len(), columns.iter().map(|(column, _)| *column).collect());
-            return Err(format!(
-                "the {size} column(s) {} are no complete vector or tensor `{name}`",
-                columns.join(", ")
-            ));
-        } else {
-            // Names that end like components but are none.
-            for (column, index) in columns {
-                arrays.push(Columns { name: column.to_owned(), indices: vec![index] });
-            }
-        }
-    }
-    Ok(arrays)
-}
-
 /// Whether a path names such a file.
 pub(super) fn is_csv(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
@@ -305,6 +337,7 @@ pub(super) fn is_csv(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::components::POINTS;
     use super::*;
 
     #[test]
@@ -321,10 +354,7 @@ mod tests {
         assert_eq!(table.floats("F", 0..1), Some(vec![5.0, 6.0, 7.0, 8.0]));
         assert_eq!(table.floats("v", 0..1), Some(vec![9.0, 10.0]));
         assert_eq!(table.integers("id", 0..2), Some(Ok(vec![1, 2])));
-        assert_eq!(
-            table.arrays.iter().find(|array| array.name == "mass").map(Columns::components),
-            Some(1)
-        );
+        assert_eq!(table.find("mass").map(|array| array.components.len()), Some(1));
         assert_eq!(table.floats("w", 0..1), None);
         let table = Table::read(b"x,node_1,node_3,S12\n1,2,3,4\n").unwrap();
         assert_eq!(table.floats("node_3", 0..1), Some(vec![3.0]));
@@ -333,7 +363,14 @@ mod tests {
 
     #[test]
     fn semicolons_and_tabs_separate_columns_and_leave_commas_for_decimals() {
-        for text in ["x;y\n0,5;1.5\n", "x\ty\n0,5\t1,5\n", "x,y\n0.5,1.5\n"] {
+        for text in [
+            "x;y\n0,5;1.5\n",
+            "x\ty\n0,5\t1,5\n",
+            "x,y\n0.5,1.5\n",
+            "x y\n 0.5  1.5\n",
+            "# x,y\n0.5,1.5\n",
+            "# made by hand\n# x y\n5e-1 1.5\n",
+        ] {
             let table = Table::read(text.as_bytes()).expect(text);
             assert_eq!(table.floats(POINTS, 0..1), Some(vec![0.5, 1.5]), "{text}");
         }
@@ -350,9 +387,12 @@ mod tests {
             ("0.30000000000000004", Some(17)),
             ("12", None),
             ("0.0", None),
+            ("0.0625", None),
+            ("0.0625000", Some(6)),
+            ("0.05", None),
         ] {
             let table = table(word);
-            assert_eq!(table.arrays[0].digits(&table), expected, "{word}");
+            assert_eq!(table.digits(&table.arrays[0]), expected, "{word}");
         }
     }
 
@@ -371,7 +411,8 @@ mod tests {
             ("x,z\n1,2\n", "no complete vector or tensor `Points`"),
             ("F11,F12,F21\n1,2,3\n", "no complete vector or tensor `F`"),
             ("t,x\n0,1\n1,1\n0,2\n", "sort the rows by time"),
-            ("x,x\n0,1\n", "no complete"),
+            ("x,x\n0,1\n", "`x` stands twice"),
+            ("t,x,t\n0,1,0\n", "`t` stands twice"),
             ("x,y\n0,5,1,5\n", "decimal commas? Write decimal points (0.5)"),
         ] {
             let message = Table::read(text.as_bytes()).expect_err(text);

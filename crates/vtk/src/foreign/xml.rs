@@ -1,12 +1,11 @@
-//! The arrays of `.vtu` and `.vtp` files, and the list in a `.pvd` file.
+//! The arrays of `.vtu` and `.vtp` files, and the files that a `.pvd`, `.pvtu`, `.pvtp`, `.vtm` or `.vtmb` file lists.
 
 use std::collections::HashMap;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::cells::CellEntries;
-use super::contents::{Appended, Contents, Entry, Piece, Place};
+use super::contents::{Appended, Cells, Contents, Entry, Kinds, Nodes, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
 /// More attributes than an element of a VTK file has.
@@ -55,18 +54,108 @@ enum Section {
     Field,
     Points,
     PointData,
+    /// The nodes of cells: a list of them is open.
     Cells,
-    /// Data of cells, which say nothing about particles.
+    CellData,
     Other,
+}
+
+/// The sections of a piece that list cells, and the kind of cells where they do not give it.
+fn lists_cells(element: &[u8]) -> Option<Kinds> {
+    Some(match element {
+        b"Cells" | b"Polys" => Kinds::Polygons,
+        b"Verts" => Kinds::Vertices,
+        b"Lines" => Kinds::Lines,
+        b"Strips" => Kinds::Strips,
+        _ => return None,
+    })
+}
+
+/// The number of cells that a section of a piece lists.
+fn count_of(element: &[u8], piece: &Tag) -> Result<usize, String> {
+    let key = match element {
+        b"Polys" => "NumberOfPolys",
+        b"Verts" => "NumberOfVerts",
+        b"Lines" => "NumberOfLines",
+        b"Strips" => "NumberOfStrips",
+        _ => "NumberOfCells",
+    };
+    Ok(piece.count(key)?.unwrap_or(0))
+}
+
+/// The arrays of a list of cells, as far as they have been met.
+struct List {
+    count: usize,
+    kinds: Kinds,
+    nodes: Option<Entry>,
+    ends: Option<Entry>,
+}
+
+impl List {
+    fn take(&mut self, entry: Entry) {
+        match entry.name.as_str() {
+            "connectivity" => self.nodes = Some(entry),
+            "offsets" => self.ends = Some(entry),
+            "types" => self.kinds = Kinds::Given(entry),
+            _ => (),
+        }
+    }
+
+    /// A list that lacks an array is none.
+    fn cells(self) -> Option<Cells> {
+        let (nodes, ends) = self.nodes.zip(self.ends)?;
+        let nodes = Nodes::Ends { ends, nodes };
+        (self.count > 0).then_some(Cells { count: self.count, nodes, kinds: self.kinds })
+    }
 }
 
 /// A piece under way.
 struct Open {
+    tag: Tag,
     particles: usize,
     points: Option<Entry>,
     arrays: Vec<Entry>,
-    count: usize,
-    cells: CellEntries,
+    lists: Vec<List>,
+    cell_arrays: Vec<Entry>,
+}
+
+impl Open {
+    fn new(element: &BytesStart<'_>) -> Result<Self, String> {
+        let tag = Tag::new(element)?;
+        // vtkio leaves the count out where it is zero.
+        let particles = tag.count("NumberOfPoints")?.unwrap_or(0);
+        Ok(Self {
+            tag,
+            particles,
+            points: None,
+            arrays: vec![],
+            lists: vec![],
+            cell_arrays: vec![],
+        })
+    }
+
+    /// Takes an array of a section.
+    fn take(
+        &mut self,
+        section: Section,
+        tag: &Tag,
+        text: std::ops::Range<usize>,
+    ) -> Result<(), String> {
+        let cells = || self.lists.iter().fold(0, |sum, list| list.count.saturating_add(sum));
+        match section {
+            Section::Points => self.points = Some(entry(tag, text, self.particles)?),
+            Section::PointData => self.arrays.push(entry(tag, text, self.particles)?),
+            // Texts and other things without numbers are no fields.
+            Section::CellData => self.cell_arrays.extend(entry(tag, text, cells()).ok()),
+            Section::Cells => {
+                if let Some(list) = self.lists.last_mut() {
+                    list.take(entry(tag, text, list.count)?);
+                }
+            }
+            Section::Field | Section::Other => (),
+        }
+        Ok(())
+    }
 }
 
 /// Finds the arrays of a `.vtu` or `.vtp` file.
@@ -87,9 +176,10 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             Event::End(element) => {
                 match element.name().as_ref() {
                     b"Piece" => close(piece.take(), contents.as_mut())?,
-                    b"FieldData" | b"Points" | b"PointData" | b"Cells" | b"CellData" => {
-                        section = Section::Other;
+                    b"FieldData" | b"Points" | b"PointData" | b"CellData" => {
+                        section = Section::Other
                     }
+                    name if lists_cells(name).is_some() => section = Section::Other,
                     b"VTKFile" => is_complete = true,
                     _ => (),
                 }
@@ -103,14 +193,9 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             b"FieldData" if !is_empty => section = Section::Field,
             b"Points" if !is_empty => section = Section::Points,
             b"PointData" if !is_empty => section = Section::PointData,
-            b"Cells" if !is_empty => section = Section::Cells,
+            b"CellData" if !is_empty => section = Section::CellData,
             b"Piece" => {
-                let tag = Tag::new(element)?;
-                // vtkio leaves the count out where it is zero.
-                let particles = tag.count("NumberOfPoints")?.unwrap_or(0);
-                let count = tag.count("NumberOfCells")?.unwrap_or(0);
-                let cells = CellEntries::default();
-                piece = Some(Open { particles, points: None, arrays: vec![], count, cells });
+                piece = Some(Open::new(element)?);
                 if is_empty {
                     close(piece.take(), contents.as_mut())?;
                 }
@@ -127,22 +212,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                         let tuples = tag.count("NumberOfTuples")?.unwrap_or(1);
                         contents.fields.extend(entry(&tag, text, tuples).ok());
                     }
-                    (Section::Points, Some(piece)) => {
-                        piece.points = Some(entry(&tag, text, piece.particles)?);
-                    }
-                    (Section::PointData, Some(piece)) => {
-                        piece.arrays.push(entry(&tag, text, piece.particles)?);
-                    }
-                    (Section::Cells, Some(piece)) => {
-                        // Whoever wants no cells is not troubled by damaged ones.
-                        let found = entry(&tag, text, piece.count).ok();
-                        match tag.get("Name") {
-                            Some("types") => piece.cells.types = found,
-                            Some("offsets") => piece.cells.ends = found,
-                            Some("connectivity") => piece.cells.nodes = found,
-                            _ => (),
-                        }
-                    }
+                    (_, Some(piece)) => piece.take(section, &tag, text)?,
                     _ => (),
                 }
             }
@@ -155,7 +225,14 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 is_complete = true;
                 break;
             }
-            _ => (),
+            name => {
+                if let (Some(kinds), Some(piece), false) = (lists_cells(name), &mut piece, is_empty)
+                {
+                    let count = count_of(name, &piece.tag)?;
+                    piece.lists.push(List { count, kinds, nodes: None, ends: None });
+                    section = Section::Cells;
+                }
+            }
         }
     }
     let contents = contents.ok_or("it holds no <VTKFile> element")?;
@@ -211,8 +288,14 @@ fn close(piece: Option<Open>, contents: Option<&mut Contents>) -> Result<(), Str
         return Ok(());
     }
     let points = piece.points.ok_or("a piece has no points")?;
-    let Open { particles, arrays, cells, .. } = piece;
-    contents.pieces.push(Piece { particles, points, arrays, cells });
+    let cells = piece.lists.into_iter().filter_map(List::cells).collect();
+    contents.pieces.push(Piece {
+        particles: piece.particles,
+        points,
+        arrays: piece.arrays,
+        cells,
+        cell_arrays: piece.cell_arrays,
+    });
     Ok(())
 }
 
@@ -290,6 +373,35 @@ fn appended(tag: &Tag, bytes: &[u8], from: usize) -> Result<Appended, String> {
 pub(super) struct Listed {
     pub(super) time: Option<f64>,
     pub(super) file: String,
+}
+
+/// The files that a `.pvtu`, `.pvtp`, `.vtm` or `.vtmb` file lists.
+pub(super) fn members(bytes: &[u8]) -> Result<Vec<String>, String> {
+    let mut reader = Reader::from_reader(bytes);
+    let mut listed = vec![];
+    loop {
+        let event = reader
+            .read_event()
+            .map_err(|cause| format!("bad XML at byte {}: {cause}", reader.error_position()))?;
+        match event {
+            Event::Start(element) | Event::Empty(element) => {
+                let key = match element.name().as_ref() {
+                    b"Piece" if !is_block(&Tag::new(&element)?) => "Source",
+                    b"DataSet" => "file",
+                    _ => continue,
+                };
+                // A block without a file is empty.
+                listed.extend(Tag::new(&element)?.get(key).map(str::to_owned));
+            }
+            Event::Eof => return Ok(listed),
+            _ => (),
+        }
+    }
+}
+
+/// Whether a piece of a list of blocks is a block itself, which lists its files within.
+fn is_block(tag: &Tag) -> bool {
+    tag.get("Source").is_none()
 }
 
 /// The files that a `.pvd` file lists.
