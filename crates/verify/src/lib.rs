@@ -88,7 +88,7 @@ pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Upd
 pub use score::{
     AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Input,
     Integrated, IntegratedOrders, Judgement, LawRow, LawVerdict, Points, Quantity, Remark,
-    Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, against,
+    Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, Times, against,
     compare_recordings, score,
 };
 pub use stability::{

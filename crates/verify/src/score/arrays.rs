@@ -57,69 +57,122 @@ impl Role {
         self.usual_names()[0]
     }
 
-    /// The names under which programs write it, the likeliest first.
+    /// The names under which programs write it, the likeliest first. Names of up to two letters are meant letter by letter; longer
+    /// ones in any case, with and without underscores.
     #[must_use]
     pub fn usual_names(self) -> &'static [&'static str] {
         match self {
             Self::Displacement => &[
                 "displacement",
-                "Displacement",
                 "displacements",
-                "Displacements",
-                "DISPLACEMENT",
                 "disp",
-                "Disp",
+                "displ",
                 "u",
                 "U",
-                "MP_DISPLACEMENT",
+                "d",
+                "D",
+                "mp_displacement",
+                "total_displacement",
+                "displacement_vector",
+                "nodal_displacement",
+                "u_h",
+                "uh",
+                "f_displacement",
             ],
-            Self::Velocity => {
-                &["velocity", "Velocity", "velocities", "VELOCITY", "vel", "v", "V", "MP_VELOCITY"]
+            Self::Velocity => &[
+                "velocity",
+                "velocities",
+                "vel",
+                "v",
+                "V",
+                "mp_velocity",
+                "velocity_vector",
+                "v_h",
+            ],
+            Self::DeformationGradient => {
+                &["deformation_gradient", "defgrad", "def_grad", "F", "mp_deformation_gradient"]
             }
-            Self::DeformationGradient => &[
-                "deformation_gradient",
-                "DeformationGradient",
-                "Deformation_Gradient",
-                "DEFORMATION_GRADIENT",
-                "defgrad",
-                "F",
-            ],
             Self::FirstPiolaKirchhoff => &[
                 "first_piola_kirchhoff",
-                "FirstPiolaKirchhoff",
                 "first_piola_kirchhoff_stress",
-                "PK1",
                 "pk1",
+                "pk1_stress",
+                "first_pk_stress",
                 "P",
+                "piola_stress",
             ],
             Self::Cauchy => &[
                 "cauchy",
                 "cauchy_stress",
-                "CauchyStress",
-                "Cauchy_Stress",
                 "stress",
-                "Stress",
+                "stresses",
                 "sigma",
-                "MP_CAUCHY_STRESS_VECTOR",
+                "S",
+                "s",
+                "mp_cauchy_stress_vector",
+                "mp_cauchy_stress",
+                "stress_tensor",
+                "cauchy_stress_tensor",
             ],
-            Self::Kirchhoff => {
-                &["kirchhoff", "kirchhoff_stress", "KirchhoffStress", "Kirchhoff_Stress", "tau"]
+            Self::Kirchhoff => &["kirchhoff", "kirchhoff_stress", "tau"],
+            Self::VolumeRatio => {
+                &["J", "jacobian", "detF", "det_deformation_gradient", "volume_ratio"]
             }
-            Self::VolumeRatio => &["J", "jacobian", "Jacobian", "detF", "volume_ratio"],
-            Self::Density => &["density", "Density", "DENSITY", "rho", "MP_DENSITY"],
+            Self::Density => &["density", "rho", "mp_density", "mass_density"],
             Self::ReferencePosition => &[
                 "reference_position",
-                "initial_position",
-                "ReferencePosition",
-                "InitialPosition",
                 "reference_positions",
+                "initial_position",
                 "initial_positions",
+                "reference_coordinates",
+                "initial_coordinates",
                 "X",
                 "X0",
                 "x0",
+                "original_position",
             ],
-            Self::Id => &["id", "ID", "Id", "particle_id", "ParticleId", "ParticleID", "pid"],
+            Self::Id => &[
+                "id",
+                "ID",
+                "ids",
+                "particle_id",
+                "global_node_id",
+                "global_node_ids",
+                "vtkOriginalPointIds",
+                "vtkOriginalCellIds",
+                "node_id",
+                "node_ids",
+                "point_id",
+                "point_ids",
+                "global_id",
+                "global_ids",
+                "element_id",
+                "cell_id",
+                "mp_id",
+                "particle_index",
+                "index",
+                "tag",
+                "pid",
+                "nid",
+            ],
         }
+    }
+
+    /// The likeliest of some arrays to be it, which has as many components as it can have.
+    pub(super) fn find<const D: usize>(self, arrays: &[ArrayHead]) -> Option<&ArrayHead> {
+        self.named(arrays).find(|array| self.admits::<D>(array.components))
+    }
+
+    /// The arrays that have a usual name, the likeliest first: those that have it letter by letter before others.
+    fn named(self, arrays: &[ArrayHead]) -> impl Iterator<Item = &ArrayHead> {
+        let names = self.usual_names();
+        let exact =
+            names.iter().flat_map(|name| arrays.iter().filter(move |array| array.name == *name));
+        let alike = names.iter().filter(|name| plain(name).len() > 2).flat_map(|name| {
+            let name = plain(name);
+            arrays.iter().filter(move |array| plain(&array.name) == name)
+        });
+        exact.chain(alike)
     }
 
     /// Whether an array of so many components can be it in `D` dimensions.
@@ -158,6 +211,12 @@ impl fmt::Display for Role {
     }
 }
 
+/// A name in small letters without signs between its words.
+fn plain(name: &str) -> String {
+    let is_letter = |letter: &char| !['_', ' ', '-', '.'].contains(letter);
+    name.chars().filter(is_letter).flat_map(char::to_lowercase).collect()
+}
+
 /// The array for each role that a recording has, by its first frame.
 pub(super) struct Chosen(BTreeMap<Role, ArrayHead>);
 
@@ -189,10 +248,8 @@ impl Chosen {
                 chosen.insert(role, array.clone());
                 continue;
             }
-            let mut found =
-                role.usual_names().iter().filter_map(|name| snapshot.array(name)).peekable();
-            let first = found.peek().copied();
-            match (found.find(|array| role.admits::<D>(array.components)), first) {
+            let arrays = snapshot.arrays();
+            match (role.find::<D>(arrays), role.named(arrays).next()) {
                 (Some(array), _) => {
                     chosen.insert(role, array.clone());
                 }
@@ -229,30 +286,7 @@ impl Chosen {
                 remarks.note("few-digits", false, what);
             }
         }
-        let has_stress =
-            [Role::Cauchy, Role::Kirchhoff].iter().any(|role| chosen.contains_key(role));
-        let missing: Vec<_> =
-            [Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff]
-                .into_iter()
-                .filter(|role| !chosen.contains_key(role))
-                .filter(|role| !(has_stress && *role == Role::FirstPiolaKirchhoff))
-                .collect();
-        let taken: BTreeSet<_> = chosen.values().map(|array| array.name.as_str()).collect();
-        let left: Vec<_> = snapshot
-            .arrays()
-            .iter()
-            .map(|array| array.name.as_str())
-            .filter(|name| !taken.contains(name) && *name != POINTS)
-            .collect();
-        if let (Some(role), Some(name)) = (missing.first(), left.first()) {
-            let roles: Vec<_> = missing.iter().map(|role| role.name()).collect();
-            let what = format!(
-                "no array is known to be {}; arrays that are not taken: {}; --map {role}={name} would take one",
-                roles.join(", "),
-                shortened(&left)
-            );
-            remarks.note("not-compared", false, what);
-        }
+        remarks_on_absent::<D>(snapshot, &chosen, remarks);
         Ok(Self(chosen))
     }
 
@@ -262,6 +296,37 @@ impl Chosen {
 
     pub(super) fn name(&self, role: Role) -> Option<&str> {
         self.head(role).map(|array| array.name.as_str())
+    }
+}
+
+/// Tells of arrays that may be a field that is compared, and are not taken.
+fn remarks_on_absent<const D: usize>(
+    snapshot: &Snapshot,
+    chosen: &BTreeMap<Role, ArrayHead>,
+    remarks: &mut Remarks,
+) {
+    let has_stress = [Role::Cauchy, Role::Kirchhoff].iter().any(|role| chosen.contains_key(role));
+    let taken: BTreeSet<_> = chosen.values().map(|array| array.name.as_str()).collect();
+    let is_free = |array: &&ArrayHead| !taken.contains(array.name.as_str()) && array.name != POINTS;
+    let left: Vec<_> = snapshot.arrays().iter().filter(is_free).collect();
+    let mut pairs = vec![];
+    for role in [Role::Velocity, Role::DeformationGradient, Role::FirstPiolaKirchhoff] {
+        if chosen.contains_key(&role) || has_stress && role == Role::FirstPiolaKirchhoff {
+            continue;
+        }
+        // In one dimension any number would do, its time and its identity too.
+        let fits = |array: &&&ArrayHead| D > 1 && role.admits::<D>(array.components);
+        pairs.extend(left.iter().find(fits).map(|array| (role, array.name.as_str())));
+    }
+    if let Some((role, name)) = pairs.first() {
+        let roles: Vec<_> = pairs.iter().map(|(role, _)| role.name()).collect();
+        let names: Vec<_> = left.iter().map(|array| array.name.as_str()).collect();
+        let what = format!(
+            "no array is known to be {}; arrays that are not taken: {}; --map {role}={name} would take one",
+            roles.join(", "),
+            shortened(&names)
+        );
+        remarks.note("not-compared", false, what);
     }
 }
 

@@ -98,18 +98,23 @@ pub enum ScoreError {
     },
     /// A frame does not tell its time.
     #[error(
-        "{}: nothing tells its time: list the frames with times in a .pvd file, write a field TimeValue, or a \
-         column t, or give --time for a single frame", path.display()
+        "{}: nothing tells its time: give --times T,... with a time for each frame, --times-from FILE with a file that lists them, or \
+         --frame-step DT; or list the frames with times in a .pvd file, or write a field TimeValue or a column t", path.display()
     )]
     NoTime {
         /// The file.
         path: PathBuf,
     },
-    /// One time is given for several frames.
-    #[error("--time is for a single frame; {} holds {frames}", path.display())]
-    OneTime {
+    /// There are other numbers of times and of frames.
+    #[error(
+        "there are {times} time(s) for the {frames} frame(s) of {}: give one for each frame, the same for all recordings \
+         (--times T,...), or --frame-step DT", path.display()
+    )]
+    OtherTimes {
         /// The recording.
         path: PathBuf,
+        /// The times that are given.
+        times: usize,
         /// Its frames.
         frames: usize,
     },

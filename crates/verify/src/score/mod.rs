@@ -33,7 +33,7 @@ pub use findings::Remark;
 pub use integrated::{Integrated, IntegratedOrders};
 pub use judgement::{Convergence, Judgement};
 pub use law::{Deformation, LawRow, LawVerdict};
-pub use options::{Input, Points, Resolution, ScoreOptions};
+pub use options::{Input, Points, Resolution, ScoreOptions, Times};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
 

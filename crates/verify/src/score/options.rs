@@ -22,6 +22,18 @@ pub enum Points {
     Reference,
 }
 
+/// The times of the frames of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Times {
+    /// The files tell them: a `.pvd` list, a field, a column, or their names.
+    #[default]
+    Told,
+    /// One for each frame, the same in all recordings.
+    At(Vec<f64>),
+    /// The frame with the number `k`, from zero on, is at `k` times this.
+    Step(f64),
+}
+
 /// How to read the files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScoreOptions {
@@ -29,8 +41,8 @@ pub struct ScoreOptions {
     pub map: BTreeMap<Role, String>,
     /// What the points are.
     pub points: Points,
-    /// The time of recordings with a single frame, where the files do not tell it.
-    pub time: Option<f64>,
+    /// The times of the frames.
+    pub times: Times,
     /// By how much velocities lag behind their frame's time, where the files do not tell it.
     pub velocity_lag: f64,
     /// The number of the solution's periods that frames may lie in, from time zero.
@@ -48,7 +60,7 @@ impl Default for ScoreOptions {
         Self {
             map: BTreeMap::new(),
             points: Points::Auto,
-            time: None,
+            times: Times::Told,
             velocity_lag: 0.0,
             periods: 1.0,
             provenance: None,

@@ -23,6 +23,14 @@ pub struct FrameFile {
     /// The time that a `.pvd` list, a column of a CSV file or a dump gives it.
     pub time: Option<f64>,
     pub(super) source: Source,
+    pub(super) location: Location,
+}
+
+/// Where the arrays live that are offered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Location {
+    Points,
+    CellCentres,
 }
 
 /// Where a frame is read from.
@@ -40,7 +48,13 @@ pub(super) enum Source {
 
 impl FrameFile {
     fn single(path: PathBuf) -> Self {
-        Self { path, time: None, source: Source::File }
+        Self { path, time: None, source: Source::File, location: Location::Points }
+    }
+
+    /// The frame with its cells for particles: at their centres, with the arrays over cells. A table has no cells and stays.
+    #[must_use]
+    pub fn at_cell_centres(self) -> Self {
+        Self { location: Location::CellCentres, ..self }
     }
 }
 
@@ -245,6 +259,7 @@ fn rows(path: &Path) -> Result<(Arc<Table>, Vec<FrameFile>), ReadError> {
         path: path.to_owned(),
         time: rows.time,
         source: Source::Rows(Arc::clone(&table), index),
+        location: Location::Points,
     };
     let frames = table.frames.iter().enumerate().map(frame).collect();
     Ok((table, frames))

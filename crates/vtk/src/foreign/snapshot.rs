@@ -8,7 +8,7 @@ use crate::Provenance;
 
 use super::components::{Joined, POINTS, join};
 use super::contents::{Contents, Entry, Piece};
-use super::frames::{FrameFile, PARTED, Source};
+use super::frames::{FrameFile, Location, PARTED, Source};
 use super::mesh::Mesh;
 use super::numbers::{Kind, Number};
 use super::table::Table;
@@ -63,13 +63,6 @@ struct OpenFile {
     contents: Contents,
 }
 
-/// Where the arrays live that are offered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Location {
-    Points,
-    CellCentres,
-}
-
 impl Location {
     fn arrays(self, piece: &Piece) -> &[Entry] {
         match self {
@@ -97,6 +90,10 @@ impl OpenFile {
         let contents =
             contents.map_err(|cause| ReadError::Malformed { path: path.to_owned(), cause })?;
         Ok(Self { path: path.to_owned(), bytes, contents })
+    }
+
+    fn pieces(&self) -> impl Iterator<Item = (&Self, &Piece)> {
+        self.contents.pieces.iter().map(move |piece| (self, piece))
     }
 
     fn particles(&self) -> Result<usize, ReadError> {
@@ -143,74 +140,19 @@ fn members(path: &Path, depth: usize, all: &mut Vec<PathBuf>) -> Result<(), Read
 }
 
 impl Files {
-    fn open(paths: &[PathBuf], must_share: bool) -> Result<Self, ReadError> {
+    fn open(paths: &[PathBuf], must_share: bool, location: Location) -> Result<Self, ReadError> {
         let mut all = vec![];
         for path in paths {
             members(path, 0, &mut all)?;
         }
         let files = all.iter().map(|path| OpenFile::open(path)).collect::<Result<Vec<_>, _>>()?;
         let share_points = shares_points(&files, must_share)?;
-        let mut files =
-            Self { files, share_points, location: Location::Points, raw: vec![], joined: vec![] };
-        files.find_arrays()?;
-        Ok(files)
+        let (raw, joined) = arrays(&files, share_points, location)?;
+        Ok(Self { files, share_points, location, raw, joined })
     }
 
     fn pieces(&self) -> impl Iterator<Item = (&OpenFile, &Piece)> {
-        self.files
-            .iter()
-            .flat_map(|file| file.contents.pieces.iter().map(move |piece| (file, piece)))
-    }
-
-    /// Finds the arrays that all parts have, and joins scalars.
-    fn find_arrays(&mut self) -> Result<(), ReadError> {
-        let mut found: HashMap<&str, (usize, usize)> = HashMap::new();
-        let mut order: Vec<&Entry> = vec![];
-        let mut pieces = 0;
-        let mut dimension = None;
-        for (file, piece) in self.pieces() {
-            if *dimension.get_or_insert(piece.points.components) != piece.points.components {
-                let cause = "its pieces have points of different dimension".into();
-                return Err(ReadError::Malformed { path: file.path.clone(), cause });
-            }
-            pieces += 1;
-            for entry in self.location.arrays(piece) {
-                let (components, count) = found.entry(&entry.name).or_insert_with(|| {
-                    order.push(entry);
-                    (entry.components, 0)
-                });
-                *count += usize::from(*components == entry.components);
-            }
-        }
-        // Arrays that only some pieces have, or in different shape, are none over all particles.
-        let is_whole = |entry: &&Entry| self.share_points || found[entry.name.as_str()].1 == pieces;
-        let raw = |entry: &Entry| Raw {
-            name: entry.name.clone(),
-            components: entry.components,
-            is_single: entry.kind == Kind::F32,
-        };
-        let raw: Vec<_> = order.into_iter().filter(is_whole).map(raw).collect();
-        let heads: Vec<_> = raw.iter().map(|raw| (raw.name.as_str(), raw.components)).collect();
-        self.joined = join(&heads).0;
-        // The points of the file are its positions.
-        self.joined
-            .retain(|array| array.name != POINTS || heads.iter().any(|(name, _)| *name == POINTS));
-        self.raw = raw;
-        Ok(())
-    }
-
-    fn heads(&self) -> Vec<ArrayHead> {
-        let head = |array: &Joined| ArrayHead {
-            name: array.name.clone(),
-            components: array.components.len(),
-            is_single: array
-                .components
-                .iter()
-                .flatten()
-                .any(|source| self.raw[source.array].is_single),
-            digits: None,
-        };
-        self.joined.iter().map(head).collect()
+        self.files.iter().flat_map(OpenFile::pieces)
     }
 
     /// The number of points, or of cells where those are offered.
@@ -310,6 +252,56 @@ impl Files {
     }
 }
 
+/// The arrays that all parts of the particles have, and those that they make.
+fn arrays(
+    files: &[OpenFile],
+    share_points: bool,
+    location: Location,
+) -> Result<(Vec<Raw>, Vec<Joined>), ReadError> {
+    let mut found: HashMap<&str, (usize, usize)> = HashMap::new();
+    let mut order: Vec<&Entry> = vec![];
+    let mut pieces = 0;
+    let mut dimension = None;
+    for (file, piece) in files.iter().flat_map(OpenFile::pieces) {
+        if *dimension.get_or_insert(piece.points.components) != piece.points.components {
+            let cause = "its pieces have points of different dimension".into();
+            return Err(ReadError::Malformed { path: file.path.clone(), cause });
+        }
+        pieces += 1;
+        for entry in location.arrays(piece) {
+            let (components, count) = found.entry(&entry.name).or_insert_with(|| {
+                order.push(entry);
+                (entry.components, 0)
+            });
+            *count += usize::from(*components == entry.components);
+        }
+    }
+    // Arrays that only some pieces have, or in different shape, are none over all particles.
+    let is_whole = |entry: &&Entry| share_points || found[entry.name.as_str()].1 == pieces;
+    let raw = |entry: &Entry| Raw {
+        name: entry.name.clone(),
+        components: entry.components,
+        is_single: entry.kind == Kind::F32,
+    };
+    let raw: Vec<_> = order.into_iter().filter(is_whole).map(raw).collect();
+    let heads: Vec<_> = raw.iter().map(|raw| (raw.name.as_str(), raw.components)).collect();
+    let mut joined = join(&heads).0;
+    // The points of the file are its positions.
+    joined.retain(|array| array.name != POINTS || heads.iter().any(|(name, _)| *name == POINTS));
+    Ok((raw, joined))
+}
+
+/// The facts of arrays that scalars and others make.
+fn heads(raw: &[Raw], joined: &[Joined]) -> Vec<ArrayHead> {
+    let head = |array: &Joined| ArrayHead {
+        name: array.name.clone(),
+        components: array.components.len(),
+        is_single: array.components.iter().flatten().any(|source| raw[source.array].is_single),
+        digits: None,
+    };
+    joined.iter().map(head).collect()
+}
+
 /// Whether several files hold the same points; an error where they must and do not.
 fn shares_points(files: &[OpenFile], must_share: bool) -> Result<bool, ReadError> {
     let [first, others @ ..] = files else { return Ok(false) };
@@ -358,44 +350,23 @@ impl Snapshot {
                 let data = Data::Table { table: Arc::clone(table), frame: *index };
                 return Ok(Self { path, particles, arrays, data });
             }
-            Source::File => Files::open(std::slice::from_ref(&path), false)?,
-            Source::Parts(paths) => Files::open(paths, false)?,
-            Source::Attributes(paths) => Files::open(paths, true)?,
+            Source::File => Files::open(std::slice::from_ref(&path), false, frame.location)?,
+            Source::Parts(paths) => Files::open(paths, false, frame.location)?,
+            Source::Attributes(paths) => Files::open(paths, true, frame.location)?,
         };
-        Self::of_files(path, files)
-    }
-
-    fn of_files(path: PathBuf, files: Files) -> Result<Self, ReadError> {
-        let (particles, arrays) = (files.count()?, files.heads());
+        let (particles, arrays) = (files.count()?, heads(&files.raw, &files.joined));
         Ok(Self { path, particles, arrays, data: Data::Files(files) })
     }
 
-    /// The same instant with the cells for particles: their centres, which are the means of their nodes, and the arrays over cells.
-    /// Without cells, as in a table, nothing changes.
-    ///
-    /// # Errors
-    ///
-    /// [`ReadError`] where the pieces of the file do not fit together.
-    pub fn at_cell_centres(self) -> Result<Self, ReadError> {
-        match self.data {
-            Data::Files(mut files) => {
-                files.location = Location::CellCentres;
-                files.find_arrays()?;
-                Self::of_files(self.path, files)
-            }
-            Data::Table { .. } => Ok(self),
-        }
-    }
-
-    /// The names and sizes of the arrays over cells; empty where those are offered already, and for a table.
+    /// The arrays over cells; empty where those are offered already, for a table, and where the pieces do not fit together.
     #[must_use]
-    pub fn cell_arrays(&self) -> Vec<(&str, usize)> {
+    pub fn cell_arrays(&self) -> Vec<ArrayHead> {
         let Data::Files(files) = &self.data else { return vec![] };
-        if files.location == Location::CellCentres {
-            return vec![];
+        let of_cells = arrays(&files.files, files.share_points, Location::CellCentres);
+        match of_cells {
+            Ok((raw, joined)) if files.location == Location::Points => heads(&raw, &joined),
+            _ => vec![],
         }
-        let entries = files.pieces().next().map_or(&[][..], |(_, piece)| &piece.cell_arrays);
-        entries.iter().map(|entry| (entry.name.as_str(), entry.components)).collect()
     }
 
     /// The cells over the points; `None` where there are none but points, as in files of particles.
