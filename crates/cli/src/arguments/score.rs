@@ -32,6 +32,15 @@ pub(crate) struct ScoreOptions {
     /// Time of a single frame that does not state it
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) time: Option<f64>,
+    /// Times of the frames that do not tell them, one for each frame, the same for all recordings
+    #[arg(long, value_name = "T,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = finite_number, conflicts_with_all = ["time", "times_from", "frame_step"])]
+    pub(crate) times: Vec<f64>,
+    /// Times of the frames from a file: its column time or t, or plain numbers
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["time", "frame_step"])]
+    pub(crate) times_from: Option<PathBuf>,
+    /// Time from each frame to the next; the first frame is at t = 0
+    #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "time")]
+    pub(crate) frame_step: Option<f64>,
     /// Time by which velocities lag behind their frame: half a time step in staggered schemes
     #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) velocity_lag: f64,

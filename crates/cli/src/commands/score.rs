@@ -11,8 +11,9 @@ use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Agreement, Case, Input, ORDER_TOLERANCE, Scheme, Score, ScoreOptions as Reading, ScoreRow,
-    Start, Stepping, Updated, against, compare_recordings, score as measure,
+    Start, Stepping, Times, Updated, against, compare_recordings, score as measure,
 };
+use mmsmith_vtk::foreign::column;
 use serde_json::json;
 
 use super::{blind, with_threads};
@@ -48,13 +49,25 @@ fn reading(selection: &Selection, options: &ScoreOptions) -> Result<Reading> {
     Ok(Reading {
         map,
         points: options.points.into(),
-        time: options.time,
+        times: times(options)?,
         velocity_lag: options.velocity_lag,
         periods: options.periods,
         provenance: Some(selection.provenance()),
         expected: options.expect.as_deref().map_or(Ok(BTreeMap::new()), expect::of_recordings)?,
         tolerance: options.tolerance.unwrap_or(ORDER_TOLERANCE),
     })
+}
+
+/// The times of the frames, where options give them.
+fn times(options: &ScoreOptions) -> Result<Times> {
+    if let Some(file) = &options.times_from {
+        return Ok(Times::At(column(file)?));
+    }
+    if let Some(step) = options.frame_step {
+        return Ok(Times::Step(step));
+    }
+    let times: Vec<f64> = options.time.iter().chain(&options.times).copied().collect();
+    Ok(if times.is_empty() { Times::Told } else { Times::At(times) })
 }
 
 /// The recordings against the exact solution; whether nothing failed.

@@ -67,7 +67,7 @@ pub enum ScoreError {
     /// Nothing tells displacements.
     #[error(
         "{}: nothing tells displacements: give an array of displacements or of reference positions \
-         (--map displacement=NAME or --map reference_position=NAME), or more than one frame (arrays there are: {there})", path.display()
+         (--map displacement=NAME or --map reference_position=NAME), or several frames with points that move (arrays there are: {there})", path.display()
     )]
     NoDisplacement {
         /// The file.

@@ -243,5 +243,7 @@ fn measured<const D: usize>(
             .fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
         (sum / count).sqrt()
     };
-    Ok(Measured { reference: rms(&|x, _| *x), current: rms(&|x, u| x - u), is_mesh: false })
+    // Cells that cannot be decoded tell nothing.
+    let is_mesh = snapshot.mesh().is_ok_and(|mesh| mesh.is_some());
+    Ok(Measured { reference: rms(&|x, _| *x), current: rms(&|x, u| x - u), is_mesh })
 }

@@ -12,7 +12,7 @@ use super::arrays::{Chosen, Role, there};
 use super::error::ScoreError;
 use super::findings::Remarks;
 use super::found::Found;
-use super::times::Timed;
+use super::times::{Timed, open};
 use super::vectors::positions;
 
 /// Steps of Newton's method from a position back to its reference position.
@@ -52,13 +52,24 @@ pub(super) fn scheme<const D: usize>(
     if displacement.is_some() {
         return Ok(if is_at_rest { Scheme::PointsAtRest } else { Scheme::Recovered });
     }
-    if timed.len() < 2 {
+    if timed.len() < 2 || stay(timed, first)? {
         return Err(ScoreError::NoDisplacement {
             path: first.path().to_owned(),
             there: there(first),
         });
     }
     trace(exact, &timed[0], first, chosen, remarks)
+}
+
+/// Whether no point moves in any frame, to the bit: a mesh whose displacements have an unknown name.
+fn stay(timed: &[Timed], first: &Snapshot) -> Result<bool, ScoreError> {
+    let positions = first.positions()?;
+    for frame in &timed[1..] {
+        if open(&frame.file)?.positions()? != positions {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Finds the reference positions behind the positions of the first frame.
