@@ -7,7 +7,9 @@ use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::ParameterOptions;
-use super::values::{finite_number, peer, positive_count, positive_number, role, thread_count};
+use super::values::{
+    axis, finite_number, peer, positive_count, positive_number, role, thread_count,
+};
 
 /// Where another solver's output is, and how it is to be read.
 #[derive(Args)]
@@ -41,6 +43,21 @@ pub(crate) struct ScoreOptions {
     /// Time from each frame to the next; the first frame is at t = 0
     #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive_number, conflicts_with = "time")]
     pub(crate) frame_step: Option<f64>,
+    /// Place of the solution's origin in the files, in the solution's unit of length
+    #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) origin: Vec<f64>,
+    /// Unit of lengths in the files, in that of the solution: 0.001 for millimetres beside metres
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) length_unit: f64,
+    /// Unit of times in the files, in that of the solution: 0.001 for milliseconds beside seconds
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) time_unit: f64,
+    /// Axes of the files that are the solution's, such as x,z. Default: x,y,z, as many as there are dimensions
+    #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = axis)]
+    pub(crate) axes: Vec<usize>,
+    /// Leave out points outside the body, such as particles of walls
+    #[arg(long)]
+    pub(crate) inside: bool,
     /// Time by which velocities lag behind their frame: half a time step in staggered schemes
     #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) velocity_lag: f64,

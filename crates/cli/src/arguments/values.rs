@@ -75,6 +75,13 @@ pub(super) fn finite_number(text: &str) -> Result<f64, String> {
     }
 }
 
+pub(super) fn axis(text: &str) -> Result<usize, String> {
+    ["x", "y", "z"]
+        .iter()
+        .position(|axis| text.eq_ignore_ascii_case(axis))
+        .ok_or_else(|| "expected x, y or z, such as --axes x,z".into())
+}
+
 pub(super) fn role(text: &str) -> Result<(verify::Role, String), String> {
     let roles = || verify::Role::ALL.map(verify::Role::name).join(", ");
     let form = || format!("expected ROLE=NAME, such as displacement=disp; roles: {}", roles());

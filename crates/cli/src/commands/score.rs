@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Agreement, Case, Input, ORDER_TOLERANCE, Scheme, Score, ScoreOptions as Reading, ScoreRow,
-    Start, Stepping, Times, Updated, against, compare_recordings, score as measure,
+    Agreement, Case, Input, ORDER_TOLERANCE, Placing, Remark, Scheme, Score,
+    ScoreOptions as Reading, ScoreRow, Start, Stepping, Times, Updated, against,
+    compare_recordings, score as measure,
 };
 use mmsmith_vtk::foreign::column;
 use serde_json::json;
@@ -50,7 +51,14 @@ fn reading(selection: &Selection, options: &ScoreOptions) -> Result<Reading> {
         map,
         points: options.points.into(),
         times: times(options)?,
-        velocity_lag: options.velocity_lag,
+        placing: Placing {
+            origin: options.origin.clone(),
+            length_unit: options.length_unit,
+            time_unit: options.time_unit,
+            velocity_unit: None,
+            axes: options.axes.clone(),
+            inside: options.inside,
+        },
         periods: options.periods,
         provenance: Some(selection.provenance()),
         expected: options.expect.as_deref().map_or(Ok(BTreeMap::new()), expect::of_recordings)?,
@@ -80,19 +88,57 @@ fn scored(
     output: Option<Output>,
 ) -> Result<bool> {
     let mut score = measure(exact, inputs, how)?;
-    if let Some((row, remark)) = advice::suggestion(selection, inputs, how, &score) {
+    let set = &options.parameters.set;
+    if let Some(name) = advice::density_one(selection, exact, set, inputs, how, &score) {
+        return at_density_one(options, selection, &name, inputs, how, output);
+    }
+    if let Some((row, remark)) = advice::suggestion(selection, exact, inputs, how, &score) {
         score.rows[row].findings.push(remark);
     }
+    tell(options, selection, exact, &score, how, output)
+}
+
+/// The same with density one, which the recordings have and nobody has set.
+fn at_density_one(
+    options: &ScoreOptions,
+    selection: &Selection,
+    name: &str,
+    inputs: &[Input],
+    how: &Reading,
+    output: Option<Output>,
+) -> Result<bool> {
+    let selection = selection.with(&[(name.to_owned(), 1.0)])?;
+    let exact = selection.build()?;
+    let how = Reading { provenance: Some(selection.provenance()), ..how.clone() };
+    let mut score = measure(&exact, inputs, &how)?;
+    let message = format!(
+        "the recordings fit density 1 in every recorded field, and not the solution's own: they are compared with {name} = 1 \
+         (--set {name}=1)"
+    );
+    let remark = Remark { kind: "density-one", is_problem: false, count: 1, frames: 0, message };
+    score.rows[0].findings.push(remark);
+    tell(options, &selection, &exact, &score, &how, output)
+}
+
+/// Prints and writes the comparison; whether nothing failed.
+fn tell(
+    options: &ScoreOptions,
+    selection: &Selection,
+    exact: &AnySolution<f64>,
+    score: &Score,
+    how: &Reading,
+    output: Option<Output>,
+) -> Result<bool> {
     // Before anything is said: what cannot be compared is refused.
-    let agreements = agreements(options, exact, &score, how)?;
-    terminal::say(&text::text(selection, &score))?;
+    let agreements = agreements(options, exact, score, how)?;
+    terminal::say(&text::text(selection, score))?;
     for (row, agreement) in score.rows.iter().zip(&agreements) {
         terminal::say(&text::of_agreement(options, row, agreement))?;
     }
     let blind = blind::measure(selection)?;
-    terminal::say(&(text::verdict(&score) + &blind::text(&blind)))?;
+    terminal::say(&(text::verdict(score) + &blind::text(&blind)))?;
     if let Some(output) = output {
-        let mut document = document::document(selection, options, &score);
+        let mut document = document::document(selection, options, score);
         document["blind_spots"] = json!(blind);
         if !agreements.is_empty() {
             document["against"] = json!(agreements);

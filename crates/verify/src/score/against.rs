@@ -112,8 +112,11 @@ pub fn against(
     if run.status != Status::Ok {
         return Err(AgainstError::Stopped { file: row.file.clone(), status: run.status });
     }
-    let input =
-        Input { paths: vec![folder.to_owned()], resolution: super::Resolution::Cells(case.cells) };
+    let input = Input {
+        paths: vec![folder.to_owned()],
+        resolution: super::Resolution::Cells(case.cells),
+        velocity_lag: 0.0,
+    };
     let own = ScoreOptions { periods: options.periods, ..ScoreOptions::default() };
     let mut scored = score(exact, &[input], &own)?;
     let errors = std::mem::take(&mut scored.rows[0].errors);

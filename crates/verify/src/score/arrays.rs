@@ -350,16 +350,18 @@ fn shortened(names: &[&str]) -> String {
     }
 }
 
-/// One vector a particle; components beyond `D`, which must vanish, are counted where they do not.
+/// One vector a particle, of the components along `axes`; particles with other components that do not vanish are counted.
 pub(super) fn vectors<const D: usize>(
     flat: &[f64],
     components: usize,
+    axes: [usize; D],
 ) -> (Vec<SVector<f64, D>>, Option<(usize, usize)>) {
     let mut beyond: Option<(usize, usize)> = None;
     let mut vectors = Vec::with_capacity(flat.len() / components.max(1));
+    let others: Vec<usize> = (0..components).filter(|axis| !axes.contains(axis)).collect();
     for (index, row) in flat.chunks_exact(components).enumerate() {
-        vectors.push(SVector::from_fn(|i, _| row[i]));
-        if row[D..].iter().any(|value| *value != 0.0) {
+        vectors.push(SVector::from_fn(|i, _| row[axes[i]]));
+        if others.iter().any(|axis| row[*axis] != 0.0) {
             let (count, first) = beyond.unwrap_or((0, index));
             beyond = Some((count + 1, first));
         }
@@ -367,9 +369,12 @@ pub(super) fn vectors<const D: usize>(
     (vectors, beyond)
 }
 
-/// One matrix a particle from its rows, or from the different components of a symmetric one; of three dimensions the first `D`
-/// rows and columns.
-pub(super) fn matrices<const D: usize>(flat: &[f64], components: usize) -> Vec<SMatrix<f64, D, D>> {
+/// One matrix a particle from its rows, or from the different components of a symmetric one; the rows and columns of `axes`.
+pub(super) fn matrices<const D: usize>(
+    flat: &[f64],
+    components: usize,
+    axes: [usize; D],
+) -> Vec<SMatrix<f64, D, D>> {
     let place = |i: usize, j: usize| match (components, i.min(j), i.max(j)) {
         (9, ..) => 3 * i + j,
         (3 | 6, i, j) if i == j => i,
@@ -378,7 +383,8 @@ pub(super) fn matrices<const D: usize>(flat: &[f64], components: usize) -> Vec<S
         (6, i, j) => [3, 5, 4][i + j - 1],
         _ => D * i + j,
     };
-    flat.chunks_exact(components).map(|row| SMatrix::from_fn(|i, j| row[place(i, j)])).collect()
+    let matrix = |row: &[f64]| SMatrix::from_fn(|i, j| row[place(axes[i], axes[j])]);
+    flat.chunks_exact(components).map(matrix).collect()
 }
 
 /// How many of the particles have a number that is none, and the first of them.
@@ -399,27 +405,32 @@ mod tests {
 
     #[test]
     fn components_beyond_the_dimension_are_counted_unless_zero() {
-        let (vectors, beyond) = vectors::<2>(&[1.0, 2.0, 0.0, 3.0, 4.0, -0.5], 3);
+        let (vectors, beyond) = vectors::<2>(&[1.0, 2.0, 0.0, 3.0, 4.0, -0.5], 3, [0, 1]);
         assert_eq!(vectors, [vector![1.0, 2.0], vector![3.0, 4.0]]);
         assert_eq!(beyond, Some((1, 1)));
+        let (of_xz, beyond) = super::vectors::<2>(&[1.0, 2.0, 0.0, 3.0, 0.0, -0.5], 3, [0, 2]);
+        assert_eq!(of_xz, [vector![1.0, 0.0], vector![3.0, -0.5]]);
+        assert_eq!(beyond, Some((1, 0)));
     }
 
     #[test]
     fn matrices_are_read_row_by_row_from_four_or_nine_components() {
         let expected = matrix![1.0, 2.0; 3.0, 4.0];
-        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0, 4.0], 4), [expected]);
+        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0, 4.0], 4, [0, 1]), [expected]);
         let nine = [1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0];
-        assert_eq!(matrices::<2>(&nine, 9), [expected]);
-        assert_eq!(matrices::<1>(&nine, 9), [matrix![1.0]]);
+        assert_eq!(matrices::<2>(&nine, 9, [0, 1]), [expected]);
+        assert_eq!(matrices::<1>(&nine, 9, [0]), [matrix![1.0]]);
     }
 
     #[test]
     fn symmetric_matrices_are_read_from_their_different_components() {
-        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0], 3), [matrix![1.0, 3.0; 3.0, 2.0]]);
+        assert_eq!(matrices::<2>(&[1.0, 2.0, 3.0], 3, [0, 1]), [matrix![1.0, 3.0; 3.0, 2.0]]);
         let six = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         let full = matrix![1.0, 4.0, 6.0; 4.0, 2.0, 5.0; 6.0, 5.0, 3.0];
-        assert_eq!(matrices::<3>(&six, 6), [full]);
-        assert_eq!(matrices::<2>(&six, 6), [matrix![1.0, 4.0; 4.0, 2.0]]);
+        assert_eq!(matrices::<3>(&six, 6, [0, 1, 2]), [full]);
+        assert_eq!(matrices::<2>(&six, 6, [0, 1]), [matrix![1.0, 4.0; 4.0, 2.0]]);
+        assert_eq!(matrices::<2>(&six, 6, [0, 2]), [matrix![1.0, 6.0; 6.0, 3.0]]);
+        assert_eq!(matrices::<2>(&six, 6, [1, 0]), [matrix![2.0, 4.0; 4.0, 1.0]]);
     }
 
     #[test]

@@ -131,7 +131,7 @@ pub enum ScoreError {
     /// No frame lies in the time in which the solution is looked at.
     #[error(
         "{}: its times, {first:?} to {last:?}, do not overlap the solution's, 0 to {end:?} ({periods} period(s)); \
-         is another unit meant? Longer simulations need --periods", path.display()
+         is another unit meant (--time-unit 0.001 for milliseconds)? Longer simulations need --periods", path.display()
     )]
     NoOverlap {
         /// The recording.
@@ -189,6 +189,27 @@ pub enum ScoreError {
         path: PathBuf,
         /// The other one.
         other: PathBuf,
+    },
+    /// There is not one entry for each axis.
+    #[error("{what} has {found} value(s); the solution has {expected} dimension(s)")]
+    Entries {
+        /// The option.
+        what: &'static str,
+        /// Its values.
+        found: usize,
+        /// The dimensions.
+        expected: usize,
+    },
+    /// An axis of the files is taken twice.
+    #[error(
+        "--axes names an axis twice; it names the file's axis for each axis of the solution, such as --axes x,z"
+    )]
+    RepeatedAxis,
+    /// No particle is left.
+    #[error("{}: no particle lies inside the body; --origin and --length-unit tell where it is", path.display())]
+    NoneInside {
+        /// The file.
+        path: PathBuf,
     },
     /// A number that makes no sense.
     #[error("{what} = {value:?}: it must be {admissible}")]

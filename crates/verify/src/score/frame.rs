@@ -15,17 +15,25 @@ use super::arrays::{Chosen, Role, matrices, vectors};
 use super::error::ScoreError;
 use super::findings::Remarks;
 use super::options::ScoreOptions;
+use super::place::Place;
 use super::reference::{Scheme, Traced};
-use super::vectors::{count_not_finite, judged, place, positions};
+use super::vectors::{
+    Positions, count_not_finite, judged, particle as of_particle, positions, sheets,
+};
 
 /// Share of the body's size by which a reference position may lie outside before it is told.
 const OUTSIDE: f64 = 1e-6;
+
+/// Share of a coordinate across the plane by which it may change, as rounding.
+const SAME_PLACE: f64 = 1e-9;
 
 /// The particles of the first frame, by which later frames are judged.
 #[derive(Default)]
 pub(super) struct Identities {
     particles: usize,
     ids: Option<HashSet<i64>>,
+    /// Their coordinates across the solution's plane or line.
+    across: Vec<f64>,
 }
 
 /// What a frame gives for the comparison.
@@ -59,6 +67,21 @@ impl<const D: usize> FrameData<D> {
         let [F, P, cauchy, kirchhoff] = self.tensors.each_ref().map(Option::is_some);
         let [J, density] = self.scalars.each_ref().map(Option::is_some);
         [true, self.v.is_some(), F, P, cauchy, kirchhoff, J, density]
+    }
+
+    /// The particles for which `kept` is true.
+    fn only(self, kept: &[bool]) -> Self {
+        fn some<T>(all: Vec<T>, kept: &[bool]) -> Vec<T> {
+            all.into_iter().zip(kept).filter(|(_, kept)| **kept).map(|(one, _)| one).collect()
+        }
+        Self {
+            ids: self.ids.map(|ids| some(ids, kept)),
+            X: some(self.X, kept),
+            u: some(self.u, kept),
+            v: self.v.map(|(v, time)| (some(v, kept), time)),
+            tensors: self.tensors.map(|tensor| tensor.map(|all| some(all, kept))),
+            scalars: self.scalars.map(|scalar| scalar.map(|all| some(all, kept))),
+        }
     }
 
     /// The error norms of the frame.
@@ -120,8 +143,10 @@ pub(super) struct FrameReader<'a, const D: usize> {
     pub(super) exact: &'a dyn Solution<f64, D>,
     pub(super) chosen: &'a Chosen,
     pub(super) scheme: &'a Scheme<D>,
+    pub(super) place: Place<D>,
     pub(super) options: &'a ScoreOptions,
     pub(super) has_velocity_times: bool,
+    pub(super) velocity_lag: f64,
     pub(super) remarks: &'a mut Remarks,
     pub(super) first: Identities,
 }
@@ -138,55 +163,118 @@ impl<const D: usize> FrameReader<'_, D> {
             None => None,
         };
         self.identify(snapshot, index, ids.as_deref());
-        let need = |name: Option<Vec<SVector<f64, D>>>, role| {
-            name.ok_or_else(|| ScoreError::Missing {
-                path: snapshot.path().to_owned(),
-                name: self.chosen.name(role).unwrap_or_default().to_owned(),
-            })
+        let (X, u) = self.places(snapshot, index, ids.as_deref())?;
+        let data = FrameData {
+            v: self.velocities(snapshot, time)?,
+            tensors: [
+                self.tensor(Role::DeformationGradient, snapshot)?,
+                self.tensor(Role::FirstPiolaKirchhoff, snapshot)?,
+                self.tensor(Role::Cauchy, snapshot)?,
+                self.tensor(Role::Kirchhoff, snapshot)?,
+            ],
+            scalars: [
+                self.scalar(Role::VolumeRatio, snapshot)?,
+                self.scalar(Role::Density, snapshot)?,
+            ],
+            ids,
+            X,
+            u,
         };
-        let (X, u) = match self.scheme {
+        if self.options.placing.inside {
+            return self.inside_only(data, snapshot);
+        }
+        self.judge_places(&data.X, snapshot);
+        Ok(data)
+    }
+
+    /// Reference positions and displacements.
+    fn places(
+        &mut self,
+        snapshot: &Snapshot,
+        index: usize,
+        ids: Option<&[i64]>,
+    ) -> Result<(Vec<SVector<f64, D>>, Vec<SVector<f64, D>>), ScoreError> {
+        let missing = |role| ScoreError::Missing {
+            path: snapshot.path().to_owned(),
+            name: self.chosen.name(role).unwrap_or_default().to_owned(),
+        };
+        let [no_X, no_u] = [Role::ReferencePosition, Role::Displacement].map(missing);
+        Ok(match self.scheme {
             Scheme::Given { displacement } => {
-                let X =
-                    need(self.vector(Role::ReferencePosition, snapshot)?, Role::ReferencePosition)?;
-                let u = if *displacement {
-                    let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
+                let X = self.vector(Role::ReferencePosition, snapshot)?.ok_or(no_X)?;
+                if *displacement {
+                    let u = self.vector(Role::Displacement, snapshot)?.ok_or(no_u)?;
                     self.hold_against_points(&X, &u, snapshot)?;
-                    u
-                } else {
-                    let x = positions(snapshot, self.remarks)?;
-                    x.iter().zip(&X).map(|(x, X)| x - X).collect()
-                };
-                (X, u)
-            }
-            Scheme::PointsAtRest => {
-                let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
-                (positions(snapshot, self.remarks)?, u)
-            }
-            Scheme::Recovered => {
-                let u = need(self.vector(Role::Displacement, snapshot)?, Role::Displacement)?;
-                let x = positions(snapshot, self.remarks)?;
-                (x.iter().zip(&u).map(|(x, u)| x - u).collect(), u)
-            }
-            Scheme::Traced(traced) => {
-                let x = positions(snapshot, self.remarks)?;
-                let X = self.traced(traced, snapshot, ids.as_deref())?;
+                    return Ok((X, u));
+                }
+                let x = self.points(snapshot, index)?;
                 let u = x.iter().zip(&X).map(|(x, X)| x - X).collect();
                 (X, u)
             }
-        };
-        self.judge_places(&X, snapshot);
-        let v = match (snapshot.field("VelocityTime"), self.has_velocity_times) {
+            Scheme::PointsAtRest => {
+                let u = self.vector(Role::Displacement, snapshot)?.ok_or(no_u)?;
+                (self.points(snapshot, index)?, u)
+            }
+            Scheme::Recovered => {
+                let u = self.vector(Role::Displacement, snapshot)?.ok_or(no_u)?;
+                let x = self.points(snapshot, index)?;
+                (x.iter().zip(&u).map(|(x, u)| x - u).collect(), u)
+            }
+            Scheme::Traced(traced) => {
+                let x = self.points(snapshot, index)?;
+                let X = self.traced(traced, snapshot, ids)?;
+                let u = x.iter().zip(&X).map(|(x, X)| x - X).collect();
+                (X, u)
+            }
+        })
+    }
+
+    /// The points; those of particles that move across the solution's plane are told of.
+    fn points(
+        &mut self,
+        snapshot: &Snapshot,
+        index: usize,
+    ) -> Result<Vec<SVector<f64, D>>, ScoreError> {
+        let Positions { all, across } = positions(snapshot, &self.place, self.remarks)?;
+        if index == 0 {
+            self.first.across.clone_from(&across);
+        }
+        let first = &self.first.across;
+        let is_same = |one: f64, other: f64| (one - other).abs() <= SAME_PLACE * one.abs();
+        let moved = first.len().abs_diff(across.len())
+            + first.iter().zip(&across).filter(|(one, other)| !is_same(**one, **other)).count();
+        if first.len() != across.len() && snapshot.particles() != self.first.particles {
+            // Told as another number of particles.
+            return Ok(all);
+        }
+        let what = format!(
+            "particle(s) move across the solution's {D} dimension(s); --axes names the plane of the motion, such as --axes x,z"
+        );
+        let path = || snapshot.path().display().to_string();
+        self.remarks.met("out-of-plane", true, moved, what, path);
+        if index == 0 && !across.is_empty() {
+            let what = format!(
+                "particles have coordinates across the solution's {D} dimension(s), which are left out: {}",
+                sheets(&across)
+            );
+            self.remarks.note("sheets", false, what);
+        }
+        Ok(all)
+    }
+
+    /// Velocities with the time to which they belong.
+    fn velocities(
+        &mut self,
+        snapshot: &Snapshot,
+        time: f64,
+    ) -> Result<Option<(Vec<SVector<f64, D>>, f64)>, ScoreError> {
+        let own = match (snapshot.field("VelocityTime"), self.has_velocity_times) {
             (Some(own), _) => {
                 let what = "frame(s) tell a time for their velocities that is not finite";
                 let first = || snapshot.path().display().to_string();
-                self.remarks.met(
-                    "time-not-finite",
-                    true,
-                    usize::from(!own.is_finite()),
-                    what,
-                    first,
-                );
-                self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
+                let count = usize::from(!own.is_finite());
+                self.remarks.met("time-not-finite", true, count, what, first);
+                own * self.options.placing.time_unit
             }
             (None, true) => {
                 self.remarks.met(
@@ -196,22 +284,37 @@ impl<const D: usize> FrameReader<'_, D> {
                     "frame(s) do not tell the time of their velocities, as others do; those are not compared",
                     || snapshot.path().display().to_string(),
                 );
-                None
+                return Ok(None);
             }
-            (None, false) => {
-                let own = time - self.options.velocity_lag;
-                self.vector(Role::Velocity, snapshot)?.map(|v| (v, own))
-            }
+            (None, false) => time - self.velocity_lag,
         };
-        let tensors = [
-            self.tensor(Role::DeformationGradient, snapshot)?,
-            self.tensor(Role::FirstPiolaKirchhoff, snapshot)?,
-            self.tensor(Role::Cauchy, snapshot)?,
-            self.tensor(Role::Kirchhoff, snapshot)?,
-        ];
-        let scalars =
-            [self.scalar(Role::VolumeRatio, snapshot)?, self.scalar(Role::Density, snapshot)?];
-        Ok(FrameData { ids, X, u, v, tensors, scalars })
+        Ok(self.vector(Role::Velocity, snapshot)?.map(|v| (v, own)))
+    }
+
+    /// The particles that the body has.
+    fn inside_only(
+        &mut self,
+        data: FrameData<D>,
+        snapshot: &Snapshot,
+    ) -> Result<FrameData<D>, ScoreError> {
+        let domain = self.exact.domain();
+        let is_traced = matches!(self.scheme, Scheme::Traced(_));
+        let is_inside = |X: &SVector<f64, D>| {
+            if X.iter().any(|value| !value.is_finite()) {
+                // Of a particle that the exact motion does not have; others are told of as not finite.
+                return !is_traced;
+            }
+            points::outside(&domain, X).is_none_or(|share| share <= OUTSIDE)
+        };
+        let kept: Vec<bool> = data.X.iter().map(is_inside).collect();
+        let left_out = kept.iter().filter(|kept| !**kept).count();
+        if left_out == kept.len() {
+            return Err(ScoreError::NoneInside { path: snapshot.path().to_owned() });
+        }
+        let what = "particle(s) outside of the body are left out";
+        let path = || snapshot.path().display().to_string();
+        self.remarks.met("left-out", false, left_out, what, path);
+        Ok(data.only(&kept))
     }
 
     /// Holds the particles against those of the first frame.
@@ -225,7 +328,7 @@ impl<const D: usize> FrameReader<'_, D> {
             self.remarks.met("repeated-id", true, repeated, what, path);
         }
         if index == 0 {
-            self.first = Identities { particles, ids: known };
+            self.first = Identities { particles, ids: known, across: vec![] };
             return;
         }
         if particles != self.first.particles {
@@ -284,7 +387,8 @@ impl<const D: usize> FrameReader<'_, D> {
             return Ok(());
         };
         let flat = snapshot.positions()?;
-        let (x, _) = vectors::<D>(&flat, head.components);
+        let (mut x, _) = vectors::<D>(&flat, head.components, self.place.axes_of(head.components));
+        x.iter_mut().for_each(|x| *x = self.place.position(*x));
         let size = X.iter().map(|X| X.amax()).fold(0.0, f64::max);
         let far = |distance: f64| distance > OUTSIDE * size;
         let distances = |u: &dyn Fn(usize) -> SVector<f64, D>| -> Vec<f64> {
@@ -301,7 +405,7 @@ impl<const D: usize> FrameReader<'_, D> {
         let first = || {
             let (particle, distance) =
                 worst.map_or((0, 0.0), |(particle, distance)| (particle, *distance));
-            format!("by {distance:.3e} at {}", place(particle, snapshot))
+            format!("by {distance:.3e} at {}", of_particle(particle, snapshot))
         };
         self.remarks.met("displacement-not-of-points", false, count, what, first);
         Ok(())
@@ -311,13 +415,7 @@ impl<const D: usize> FrameReader<'_, D> {
     fn judge_places(&mut self, X: &[SVector<f64, D>], snapshot: &Snapshot) {
         let domain = self.exact.domain();
         let (count, furthest) = outside(&domain, X);
-        let hint = match self.scheme {
-            Scheme::Recovered => {
-                "; if the points are reference positions already, --points reference tells so"
-            }
-            _ => "",
-        };
-        let what = format!("reference position(s) lie outside the body{hint}");
+        let what = "reference position(s) lie outside the body (--inside leaves them out)";
         let first = || format!("the furthest by {furthest:.3e} in {}", snapshot.path().display());
         self.remarks.met("outside-body", false, count, what, first);
     }
@@ -328,7 +426,22 @@ impl<const D: usize> FrameReader<'_, D> {
         snapshot: &Snapshot,
     ) -> Result<Option<Vec<SVector<f64, D>>>, ScoreError> {
         let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
-        Ok(Some(judged(&flat, components, role.name(), snapshot, self.remarks)))
+        let mut all = match role {
+            // What they have across the plane is that of points.
+            Role::ReferencePosition => {
+                count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
+                vectors(&flat, components, self.place.axes_of(components)).0
+            }
+            _ => judged(&flat, components, role.name(), &self.place, snapshot, self.remarks),
+        };
+        for vector in &mut all {
+            *vector = match role {
+                Role::ReferencePosition => self.place.position(*vector),
+                Role::Velocity => *vector * self.place.velocity,
+                _ => *vector * self.place.length,
+            };
+        }
+        Ok(Some(all))
     }
 
     fn tensor(
@@ -338,7 +451,8 @@ impl<const D: usize> FrameReader<'_, D> {
     ) -> Result<Option<Vec<SMatrix<f64, D, D>>>, ScoreError> {
         let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
         count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
-        Ok(Some(matrices(&flat, components)))
+        let dimensions = if [6, 9].contains(&components) { 3 } else { D };
+        Ok(Some(matrices(&flat, components, self.place.axes_of(dimensions))))
     }
 
     fn scalar(&mut self, role: Role, snapshot: &Snapshot) -> Result<Option<Vec<f64>>, ScoreError> {

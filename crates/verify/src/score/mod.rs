@@ -16,6 +16,7 @@ mod integrated;
 mod judgement;
 mod law;
 mod options;
+mod place;
 mod points;
 mod quantity;
 mod recording;
@@ -33,7 +34,7 @@ pub use findings::Remark;
 pub use integrated::{Integrated, IntegratedOrders};
 pub use judgement::{Convergence, Judgement};
 pub use law::{Deformation, LawRow, LawVerdict};
-pub use options::{Input, Points, Resolution, ScoreOptions, Times};
+pub use options::{Input, Placing, Points, Resolution, ScoreOptions, Times};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
 

@@ -43,8 +43,8 @@ pub struct ScoreOptions {
     pub points: Points,
     /// The times of the frames.
     pub times: Times,
-    /// By how much velocities lag behind their frame's time, where the files do not tell it.
-    pub velocity_lag: f64,
+    /// Where and in which units the files have the body.
+    pub placing: Placing,
     /// The number of the solution's periods that frames may lie in, from time zero.
     pub periods: f64,
     /// The solution that the recordings are compared with; that a file tells another one is a remark.
@@ -61,11 +61,41 @@ impl Default for ScoreOptions {
             map: BTreeMap::new(),
             points: Points::Auto,
             times: Times::Told,
-            velocity_lag: 0.0,
+            placing: Placing::default(),
             periods: 1.0,
             provenance: None,
             expected: BTreeMap::new(),
             tolerance: ORDER_TOLERANCE,
+        }
+    }
+}
+
+/// Where and in which units the files have the body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placing {
+    /// What is subtracted from positions, in the solution's unit of length; empty for nothing.
+    pub origin: Vec<f64>,
+    /// The unit of positions and displacements, in the solution's.
+    pub length_unit: f64,
+    /// The unit of times, in the solution's.
+    pub time_unit: f64,
+    /// The unit of velocities, in the solution's; that of lengths over that of times where it is none.
+    pub velocity_unit: Option<f64>,
+    /// Which components of the files are along the solution's axes, numbered from 0; empty for the first ones.
+    pub axes: Vec<usize>,
+    /// Whether particles outside of the body are left out.
+    pub inside: bool,
+}
+
+impl Default for Placing {
+    fn default() -> Self {
+        Self {
+            origin: vec![],
+            length_unit: 1.0,
+            time_unit: 1.0,
+            velocity_unit: None,
+            axes: vec![],
+            inside: false,
         }
     }
 }
@@ -88,6 +118,8 @@ pub struct Input {
     pub paths: Vec<PathBuf>,
     /// Its resolution.
     pub resolution: Resolution,
+    /// By how much velocities lag behind their frame's time, where the files do not tell it; in the solution's unit.
+    pub velocity_lag: f64,
 }
 
 impl Input {

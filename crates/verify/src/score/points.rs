@@ -9,6 +9,7 @@ use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
 use super::found::Found;
 use super::options::{Input, Points, ScoreOptions};
+use super::place::Place;
 use super::times::{Timed, open};
 
 /// By how many times one error is larger than the other where it decides.
@@ -193,11 +194,13 @@ fn evidence<const D: usize>(
     if let Some(is_at_rest) = points_are_at_rest(&found.timed, &found.first, name)? {
         return Ok(if is_at_rest { Evidence::AtRest } else { Evidence::Moving });
     }
+    let place = Place::new(&options.placing)?;
     let [first, .., last] = &found.timed[..] else {
-        return measured(exact, &found.first, name, found.timed[0].time).map(Evidence::Measured);
+        return measured(exact, &found.first, name, found.timed[0].time, &place)
+            .map(Evidence::Measured);
     };
     let frame = if last.time > first.time { last } else { first };
-    measured(exact, &open(&frame.file)?, name, frame.time).map(Evidence::Measured)
+    measured(exact, &open(&frame.file)?, name, frame.time, &place).map(Evidence::Measured)
 }
 
 /// Whether points stay where they are, to the bit, while displacements change; `None` where these do not.
@@ -223,9 +226,11 @@ fn measured<const D: usize>(
     snapshot: &Snapshot,
     displacement: &str,
     time: f64,
+    place: &Place<D>,
 ) -> Result<Measured, ScoreError> {
     let read = |flat: Vec<f64>, components: usize| -> Vec<SVector<f64, D>> {
-        if components < D { vec![] } else { vectors::<D>(&flat, components).0 }
+        let axes = place.axes_of(components);
+        if components < D { vec![] } else { vectors::<D>(&flat, components, axes).0 }
     };
     let components = |head: Option<usize>| head.unwrap_or_default();
     let x = read(snapshot.positions()?, components(snapshot.points().map(|head| head.components)));
@@ -236,8 +241,11 @@ fn measured<const D: usize>(
     let stride = x.len().div_ceil(MOST_MEASURED).max(1);
     let rms = |reference: &dyn Fn(&SVector<f64, D>, &SVector<f64, D>) -> SVector<f64, D>| {
         let pairs = x.iter().zip(&u).step_by(stride);
-        let errors =
-            pairs.map(|(x, u)| (exact.displacement(&reference(x, u), time) - u).norm_squared());
+        let error = |(x, u): (&SVector<f64, D>, &SVector<f64, D>)| {
+            let (x, u) = (place.position(*x), u * place.length);
+            (exact.displacement(&reference(&x, &u), time) - u).norm_squared()
+        };
+        let errors = pairs.map(error);
         let (sum, count) = errors
             .filter(|error| error.is_finite())
             .fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));

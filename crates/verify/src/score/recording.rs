@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mmsmith_measure::norms::PerNorm;
-use mmsmith_runtime::Solution;
+use mmsmith_runtime::{Domain, Solution};
 use mmsmith_vtk::Provenance;
 use mmsmith_vtk::foreign::ArrayHead;
 use nalgebra::SVector;
@@ -18,6 +18,7 @@ use super::frame::{FrameErrors, FrameReader, Identities};
 use super::integrated::{Integrated, Mesh};
 use super::law::{self, Witnesses};
 use super::options::{Input, Resolution, ScoreOptions};
+use super::place::Place;
 use super::points::Taken;
 use super::quantity::Quantity;
 use super::reference::{Scheme, scheme};
@@ -30,7 +31,9 @@ use crate::precision::Precision;
 pub(super) struct Opened<const D: usize> {
     pub(super) found: Found,
     scheme: Scheme<D>,
+    place: Place<D>,
     has_velocity_times: bool,
+    velocity_lag: f64,
 }
 
 impl<const D: usize> Opened<D> {
@@ -42,13 +45,16 @@ impl<const D: usize> Opened<D> {
         remarks: &mut Remarks,
     ) -> Result<Self, ScoreError> {
         let found = Found::new(exact, input, options, remarks)?;
-        let scheme = scheme(exact, &found, taken.at_rest, remarks)?;
+        let place = Place::new(&options.placing)?;
+        let inside = options.placing.inside;
+        let scheme = scheme(exact, &found, taken.at_rest, &place, inside, remarks)?;
         if let Some(Remark { kind, is_problem, message, .. }) = &taken.told {
             remarks.note(kind, *is_problem, message);
         }
         let has_velocity_times = found.chosen.name(Role::Velocity).is_some()
             && any_velocity_time(&found.timed, &found.first)?;
-        Ok(Self { found, scheme, has_velocity_times })
+        let velocity_lag = input.velocity_lag;
+        Ok(Self { found, scheme, place, has_velocity_times, velocity_lag })
     }
 
     pub(super) fn reader<'a>(
@@ -61,8 +67,10 @@ impl<const D: usize> Opened<D> {
             exact,
             chosen: &self.found.chosen,
             scheme: &self.scheme,
+            place: self.place,
             options,
             has_velocity_times: self.has_velocity_times,
+            velocity_lag: self.velocity_lag,
             remarks,
             first: Identities::default(),
         }
@@ -149,6 +157,7 @@ struct Totals {
     /// The frames that have each field.
     compared: [usize; 8],
     h: f64,
+    shift: Option<Vec<f64>>,
 }
 
 impl Totals {
@@ -167,6 +176,7 @@ impl Totals {
             let data = reader.frame(&snapshot, frame.time, index)?;
             if index == 0 {
                 mesh = Mesh::new(&snapshot, data.X.len(), opened.found.timed.len());
+                totals.shift = shift(exact, &data.X);
                 totals.h = match resolution {
                     Resolution::Cells(cells) => exact.cell_length() / cells as f64,
                     Resolution::Length(length) => length,
@@ -280,6 +290,19 @@ impl Totals {
     }
 }
 
+/// How far the middle of the bounding box of places lies from that of the body.
+fn shift<const D: usize>(exact: &dyn Solution<f64, D>, X: &[SVector<f64, D>]) -> Option<Vec<f64>> {
+    let middle = match exact.domain() {
+        Domain::Box { lower, upper } => 0.5 * (lower + upper),
+        Domain::Annulus { .. } => SVector::zeros(),
+        _ => return None,
+    };
+    let first = X.first()?;
+    let lower = X.iter().fold(*first, |lower, X| lower.inf(X));
+    let upper = X.iter().fold(*first, |upper, X| upper.sup(X));
+    Some((0.5 * (lower + upper) - middle).iter().copied().collect())
+}
+
 /// The errors of one recording.
 pub(super) fn recording<const D: usize>(
     exact: &dyn Solution<f64, D>,
@@ -334,6 +357,7 @@ where
         exact_displacement: totals.displacement.l2,
         integrated: totals.integrated,
         law,
+        shift: totals.shift,
         floors: totals.scales.floors(exact, &opened.grain()),
         findings,
     })

@@ -3,15 +3,15 @@
 use std::collections::HashMap;
 
 use mmsmith_runtime::Solution;
-use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::SVector;
 
 use crate::inverse::inverse;
 
-use super::arrays::{Chosen, Role, there};
+use super::arrays::{Role, there};
 use super::error::ScoreError;
 use super::findings::Remarks;
 use super::found::Found;
+use super::place::Place;
 use super::times::{Timed, open};
 use super::vectors::positions;
 
@@ -42,6 +42,8 @@ pub(super) fn scheme<const D: usize>(
     exact: &dyn Solution<f64, D>,
     found: &Found,
     is_at_rest: bool,
+    place: &Place<D>,
+    is_inside_only: bool,
     remarks: &mut Remarks,
 ) -> Result<Scheme<D>, ScoreError> {
     let Found { timed, first, chosen } = found;
@@ -58,7 +60,8 @@ pub(super) fn scheme<const D: usize>(
             there: there(first),
         });
     }
-    trace(exact, &timed[0], first, chosen, remarks)
+    let x = positions(first, place, remarks)?.all;
+    trace(exact, &x, found, is_inside_only, remarks)
 }
 
 /// Whether no point moves in any frame, to the bit: a mesh whose displacements have an unknown name.
@@ -75,18 +78,18 @@ fn stay(timed: &[Timed], first: &Snapshot) -> Result<bool, ScoreError> {
 /// Finds the reference positions behind the positions of the first frame.
 fn trace<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    frame: &Timed,
-    first: &Snapshot,
-    chosen: &Chosen,
+    x: &[SVector<f64, D>],
+    Found { timed, first, chosen }: &Found,
+    is_inside_only: bool,
     remarks: &mut Remarks,
 ) -> Result<Scheme<D>, ScoreError> {
-    let x = positions(first, remarks)?;
+    let time = timed[0].time;
     let mut lost = (0, 0);
     let X = x
         .iter()
         .enumerate()
         .map(|(p, x)| {
-            reference_position(exact, x, frame.time).unwrap_or_else(|| {
+            reference_position(exact, x, time).unwrap_or_else(|| {
                 lost = if lost.0 == 0 { (1, p) } else { (lost.0 + 1, lost.1) };
                 SVector::repeat(f64::NAN)
             })
@@ -94,7 +97,7 @@ fn trace<const D: usize>(
         .collect();
     remarks.met(
         "not-traced",
-        true,
+        !is_inside_only,
         lost.0,
         "particle(s) of the first frame lie where the exact motion brings no material point",
         || format!("particle {} of {}", lost.1, first.path().display()),
@@ -108,8 +111,7 @@ fn trace<const D: usize>(
         "first-frame",
         false,
         format!(
-            "the first frame's positions are taken to be exact at t = {:?}; particles are found again by {found_by}",
-            frame.time
+            "the first frame's positions are taken to be exact at t = {time:?}; particles are found again by {found_by}"
         ),
     );
     let places =

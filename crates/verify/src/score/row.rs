@@ -78,6 +78,10 @@ pub struct ScoreRow {
     /// For each field the error that rounding alone may cause, of the files' numbers too.
     #[serde(skip)]
     pub floors: BTreeMap<Quantity, f64>,
+    /// How far the middle of the first frame's reference positions lies from that of the body, along each axis; a length. `None` for a
+    /// body whose middle is not known.
+    #[serde(skip)]
+    pub shift: Option<Vec<f64>>,
     /// Everything else that has to be known; problems first.
     #[serde(skip)]
     pub findings: Vec<Remark>,

@@ -48,6 +48,7 @@ pub(super) fn times<const D: usize>(
     let mut first_bad = None;
     let count = files.len();
     for (file, time) in files.into_iter().zip(times) {
+        let time = time * options.placing.time_unit;
         if time.is_finite() {
             timed.push(Timed { file, time });
         } else {

@@ -1,15 +1,17 @@
-//! Parameters with other values that explain an error.
+//! Another place, other units or another parameter that explain a gross error, each with the option that mends it.
 
+use mmsmith_runtime::AnySolution;
 use mmsmith_verify::{
-    Input, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow, score as measure,
+    Input, Norm, Placing, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow,
+    score as measure,
 };
 
 use crate::library::Selection;
 use crate::number;
 
 /// A relative error that a solver that converges does not have on any grid worth scoring.
-const SUSPICIOUS: f64 = 0.3;
-/// The share of the error that is left where another value explains it, on coarse grids too.
+const SUSPICIOUS: f64 = 0.1;
+/// The share of the error that is left where another reading explains it, on coarse grids too.
 const EXPLAINED: f64 = 0.25;
 /// Below this order the grid is not what the error is from.
 const NO_ORDER: f64 = 0.5;
@@ -18,49 +20,227 @@ const MOST_TRIED: usize = 50_000;
 /// Octaves up and down from the value of a parameter in which another one is looked for.
 const OCTAVES: i32 = 7;
 
-/// What is to be said of the row with the smallest recording where the error of u is as large as u, no smaller on finer grids,
-/// and far smaller with another value of a parameter.
+/// Something that would explain an error.
+struct Hypothesis {
+    /// The option that mends it.
+    option: String,
+    /// In words, to follow "the error is explained by".
+    words: String,
+    reading: Reading,
+    parameter: Option<(String, f64)>,
+}
+
+/// A recording with a gross error, and how it is read.
+struct Case<'a> {
+    selection: &'a Selection,
+    exact: &'a AnySolution<f64>,
+    input: &'a [Input],
+    how: &'a Reading,
+    row: &'a ScoreRow,
+}
+
+/// The finding about the row with the smallest recording where the error of u is large, no smaller on finer grids, and another reading
+/// explains it in every recorded field.
 pub(super) fn suggestion(
     selection: &Selection,
+    exact: &AnySolution<f64>,
     inputs: &[Input],
     how: &Reading,
     score: &Score,
 ) -> Option<(usize, Remark)> {
+    let (index, row) = suspect(score)?;
+    let case = Case { selection, exact, input: &inputs[index..=index], how, row };
+    let mut tried: Vec<_> =
+        case.places().into_iter().filter_map(|one| Some((case.error(&one)?, one))).collect();
+    if tried.is_empty() {
+        tried
+            .extend(case.parameters().into_iter().filter_map(|one| Some((case.error(&one)?, one))));
+    }
+    let (error, found) = tried.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let message = format!(
+        "{} explains the error: {} of u with {}, in place of {}",
+        found.words,
+        number::rounded(error, 3),
+        found.option,
+        number::rounded(u(row), 3)
+    );
+    let kind = if found.parameter.is_some() { "other-parameter" } else { "other-place" };
+    Some((index, Remark { kind, is_problem: false, count: 1, frames: 0, message }))
+}
+
+/// The parameter that is the density and was not set, where density one explains every field of a recording with a gross error: the
+/// density of many codes, and the library's until 0.1.
+pub(super) fn density_one(
+    selection: &Selection,
+    exact: &AnySolution<f64>,
+    set: &[(String, f64)],
+    inputs: &[Input],
+    how: &Reading,
+    score: &Score,
+) -> Option<String> {
+    let (index, row) = suspect(score)?;
+    let density = density(exact)?;
+    let is_density = |(name, value): &(&String, &f64)| {
+        **value == density && density != 1.0 && set.iter().all(|(given, _)| given != *name)
+    };
+    let (name, _) = selection.parameters().iter().find(is_density)?;
+    let case = Case { selection, exact, input: &inputs[index..=index], how, row };
+    let hypothesis = case.parameter(name, 1.0);
+    case.error(&hypothesis).map(|_| name.clone())
+}
+
+fn density(exact: &AnySolution<f64>) -> Option<f64> {
+    match exact {
+        AnySolution::One(exact) => Some(exact.density()),
+        AnySolution::Two(exact) => Some(exact.density()),
+        AnySolution::Three(exact) => Some(exact.density()),
+        _ => None,
+    }
+}
+
+/// The smallest recording, where its error is gross.
+fn suspect(score: &Score) -> Option<(usize, &ScoreRow)> {
     let size = |row: &ScoreRow| row.particles * row.frames;
     let (index, row) = score.rows.iter().enumerate().min_by_key(|(_, row)| size(row))?;
-    let u = |row: &ScoreRow| row.errors[&Quantity::Displacement].l2;
-    let relative = u(row) / row.exact_displacement;
     let order =
         score.orders.as_ref().and_then(|orders| orders.get(&Quantity::Displacement)?.l2.fit);
-    if !(row.is_ok() && relative > SUSPICIOUS && size(row) <= MOST_TRIED)
-        || order.is_some_and(|order| order > NO_ORDER)
-    {
-        return None;
+    let is_gross = row.is_whole() && u(row) > SUSPICIOUS * row.exact_displacement;
+    let falls = order.is_some_and(|order| order > NO_ORDER);
+    (is_gross && !falls && size(row) <= MOST_TRIED).then_some((index, row))
+}
+
+fn u(row: &ScoreRow) -> f64 {
+    row.errors.get(&Quantity::Displacement).map_or(f64::NAN, |norms| norms.l2)
+}
+
+impl Case<'_> {
+    /// The error of u where a hypothesis explains every recorded field.
+    fn error(&self, hypothesis: &Hypothesis) -> Option<f64> {
+        let other = match &hypothesis.parameter {
+            Some(parameter) => {
+                Some(self.selection.with(std::slice::from_ref(parameter)).ok()?.build().ok()?)
+            }
+            None => None,
+        };
+        let exact = other.as_ref().unwrap_or(self.exact);
+        let row = measure(exact, self.input, &hypothesis.reading).ok()?.rows.pop()?;
+        let explains = |field: &Quantity| {
+            let error = |row: &ScoreRow| row.errors.get(field).map(|norms| norms[Norm::L2]);
+            error(&row)
+                .zip(error(self.row))
+                .is_some_and(|(after, before)| after <= EXPLAINED * before)
+        };
+        (row.is_whole() && self.row.fields.iter().all(explains)).then(|| u(&row))
     }
-    let misfit = |name: &str, value: f64| -> Option<f64> {
-        let exact = selection.with(&[(name.to_owned(), value)]).ok()?.build().ok()?;
-        Some(u(&measure(&exact, &inputs[index..=index], how).ok()?.rows[0]))
-    };
-    let (error, name, value) = selection
-        .parameters()
-        .iter()
-        .filter(|(_, value)| **value != 0.0)
-        .filter_map(|(name, value)| {
-            let (factor, error) = least(|factor| misfit(name, factor * value))?;
-            Some((error, name, factor * value))
-        })
-        .min_by(|one, other| one.0.total_cmp(&other.0))?;
-    let told = number::rounded(value, 3);
-    (error < EXPLAINED * u(row)).then(|| {
-        let message = format!(
-            "the error of u is {:.0} % of u, but {} % with {name} near {told} in place of {}: is another value meant? --set \
-             {name}={told}",
-            100.0 * relative,
-            number::rounded(100.0 * error / row.exact_displacement, 2),
-            number::exact(selection.parameters()[name]),
-        );
-        (index, Remark { kind: "other-parameter", is_problem: false, count: 1, frames: 0, message })
-    })
+
+    fn reading(&self, change: impl FnOnce(&mut Placing)) -> Reading {
+        let mut reading = self.how.clone();
+        change(&mut reading.placing);
+        reading
+    }
+
+    fn place(&self, words: &str, option: String, change: impl FnOnce(&mut Placing)) -> Hypothesis {
+        Hypothesis { option, words: words.into(), reading: self.reading(change), parameter: None }
+    }
+
+    fn parameter(&self, name: &str, value: f64) -> Hypothesis {
+        Hypothesis {
+            option: format!("--set {name}={}", number::rounded(value, 3)),
+            words: "another value of a parameter".into(),
+            reading: self.how.clone(),
+            parameter: Some((name.to_owned(), value)),
+        }
+    }
+
+    /// Other places and units.
+    fn places(&self) -> Vec<Hypothesis> {
+        let mut all = self.shifts();
+        for (unit, words) in [
+            (0.001, "a unit of length of a thousandth"),
+            (0.01, "a unit of length of a hundredth"),
+            (1000.0, "a unit of length of a thousand"),
+        ] {
+            all.push(self.place(words, format!("--length-unit {unit}"), |placing| {
+                placing.length_unit = unit
+            }));
+        }
+        let period = match self.exact {
+            AnySolution::One(exact) => exact.period(),
+            AnySolution::Two(exact) => exact.period(),
+            AnySolution::Three(exact) => exact.period(),
+            _ => return all,
+        };
+        for (unit, words) in [
+            (0.001, "a unit of time of a thousandth"),
+            (1e-6, "a unit of time of a millionth"),
+            (period, "the period as the unit of time"),
+            (period / std::f64::consts::TAU, "the period over 2 pi as the unit of time"),
+            (1.0 / std::f64::consts::TAU, "a factor of 2 pi in the time"),
+        ] {
+            let option = format!("--time-unit {}", number::exact(unit));
+            all.push(self.place(words, option, |placing| placing.time_unit = unit));
+        }
+        for axes in axes(self.selection.dimension()) {
+            let names: Vec<_> = axes.iter().map(|axis| ["x", "y", "z"][*axis]).collect();
+            let option = format!("--axes {}", names.join(","));
+            all.push(
+                self.place("another order of the axes", option, |placing| placing.axes = axes),
+            );
+        }
+        all.push(self.place("leaving out points outside the body", "--inside".into(), |placing| {
+            placing.inside = true
+        }));
+        all
+    }
+
+    /// Shifts of the body: by its own centre, in as few digits as come near it.
+    fn shifts(&self) -> Vec<Hypothesis> {
+        let Some(shift) = &self.row.shift else { return vec![] };
+        let to = |digits: usize| -> Vec<f64> {
+            let scale = 10.0_f64.powi(digits as i32);
+            shift.iter().map(|value| (value * scale).round() / scale).collect()
+        };
+        let mut all: Vec<Hypothesis> = vec![];
+        for origin in [to(1), to(2), to(3), shift.clone()] {
+            let told: Vec<_> = origin.iter().map(|value| number::exact(*value)).collect();
+            let option = format!("--origin {}", told.join(","));
+            if origin.iter().any(|value| *value != 0.0)
+                && all.iter().all(|other| other.option != option)
+            {
+                all.push(self.place("a body that stands elsewhere", option, |placing| {
+                    placing.origin = origin
+                }));
+            }
+        }
+        all
+    }
+
+    /// Other values of single parameters.
+    fn parameters(&self) -> Vec<Hypothesis> {
+        let misfit = |name: &str, value: f64| -> Option<f64> {
+            let exact = self.selection.with(&[(name.to_owned(), value)]).ok()?.build().ok()?;
+            Some(u(&measure(&exact, self.input, self.how).ok()?.rows[0]))
+        };
+        let best = |(name, value): (&String, &f64)| {
+            let (factor, _) = least(|factor| misfit(name, factor * value))?;
+            Some(self.parameter(name, factor * value))
+        };
+        self.selection
+            .parameters()
+            .iter()
+            .filter(|(_, value)| **value != 0.0)
+            .filter_map(best)
+            .collect()
+    }
+}
+
+/// Other orders of axes, and other planes.
+fn axes(dimension: usize) -> Vec<Vec<usize>> {
+    match dimension {
+        2 => vec![vec![1, 0], vec![0, 2], vec![2, 0], vec![1, 2], vec![2, 1]],
+        3 => vec![vec![0, 2, 1], vec![1, 0, 2], vec![1, 2, 0], vec![2, 0, 1], vec![2, 1, 0]],
+        _ => vec![vec![1], vec![2]],
+    }
 }
 
 /// The factor, and its value, where a function is least: among half octaves and minus one, then by bisection between the

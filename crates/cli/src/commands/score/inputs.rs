@@ -36,7 +36,11 @@ pub(super) fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
         (None, Some(h)) => Resolution::Length(*h),
         (None, None) => Resolution::Estimated,
     };
-    let input = |(index, paths)| Input { paths, resolution: resolution(index) };
+    let input = |(index, paths)| Input {
+        paths,
+        resolution: resolution(index),
+        velocity_lag: options.velocity_lag,
+    };
     Ok(recordings.into_iter().enumerate().map(input).collect())
 }
 
