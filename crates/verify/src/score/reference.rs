@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use mmsmith_runtime::Solution;
+use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::SVector;
 
 use crate::inverse::inverse;

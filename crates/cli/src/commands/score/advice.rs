@@ -1,6 +1,6 @@
 //! Another place, other units or another parameter that explain a gross error, each with the option that mends it.
 
-use mmsmith_runtime::AnySolution;
+use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Input, Norm, Placing, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow,
     score as measure,
