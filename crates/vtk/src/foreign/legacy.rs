@@ -222,7 +222,7 @@ impl<'a> Scan<'a> {
     /// One of the two arrays that list cells in files of version 5.
     fn part(&mut self, part: &str, count: usize) -> Result<Entry, String> {
         let found = self.word()?;
-        if found != part {
+        if !found.eq_ignore_ascii_case(part) {
             return Err(format!("{found:?} where {part} should be"));
         }
         let kind = self.kind(part)?;
@@ -239,7 +239,7 @@ impl<'a> Scan<'a> {
         }
         let (components, tuples) = (self.count(name)?, self.count(name)?);
         let kind = self.word()?;
-        if kind == "string" && !self.is_binary {
+        if kind.eq_ignore_ascii_case("string") && !self.is_binary {
             self.line()?;
             for _ in 0..tuples.saturating_mul(components) {
                 if self.at == self.bytes.len() {
@@ -323,6 +323,7 @@ fn unescape(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::mesh::{Cell, Mesh};
     use super::*;
 
     fn refused(text: &str) -> String {
@@ -352,6 +353,47 @@ mod tests {
             (contents.fields[0].name.as_str(), numbers(&contents.fields[0])),
             ("TimeValue", vec![0.5])
         );
+    }
+
+    #[test]
+    fn kinds_and_keywords_are_read_in_any_case() {
+        let body = "POINTS 2 double\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nCELL_TYPES 1\n3\nPOINT_DATA 2\n\
+                    SCALARS sigma_xx float 1\nLOOKUP_TABLE default\n5 6\nVECTORS u double\n1 2 3 4 5 6\n";
+        let lower = body.to_ascii_lowercase();
+        let upper = body.to_ascii_uppercase();
+        for text in [body, &lower, &upper].map(|body| format!("{HEAD}{body}")) {
+            let contents = contents(text.as_bytes()).unwrap();
+            let piece = &contents.pieces[0];
+            let found: Vec<_> = piece.arrays.iter().map(|a| (a.components, a.kind)).collect();
+            assert_eq!(found, [(1, Kind::F32), (3, Kind::F64)], "{text}");
+            let numbers = |entry| contents.numbers::<f64>(text.as_bytes(), entry).unwrap();
+            assert_eq!(numbers(&piece.arrays[0]), [5.0, 6.0]);
+        }
+    }
+
+    #[test]
+    fn cells_are_read_with_counts_among_their_nodes_and_with_offsets() {
+        let points = "POINTS 4 double\n0 0 0 1 0 0 1 1 0 0 1 0\n";
+        let old = format!("{HEAD}{points}CELLS 2 8\n4 0 1 2 3\n2 0 1\nCELL_TYPES 2\n9 3\n");
+        let new = format!(
+            "{}{points}CELLS 3 6\nOFFSETS vtktypeint64\n0 4 6\nCONNECTIVITY vtktypeint64\n0 1 2 3 0 1\nCELL_TYPES 2\n9 3\n",
+            HEAD.replace("4.2", "5.1")
+        );
+        for text in [old, new] {
+            let contents = contents(text.as_bytes()).unwrap();
+            let mut mesh = Mesh::default();
+            for first in [0, 7] {
+                mesh.append(&contents, text.as_bytes(), &contents.pieces[0], first).unwrap();
+            }
+            let cells: Vec<_> = mesh.cells().collect();
+            assert_eq!(cells[0], Cell { kind: 9, nodes: &[0, 1, 2, 3] }, "{text}");
+            assert_eq!(cells[1], Cell { kind: 3, nodes: &[0, 1] });
+            assert_eq!(cells[2], Cell { kind: 9, nodes: &[7, 8, 9, 10] });
+        }
+        let damaged = format!("{HEAD}{points}CELLS 1 3\n4 0 1\nCELL_TYPES 1\n9\n");
+        let contents = contents(damaged.as_bytes()).unwrap();
+        let piece = &contents.pieces[0];
+        assert!(Mesh::default().append(&contents, damaged.as_bytes(), piece, 0).is_err());
     }
 
     #[test]

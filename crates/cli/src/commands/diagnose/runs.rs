@@ -178,7 +178,8 @@ impl Solver<'_> {
 
     /// The errors of the files that a run left, against the right fields.
     fn scored(&self, cells: usize, out: PathBuf) -> Run {
-        let inputs = [Input { paths: files(&out), resolution: Resolution::Cells(cells) }];
+        let resolution = Resolution::Cells(cells);
+        let inputs = [Input { paths: files(&out), resolution, velocity_lag: 0.0 }];
         match score(&self.exact, &inputs, &Reading::default()) {
             Ok(score) => {
                 let row = &score.rows[0];
