@@ -77,8 +77,8 @@ impl Measured {
     }
 
     fn is_alike(self) -> bool {
-        // Not a number is alike as well.
-        !((self.reference - self.current).abs() > ALIKE * self.least())
+        let apart = (self.reference - self.current).abs();
+        apart.is_nan() || self.least().is_nan() || apart <= ALIKE * self.least()
     }
 
     /// What is taken where errors do not decide.
@@ -220,6 +220,10 @@ fn points_are_at_rest(
     Ok(None)
 }
 
+/// The reference position of a point with a displacement.
+type Reference<'a, const D: usize> =
+    &'a dyn Fn(&SVector<f64, D>, &SVector<f64, D>) -> SVector<f64, D>;
+
 /// Measures both ways.
 fn measured<const D: usize>(
     exact: &dyn Solution<f64, D>,
@@ -239,7 +243,7 @@ fn measured<const D: usize>(
         components(snapshot.array(displacement).map(|head| head.components)),
     );
     let stride = x.len().div_ceil(MOST_MEASURED).max(1);
-    let rms = |reference: &dyn Fn(&SVector<f64, D>, &SVector<f64, D>) -> SVector<f64, D>| {
+    let rms = |reference: Reference<'_, D>| {
         let pairs = x.iter().zip(&u).step_by(stride);
         let error = |(x, u): (&SVector<f64, D>, &SVector<f64, D>)| {
             let (x, u) = (place.position(*x), u * place.length);
