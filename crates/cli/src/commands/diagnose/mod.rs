@@ -123,11 +123,20 @@ fn list(output: Option<Output>) -> Result<bool> {
     Ok(true)
 }
 
+/// A mistake that explains the errors.
+struct Named {
+    cause: &'static Cause,
+    /// With its opposite in the fields; none where it was found without.
+    errors: Option<BTreeMap<usize, Errors>>,
+    /// A time that was fitted, on the coarsest grid.
+    shift: Option<f64>,
+}
+
 /// What was found.
 struct Told {
     passed: bool,
     right: BTreeMap<usize, Errors>,
-    causes: Vec<(&'static Cause, Option<BTreeMap<usize, Errors>>, Option<f64>)>,
+    causes: Vec<Named>,
     tried: Vec<(&'static str, f64)>,
     not_tried: BTreeMap<&'static str, String>,
     notes: Vec<String>,
@@ -236,12 +245,16 @@ impl Told {
             self.tried.push((trial.cause.name, order));
             if expected.is_met(&errors, 0.0) {
                 let shift = trial.fitted.map(|dt_over_h| dt_over_h * solver.h(options.cells[0]));
-                self.causes.push((trial.cause, Some(errors), shift));
+                self.causes.push(Named { cause: trial.cause, errors: Some(errors), shift });
             }
         }
         if self.causes.is_empty() {
             let unused = search.unused(right)?;
-            self.causes.extend(unused.into_iter().map(|cause| (cause, None, None)));
+            self.causes.extend(unused.into_iter().map(|cause| Named {
+                cause,
+                errors: None,
+                shift: None,
+            }));
         }
         if self.causes.is_empty() {
             self.notes.push("no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into());
@@ -268,7 +281,7 @@ impl Told {
         if self.passed {
             text += "nothing is wrong: the errors fall as expected\n";
         }
-        for (index, (cause, errors, shift)) in self.causes.iter().take(4).enumerate() {
+        for (index, Named { cause, errors, shift }) in self.causes.iter().take(4).enumerate() {
             text += &format!(
                 "{}{}: {}\n",
                 if index > 0 { "or " } else { "" },
@@ -315,11 +328,7 @@ impl Told {
                 .map(|(cells, errors)| json!({"cells": cells, "errors": named(errors)}))
                 .collect()
         };
-        let cause = |(cause, errors, shift): &(
-            &Cause,
-            Option<BTreeMap<usize, Errors>>,
-            Option<f64>,
-        )| {
+        let cause = |Named { cause, errors, shift }: &Named| {
             json!({
                 "name": cause.name,
                 "mistake": cause.mistake,
