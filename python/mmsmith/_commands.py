@@ -557,6 +557,14 @@ def score(
     map: Mapping[str, str] | None = None,
     points: Literal["auto", "current", "reference"] | None = None,
     time: float | None = None,
+    times: float | Iterable[float] | None = None,
+    times_from: str | os.PathLike[str] | None = None,
+    frame_step: float | None = None,
+    origin: float | Iterable[float] | None = None,
+    length_unit: float | None = None,
+    time_unit: float | None = None,
+    axes: str | Iterable[str] | None = None,
+    inside: bool = False,
     velocity_lag: float | None = None,
     periods: float | None = None,
     cells: int | Iterable[int] | None = None,
@@ -584,6 +592,14 @@ def score(
             `current`: Current positions.
             `reference`: Reference positions.
         time: Time of a single frame that does not state it.
+        times: Times of the frames that do not tell them, one for each frame, the same for all recordings.
+        times_from: Times of the frames from a file: its column time or t, or plain numbers.
+        frame_step: Time from each frame to the next; the first frame is at t = 0.
+        origin: Place of the solution's origin in the files, in the solution's unit of length.
+        length_unit: Unit of lengths in the files, in that of the solution: 0.001 for millimetres beside metres. Default: 1.
+        time_unit: Unit of times in the files, in that of the solution: 0.001 for milliseconds beside seconds. Default: 1.
+        axes: Axes of the files that are the solution's, such as x,z. Default: x,y,z, as many as there are dimensions.
+        inside: Leave out points outside the body, such as particles of walls.
         velocity_lag: Time by which velocities lag behind their frame: half a time step in staggered schemes. Default: 0.
         periods: Time in which frames are expected, in periods of the solution. Default: 1.
         cells: Cell counts along the solution's cell length, one for each recording.

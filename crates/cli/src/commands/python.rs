@@ -188,7 +188,10 @@ fn kind(argument: &Arg) -> String {
         |name: &str| argument.get_value_names().unwrap_or_default().iter().any(|own| *own == name);
     let id = argument.get_value_parser().type_id();
     let is = |known: TypeId| id == known;
-    let text = if is(TypeId::of::<usize>()) || is(TypeId::of::<u64>()) {
+    // An axis is told by its letter.
+    let text = if is_called("AXES") {
+        "str"
+    } else if is(TypeId::of::<usize>()) || is(TypeId::of::<u64>()) {
         "int"
     } else if is(TypeId::of::<f64>()) {
         // A time may have a unit.
