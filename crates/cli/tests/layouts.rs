@@ -167,7 +167,7 @@ fn recorded(
     h: f64,
 ) -> SVector<f64, 2> {
     let c = Vector2::new(0.5 + 0.3 * X[0], -0.4 + 0.2 * X[1]);
-    exact.displacement(X, t) + c * (0.2 * share * h * h)
+    exact.displacement(X, t) + c * (0.02 * share * h * h)
 }
 
 /// The frames of a layout on a grid.

@@ -92,7 +92,7 @@ fn scored(
     if let Some(name) = advice::density_one(selection, exact, set, inputs, how, &score) {
         return at_density_one(options, selection, &name, inputs, how, output);
     }
-    if let Some((row, remark)) = advice::suggestion(selection, exact, inputs, how, &score) {
+    if let Some((row, remark)) = advice::suggestion(selection, exact, set, inputs, how, &score) {
         score.rows[row].findings.push(remark);
     }
     tell(options, selection, exact, &score, how, output)

@@ -2,7 +2,7 @@
 
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Input, Norm, Placing, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow,
+    Input, Norm, Placing, Points, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow,
     score as measure,
 };
 
@@ -13,6 +13,8 @@ use crate::number;
 const SUSPICIOUS: f64 = 0.1;
 /// The share of the error that is left where another reading explains it, on coarse grids too.
 const EXPLAINED: f64 = 0.25;
+/// The share that is left of the errors of other recorded fields: coarse grids leave more of those of F and P.
+const SUPPORTED: f64 = 0.5;
 /// Below this order the grid is not what the error is from.
 const NO_ORDER: f64 = 0.5;
 /// More numbers than are read anew for every trial.
@@ -44,27 +46,33 @@ struct Case<'a> {
 pub(super) fn suggestion(
     selection: &Selection,
     exact: &AnySolution<f64>,
+    set: &[(String, f64)],
     inputs: &[Input],
     how: &Reading,
     score: &Score,
 ) -> Option<(usize, Remark)> {
     let (index, row) = suspect(score)?;
     let case = Case { selection, exact, input: &inputs[index..=index], how, row };
-    let mut tried: Vec<_> =
-        case.places().into_iter().filter_map(|one| Some((case.error(&one)?, one))).collect();
+    let explaining = |all: Vec<Hypothesis>| -> Vec<(f64, Hypothesis)> {
+        all.into_iter().filter_map(|one| Some((case.error(&one)?, one))).collect()
+    };
+    let mut tried = explaining(case.places());
     if tried.is_empty() {
-        tried
-            .extend(case.parameters().into_iter().filter_map(|one| Some((case.error(&one)?, one))));
+        tried = explaining(case.parameters());
+    }
+    if tried.is_empty() {
+        tried = explaining(case.places_at_density_one(set));
     }
     let (error, found) = tried.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
     let message = format!(
-        "{} explains the error: {} of u with {}, in place of {}",
+        "{} explains the error: {} % of u with {}, in place of {} %",
         found.words,
-        number::rounded(error, 3),
+        number::rounded(100.0 * error, 2),
         found.option,
-        number::rounded(u(row), 3)
+        number::rounded(100.0 * relative(row), 2)
     );
-    let kind = if found.parameter.is_some() { "other-parameter" } else { "other-place" };
+    let is_place = found.reading.placing != how.placing;
+    let kind = if is_place { "other-place" } else { "other-parameter" };
     Some((index, Remark { kind, is_problem: false, count: 1, frames: 0, message }))
 }
 
@@ -79,14 +87,23 @@ pub(super) fn density_one(
     score: &Score,
 ) -> Option<String> {
     let (index, row) = suspect(score)?;
-    let density = density(exact)?;
-    let is_density = |(name, value): &(&String, &f64)| {
-        **value == density && density != 1.0 && set.iter().all(|(given, _)| given != *name)
-    };
-    let (name, _) = selection.parameters().iter().find(is_density)?;
+    let name = unset_density(selection, exact, set)?;
     let case = Case { selection, exact, input: &inputs[index..=index], how, row };
-    let hypothesis = case.parameter(name, 1.0);
-    case.error(&hypothesis).map(|_| name.clone())
+    let hypothesis = case.parameter(&name, 1.0);
+    case.error(&hypothesis).map(|_| name)
+}
+
+/// The parameter that is the density, where it is not one and was not set.
+fn unset_density(
+    selection: &Selection,
+    exact: &AnySolution<f64>,
+    set: &[(String, f64)],
+) -> Option<String> {
+    let density = density(exact).filter(|density| *density != 1.0)?;
+    let is_density = |(name, value): &(&String, &f64)| {
+        **value == density && set.iter().all(|(given, _)| given != *name)
+    };
+    selection.parameters().iter().find(is_density).map(|(name, _)| name.clone())
 }
 
 fn density(exact: &AnySolution<f64>) -> Option<f64> {
@@ -109,12 +126,17 @@ fn suspect(score: &Score) -> Option<(usize, &ScoreRow)> {
     (is_gross && !falls && size(row) <= MOST_TRIED).then_some((index, row))
 }
 
+/// The error of u over the exact displacements at the same places: another reading may move these to where nothing moves.
+fn relative(row: &ScoreRow) -> f64 {
+    u(row) / row.exact_displacement
+}
+
 fn u(row: &ScoreRow) -> f64 {
     row.errors.get(&Quantity::Displacement).map_or(f64::NAN, |norms| norms.l2)
 }
 
 impl Case<'_> {
-    /// The error of u where a hypothesis explains every recorded field.
+    /// The relative error of u where a hypothesis explains every recorded field.
     fn error(&self, hypothesis: &Hypothesis) -> Option<f64> {
         let other = match &hypothesis.parameter {
             Some(parameter) => {
@@ -128,9 +150,10 @@ impl Case<'_> {
             let error = |row: &ScoreRow| row.errors.get(field).map(|norms| norms[Norm::L2]);
             error(&row)
                 .zip(error(self.row))
-                .is_some_and(|(after, before)| after <= EXPLAINED * before)
+                .is_some_and(|(after, before)| after <= SUPPORTED * before)
         };
-        (row.is_whole() && self.row.fields.iter().all(explains)).then(|| u(&row))
+        let is_small = relative(&row) <= EXPLAINED * relative(self.row);
+        (row.is_whole() && is_small && self.row.fields.iter().all(explains)).then(|| relative(&row))
     }
 
     fn reading(&self, change: impl FnOnce(&mut Placing)) -> Reading {
@@ -150,6 +173,17 @@ impl Case<'_> {
             reading: self.how.clone(),
             parameter: Some((name.to_owned(), value)),
         }
+    }
+
+    /// Other places and units of a recording with density one.
+    fn places_at_density_one(&self, set: &[(String, f64)]) -> Vec<Hypothesis> {
+        let Some(name) = unset_density(self.selection, self.exact, set) else { return vec![] };
+        let at_one = |hypothesis: Hypothesis| Hypothesis {
+            option: format!("{} --set {name}=1", hypothesis.option),
+            parameter: Some((name.clone(), 1.0)),
+            ..hypothesis
+        };
+        self.places().into_iter().map(at_one).collect()
     }
 
     /// Other places and units.
@@ -193,26 +227,36 @@ impl Case<'_> {
         all
     }
 
-    /// Shifts of the body: by its own centre, in as few digits as come near it.
+    /// Shifts of the body: by its own middle, in as few digits as come near it. The middle is that of reference positions, whichever the
+    /// points are.
     fn shifts(&self) -> Vec<Hypothesis> {
-        let Some(shift) = &self.row.shift else { return vec![] };
-        let to = |digits: usize| -> Vec<f64> {
-            let scale = 10.0_f64.powi(digits as i32);
+        let of = |points| {
+            let reading = Reading { points, ..self.how.clone() };
+            measure(self.exact, self.input, &reading).ok()?.rows.pop()?.shift
+        };
+        let found = [of(Points::Reference), of(Points::Current)].into_iter().flatten();
+        let mut all = vec![];
+        for shift in found {
+            self.add_shifts(&shift, &mut all);
+        }
+        all
+    }
+
+    fn add_shifts(&self, shift: &[f64], all: &mut Vec<Hypothesis>) {
+        let to = |digits: i32| -> Vec<f64> {
+            let scale = 10.0_f64.powi(digits);
             shift.iter().map(|value| (value * scale).round() / scale).collect()
         };
-        let mut all: Vec<Hypothesis> = vec![];
-        for origin in [to(1), to(2), to(3), shift.clone()] {
+        for origin in [to(1), to(2), to(3), shift.to_vec()] {
             let told: Vec<_> = origin.iter().map(|value| number::exact(*value)).collect();
             let option = format!("--origin {}", told.join(","));
-            if origin.iter().any(|value| *value != 0.0)
-                && all.iter().all(|other| other.option != option)
-            {
+            let is_new = all.iter().all(|other: &Hypothesis| other.option != option);
+            if origin.iter().any(|value| *value != 0.0) && is_new {
                 all.push(self.place("a body that stands elsewhere", option, |placing| {
-                    placing.origin = origin
+                    placing.origin = origin;
                 }));
             }
         }
-        all
     }
 
     /// Other values of single parameters.
