@@ -27,6 +27,9 @@ const OUTSIDE: f64 = 1e-6;
 /// Share of a coordinate across the plane by which it may change, as rounding.
 const SAME_PLACE: f64 = 1e-9;
 
+/// One vector a particle.
+type Vectors<const D: usize> = Vec<SVector<f64, D>>;
+
 /// The particles of the first frame, by which later frames are judged.
 #[derive(Default)]
 pub(super) struct Identities {
@@ -193,7 +196,7 @@ impl<const D: usize> FrameReader<'_, D> {
         snapshot: &Snapshot,
         index: usize,
         ids: Option<&[i64]>,
-    ) -> Result<(Vec<SVector<f64, D>>, Vec<SVector<f64, D>>), ScoreError> {
+    ) -> Result<(Vectors<D>, Vectors<D>), ScoreError> {
         let missing = |role| ScoreError::Missing {
             path: snapshot.path().to_owned(),
             name: self.chosen.name(role).unwrap_or_default().to_owned(),
@@ -267,7 +270,7 @@ impl<const D: usize> FrameReader<'_, D> {
         &mut self,
         snapshot: &Snapshot,
         time: f64,
-    ) -> Result<Option<(Vec<SVector<f64, D>>, f64)>, ScoreError> {
+    ) -> Result<Option<(Vectors<D>, f64)>, ScoreError> {
         let own = match (snapshot.field("VelocityTime"), self.has_velocity_times) {
             (Some(own), _) => {
                 let what = "frame(s) tell a time for their velocities that is not finite";
