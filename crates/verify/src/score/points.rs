@@ -11,6 +11,7 @@ use super::found::Found;
 use super::options::{Input, Points, ScoreOptions};
 use super::place::Place;
 use super::times::{Timed, open};
+use super::vectors::are_same_places;
 
 /// By how many times one error is larger than the other where it decides.
 const FAR_LARGER: f64 = 3.0;
@@ -214,7 +215,8 @@ fn points_are_at_rest(
     for frame in &timed[1..] {
         let snapshot = open(&frame.file)?;
         if snapshot.floats(displacement)? != at_first {
-            return Ok(Some(snapshot.positions()? == positions));
+            let components = first.points().map_or(3, |head| head.components);
+            return Ok(Some(are_same_places(&snapshot.positions()?, &positions, components)));
         }
     }
     Ok(None)

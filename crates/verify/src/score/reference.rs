@@ -14,7 +14,7 @@ use super::findings::Remarks;
 use super::found::Found;
 use super::place::Place;
 use super::times::{Timed, open};
-use super::vectors::positions;
+use super::vectors::{are_same_places, positions};
 
 /// Steps of Newton's method from a position back to its reference position.
 const MOST_ITERATIONS: usize = 50;
@@ -69,7 +69,8 @@ pub(super) fn scheme<const D: usize>(
 fn stay(timed: &[Timed], first: &Snapshot) -> Result<bool, ScoreError> {
     let positions = first.positions()?;
     for frame in &timed[1..] {
-        if open(&frame.file)?.positions()? != positions {
+        let components = first.points().map_or(3, |head| head.components);
+        if !are_same_places(&open(&frame.file)?.positions()?, &positions, components) {
             return Ok(false);
         }
     }

@@ -113,6 +113,20 @@ pub(super) fn count_not_finite(
     remarks.met("not-finite", true, count, what, || particle(first, snapshot));
 }
 
+/// Whether two lists hold the same points, in any order, to the bit.
+pub(super) fn are_same_places(one: &[f64], other: &[f64], components: usize) -> bool {
+    if one == other {
+        return true;
+    }
+    let sorted = |flat: &[f64]| {
+        let bits = |row: &[f64]| row.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        let mut rows: Vec<_> = flat.chunks_exact(components.max(1)).map(bits).collect();
+        rows.sort_unstable();
+        rows
+    };
+    one.len() == other.len() && sorted(one) == sorted(other)
+}
+
 /// A particle, for messages.
 pub(super) fn particle(particle: usize, snapshot: &Snapshot) -> String {
     format!("particle {particle} of {}", snapshot.path().display())

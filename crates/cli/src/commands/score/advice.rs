@@ -15,6 +15,8 @@ const SUSPICIOUS: f64 = 0.1;
 const EXPLAINED: f64 = 0.25;
 /// The share that is left of the errors of other recorded fields: coarse grids leave more of those of F and P.
 const SUPPORTED: f64 = 0.5;
+/// The relative error of u that may be left, on coarse grids too.
+const MOST_LEFT: f64 = 0.2;
 /// Below this order the grid is not what the error is from.
 const NO_ORDER: f64 = 0.5;
 /// More numbers than are read anew for every trial.
@@ -148,11 +150,10 @@ impl Case<'_> {
         let row = measure(exact, self.input, &hypothesis.reading).ok()?.rows.pop()?;
         let explains = |field: &Quantity| {
             let error = |row: &ScoreRow| row.errors.get(field).map(|norms| norms[Norm::L2]);
-            error(&row)
-                .zip(error(self.row))
-                .is_some_and(|(after, before)| after <= SUPPORTED * before)
+            let share = if *field == Quantity::Displacement { EXPLAINED } else { SUPPORTED };
+            error(&row).zip(error(self.row)).is_some_and(|(after, before)| after <= share * before)
         };
-        let is_small = relative(&row) <= EXPLAINED * relative(self.row);
+        let is_small = relative(&row) <= MOST_LEFT.min(SUPPORTED * relative(self.row));
         (row.is_whole() && is_small && self.row.fields.iter().all(explains)).then(|| relative(&row))
     }
 
