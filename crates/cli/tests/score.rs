@@ -529,3 +529,19 @@ fn files_of_two_gigabytes_are_refused_in_bounded_memory() {
         }
     }
 }
+
+#[test]
+fn times_of_a_static_solution_have_no_bounds() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let specification =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/tests/data/ok/static-bend.toml");
+    let specification = specification.display();
+    for t in ["0", "1", "250"] {
+        fs::write(place.join("p.csv"), format!("X,Y,t\n0.3,0.2,{t}\n0.6,0.4,{t}\n")).unwrap();
+        let called = mms(place, &format!("eval {specification} --points p.csv --csv e.csv"));
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        let called = mms(place, &format!("score {specification} e.csv --cells 4"));
+        assert!(called.stdout.contains("status: ok"), "{t}: {}{}", called.stdout, called.stderr);
+    }
+}

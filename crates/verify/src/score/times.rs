@@ -70,7 +70,9 @@ pub(super) fn times<const D: usize>(
     let end = options.periods * exact.period();
     let slack = TIME_SLACK * end;
     let is_outside = |frame: &&Timed| !(-slack..=end + slack).contains(&frame.time);
-    let outside = timed.iter().filter(is_outside).count();
+    // A time, or a load factor, of a solution that does not move has no bounds.
+    let bounded = if is_static(exact) { &timed[..0] } else { &timed[..] };
+    let outside = bounded.iter().filter(is_outside).count();
     if outside == timed.len() {
         let times = timed.iter().map(|frame| frame.time);
         return Err(ScoreError::NoOverlap {
