@@ -224,7 +224,13 @@ fn one_cell_and_one_particle_are_enough_for_a_run() {
         for per_cell in [1, 2] {
             let case = Case { cells: 1, per_cell, ..case };
             let row = row(&exact, &case);
-            assert_eq!((row.status, row.particles), (Status::Ok, per_cell), "{case:?}");
+            // On one cell the error may exceed the motion, which is told; the run comes to its end.
+            assert!(
+                row.status == Status::Ok || row.status.is_not_judged(),
+                "{case:?}: {}",
+                row.status
+            );
+            assert_eq!(row.particles, per_cell, "{case:?}");
             assert!(row.errors.u.linf < 0.05, "{case:?}: {:?}", row.errors.u);
         }
     }
@@ -319,7 +325,9 @@ fn a_million_steps_on_one_cell_end_with_the_error_of_the_first_ones() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let of = |periods: f64| pool.install(|| row(&exact, &Case { periods, ..few }));
     let (long, short) = (of(200_000.0), of(20.0));
-    assert_eq!((long.steps, &long.status), (1_000_000, &Status::Ok));
+    // On one cell the error exceeds the motion, which is told; the run comes to its end.
+    assert!(long.status == Status::Ok || long.status.is_not_judged(), "{}", long.status);
+    assert_eq!(long.steps, 1_000_000);
     let ratio = long.errors.u.linf / short.errors.u.linf;
     assert!((1.0..1.01).contains(&ratio), "{ratio}: {long:?}");
 }

@@ -180,10 +180,12 @@ fn a_run_that_breaks_down_has_its_history_until_then() {
 fn means(stepping: Stepping) -> Vec<f64> {
     let case = Case { scheme: scheme(stepping), cells: 12, periods: 10.0, ..Case::default() };
     let (row, history) = history(AxisAligned::default(), &case);
-    assert_eq!(row.status, Status::Ok, "{stepping:?}");
+    // With so much energy the error exceeds the motion in the end.
+    assert!(row.status == Status::Ok || row.status.is_not_judged(), "{stepping:?}: {}", row.status);
     let drift = energy_drift(&history);
+    const PERIOD: f64 = 0.02;
     let of = |period: usize| {
-        let range = period as f64 * 0.02..(period + 1) as f64 * 0.02;
+        let range = period as f64 * PERIOD..(period + 1) as f64 * PERIOD;
         let own: Vec<f64> =
             drift.iter().filter(|point| range.contains(&point.0)).map(|point| point.1).collect();
         own.iter().sum::<f64>() / own.len() as f64
