@@ -171,9 +171,22 @@ def fortran(mms, folder, wanted):
             yield by_command(mms, folder, "Fortran", "axis-aligned-1d", "fortran", build, "{fields}/bar {cells} {out}", mistake)
 
 
-def table(outcomes):
+def merged(page, outcomes):
+    """The page with the rows of these outcomes; rows of others stay."""
+    before, _, rest = page.partition(BEGIN)
+    inside, _, after = rest.partition(END)
+    key = lambda row: row.split("|")[1:3]  # noqa: E731
+    rows = [row for row in inside.splitlines() if row.startswith("|")][2:]
+    for outcome in outcomes:
+        row = outcome.row()
+        places = [index for index, known in enumerate(rows) if key(known) == key(row)]
+        rows = [row if index in places else known for index, known in enumerate(rows)] + ([] if places else [row])
+    return before + BEGIN + "\n" + table(rows) + "\n" + END + after
+
+
+def table(rows):
     head = ["| solver | mistake planted | named | order with the opposite |", "|---|---|---|---:|"]
-    return "\n".join([*head, *(one.row() for one in outcomes)]) + "\n"
+    return "\n".join([*head, *rows]) + "\n"
 
 
 def main():
@@ -182,6 +195,7 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quick", action="store_true", help="a few mistakes of each solver")
     parser.add_argument("--only", metavar="SOLVER", help="one solver")
+    parser.add_argument("--mistake", help="one mistake")
     parser.add_argument("--page", type=Path, help="this page must have the table")
     parser.add_argument("--write", type=Path, metavar="PAGE", help="this page gets the table")
     options = parser.parse_args()
@@ -189,7 +203,9 @@ def main():
     mms = str(Path(options.mms).resolve())
 
     def of(solver):
-        return lambda mistake: (not options.quick or mistake in QUICK[solver]) and options.only in (None, solver)
+        return lambda mistake: (
+            (not options.quick or mistake in QUICK[solver]) and options.only in (None, solver) and options.mistake in (None, mistake)
+        )
 
     studies = [numpy_solver(of("NumPy")), scikit_fem(of("scikit-fem")), cpp(mms, options.folder, of("C++"))]
     if shutil.which("gfortran"):
@@ -205,8 +221,8 @@ def main():
     for outcome in wrong:
         print(f"FAILED: {outcome.solver}, {outcome.mistake}: {outcome.named} in place of {outcome.right}", file=sys.stderr)
     if options.write:
-        before, _, rest = options.write.read_text(encoding="utf-8").partition(BEGIN)
-        options.write.write_text(before + BEGIN + "\n" + table(outcomes) + "\n" + END + rest.partition(END)[2], encoding="utf-8")
+        page = options.write.read_text(encoding="utf-8")
+        options.write.write_text(merged(page, outcomes), encoding="utf-8")
     if options.page:
         text = options.page.read_text(encoding="utf-8")
         missing = [outcome.row() for outcome in outcomes if outcome.row() not in text]

@@ -79,6 +79,8 @@ pub(super) struct Search<'a> {
     pub(super) solver: &'a Solver<'a>,
     pub(super) expected: &'a Expected,
     pub(super) cells: &'a [usize],
+    /// Whether the errors fall with an order of about one, as those of a shift in time or place.
+    pub(super) is_of_first_order: bool,
     /// Why a mistake was not looked for.
     pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
 }
@@ -168,6 +170,9 @@ impl Search<'_> {
             let [one, other] = [one, other].map(|tried| self.expected.size(tried.finest()));
             one.total_cmp(&other)
         };
+        if self.is_of_first_order {
+            trials.sort_by_key(|trial| matches!(trial.cause.counter, Counter::Fields(_)));
+        }
         let whole = self.expected.size(&right.errors);
         let mut tried: Vec<Tried> = vec![];
         while !trials.is_empty() {
