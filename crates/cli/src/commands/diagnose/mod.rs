@@ -237,8 +237,13 @@ impl Told {
         options: &DiagnoseOptions,
         expected: &Expected,
     ) -> Result<()> {
-        let search =
-            Search { solver, expected, cells: &options.cells, not_tried: Mutex::default() };
+        let search = Search {
+            solver,
+            expected,
+            cells: &options.cells,
+            is_of_first_order: self.order() > 0.5,
+            not_tried: Mutex::default(),
+        };
         let tried = search.single(right)?;
         for Tried { trial, errors } in tried {
             let order = Expected::order(&errors, self.field);
