@@ -117,8 +117,8 @@ const EXAMPLES: [(&str, &[Example]); 18] = [
         "diagnose",
         &[
             (
-                "mms diagnose bar --target c --run './run.sh {fields} {cells} {out}'",
-                "run.sh compiles with the header in {fields}, and writes a file into {out}",
+                "mms diagnose bar --target c --run ./run.sh",
+                "run.sh compiles with the header in $MMS_FIELDS, and writes a file into $MMS_OUT",
             ),
             ("mms diagnose --list", "the mistakes that are looked for"),
         ],
