@@ -96,7 +96,7 @@ fn what_cannot_be_swept_is_refused() {
     let turning = turning.expect("a specification") + &moved.concat();
     std::fs::write(place.join("turning.toml"), turning).expect("a file");
     let call = "tradeoff turning.toml --budget 1s --json a.json";
-    refuses(place, call, &["stated in components along curvilinear coordinates"]);
+    refuses(place, call, &["directions along curvilinear coordinates", "in J, I1 and I2"]);
     refuses(place, "tradeoff ring --budget 2x", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff ring --budget=-1s", &["--budget", "90s, 2m or 1h"]);
     refuses(place, "tradeoff rings --budget 1s", &["did you mean 'ring'"]);

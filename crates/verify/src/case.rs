@@ -81,6 +81,18 @@ impl CflSpeed {
     }
 }
 
+/// A positive number rounded down to two digits.
+pub(crate) fn two_digits(value: f64) -> f64 {
+    if !value.is_normal() {
+        return value;
+    }
+    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
+    // What is less than a whole number by rounding alone stays.
+    let rounded = (value / unit + 1e-9).floor();
+    // A quotient prints shorter than a product where the unit has no exact form.
+    if unit < 1.0 { rounded / (1.0 / unit).round() } else { rounded * unit }
+}
+
 /// How much of an annulus or a spherical shell is modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {

@@ -9,13 +9,12 @@ use mmsmith_runtime::{AnySolution, Condition, Domain, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use crate::case::{Case, CflSpeed, Extent, law};
+use crate::case::{Case, CflSpeed, Extent, law, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Total, grid_name};
-use crate::usual_step::two_digits;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
 /// solution says.

@@ -4,7 +4,7 @@ use mmsmith_mpm::Law;
 use mmsmith_runtime::{AnySolution, Solution};
 use nalgebra::{SMatrix, SVector};
 
-use crate::case::{Case, CflSpeed, law};
+use crate::case::{Case, CflSpeed, law, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::points;
@@ -161,18 +161,6 @@ fn largest_eigenvalue<const D: usize>(tensor: &SMatrix<f64, D, D>) -> f64 {
         }
     }
     direction.dot(&(tensor * direction))
-}
-
-/// A positive number rounded down to two digits.
-pub(crate) fn two_digits(value: f64) -> f64 {
-    if !value.is_normal() {
-        return value;
-    }
-    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
-    // What is less than a whole number by rounding alone stays.
-    let rounded = (value / unit + 1e-9).floor();
-    // A quotient prints shorter than a product where the unit has no exact form.
-    if unit < 1.0 { rounded / (1.0 / unit).round() } else { rounded * unit }
 }
 
 #[cfg(test)]
