@@ -55,73 +55,46 @@
 //!
 //! # Modules
 //!
+//! - `scheme`: the choices. `simulation`: set-up and life cycle. `solver`: solvers of any scheme behind one door.
+//! - `particles`: what a particle has; bodies, clipped bodies, and meshes of domains that share corners.
+//! - `grid`: memory layout, walls, ghost nodes, grid update. `shape`: shape functions and weights.
+//! - `domain`: the domains that weights are means over, of each particle alone or on shared corners.
+//! - `kernel`: sums over weights in vector instructions, for blocks of particles.
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
-//! - `clip`: bodies of any shape; `mesh`: domains of particles on shared corners, cells of CPDI2, polygons and
-//!   polyhedra; `shared_corners`, `corner_values`, `corner_exchange`, `corner_step`: P2G and G2P by way of corners.
-//! - `scheme`: the choices. `support`, `shape_function`, `domain`, `weights`: weights of particles at nodes. `kernel`: sums over
-//!   them in vector instructions. `body`: particles with their domains.
-//! - `material`: the laws, one file each. `body_force`, `forcing`: the body force.
-//! - `grid`, `node`: memory layout, walls and ghost nodes. `parallel`: bins of particles and the two-colour schedule.
-//! - `decomposition`, `redistribute`, `corner_halo`, `directory`: several processes. `saved_state`: what a run goes on from.
-//! - `simulation`: set-up and life cycle. `state`, `geometry`, `health`: data and checks that the stages share.
+//! - `parallel`: bins of particles and the two-colour schedule. `processes`: several processes, and the state to resume from.
+//! - `material`: the laws, one file each.
 
-mod body;
-mod body_force;
-mod clip;
-mod corner_exchange;
-mod corner_halo;
-mod corner_step;
-mod corner_values;
-mod decomposition;
-mod directory;
 mod domain;
 mod error;
-mod extension;
 #[doc(hidden)]
 pub mod fault;
-mod forcing;
-mod g2p;
-mod g2p2g;
-mod geometry;
 mod grid;
-mod grid_update;
-mod health;
 mod kernel;
 mod material;
-mod mesh;
-mod node;
-mod p2g;
 mod parallel;
 mod particles;
-mod prefetch;
-mod redistribute;
-mod saved_state;
+mod processes;
 mod scheme;
-mod shape_function;
-mod shared_corners;
+mod shape;
 mod simd;
 mod simulation;
 mod solver;
-mod state;
 mod step;
-mod support;
 mod tensor;
 pub mod total_lagrangian;
-mod weights;
-mod xpic;
 
-pub use body::{Annulus, Body};
-pub use body_force::{AtTime, BodyForce, NoBodyForce};
-pub use clip::{Clip, Facet, Side};
-pub use decomposition::{Arrangement, Share};
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use kernel::copies::BLOCK;
 pub use material::{ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric};
-pub use mesh::{Faces, Interpolation, Load, Mesh, Numbers};
 pub use particles::Particles;
-pub use saved_state::{SavedState, SavedStateError};
+pub use particles::body::{Annulus, Body};
+pub use particles::clip::{Clip, Facet, Side};
+pub use particles::mesh::{Faces, Interpolation, Load, Mesh, Numbers};
+pub use processes::decomposition::{Arrangement, Share};
+pub use processes::saved_state::{SavedState, SavedStateError};
 pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
 pub use simd::Registers;
 pub use simulation::{Simulated, Simulation};
 pub use solver::{Scalar, Solver, TotalSetUp};
+pub use step::body_force::{AtTime, BodyForce, NoBodyForce};

@@ -4,29 +4,29 @@ use std::fmt;
 
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::body::Body;
-use crate::body_force::BodyForce;
-use crate::corner_exchange::Exchange;
-use crate::corner_exchange::invalidity_of_corner;
-use crate::decomposition::{Arrangement, Part, Share, admit};
+use crate::domain::Support;
+use crate::domain::corner_exchange::Exchange;
+use crate::domain::corner_exchange::invalidity_of_corner;
 use crate::error::{SetupError, StepError};
 use crate::fault::Fault;
-use crate::geometry::Constants;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::grid::{Grid, Layout};
-use crate::health::{Invalid, Outcome};
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
-use crate::mesh::{Interpolation, Mesh};
-use crate::node::Node;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
+use crate::particles::body::Body;
+use crate::particles::mesh::{Interpolation, Mesh};
+use crate::processes::decomposition::{Arrangement, Part, Share, admit};
 use crate::scheme::{Settings, Shape, Taken};
-use crate::shape_function::HALF_SIZE_LIMIT;
+use crate::shape::one_axis::HALF_SIZE_LIMIT;
 use crate::simd::Lanes;
-use crate::state::State;
+use crate::step::body_force::BodyForce;
+use crate::step::health::{Invalid, Outcome};
+use crate::step::state::State;
 use crate::step::{StepTimes, is_fused};
-use crate::support::Support;
 use crate::tensor::{determinant, real};
 
 /// A running simulation.

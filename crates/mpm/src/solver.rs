@@ -4,17 +4,17 @@ use std::ops::Range;
 
 use nalgebra::SVector;
 
-use crate::body::{self, Annulus, Body};
-use crate::body_force::BodyForce;
-use crate::clip::{self, Clip, Facet};
-use crate::decomposition::{Arrangement, Share};
 use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
 use crate::material::Law;
 use crate::particles::Particles;
-use crate::saved_state::{SavedState, SavedStateError};
+use crate::particles::body::{self, Annulus, Body};
+use crate::particles::clip::{self, Clip, Facet};
+use crate::processes::decomposition::{Arrangement, Share};
+use crate::processes::saved_state::{SavedState, SavedStateError};
 use crate::scheme::Settings;
 use crate::simulation::{Simulated, Simulation};
+use crate::step::body_force::BodyForce;
 use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
 /// A solver that can be stepped and looked at.

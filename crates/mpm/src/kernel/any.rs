@@ -3,11 +3,11 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::fault::Fault;
-use crate::geometry::Constants;
-use crate::node::{LANES, Node};
-use crate::shape_function::EXTENDED;
+use crate::grid::geometry::Constants;
+use crate::grid::node::{LANES, Node};
+use crate::shape::one_axis::EXTENDED;
+use crate::shape::weights::Weights;
 use crate::simd::{Lane4, Lane8, Lanes, Vectors};
-use crate::weights::Weights;
 
 /// Values of the grid at a particle, the result of G2P.
 #[derive(Clone, Copy, Debug)]

@@ -2,17 +2,17 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::corner_values::Seen;
-use crate::geometry::Constants;
+use crate::domain::Support;
+use crate::domain::corner_values::Seen;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::parallelograms::ParallelogramWeights;
 use crate::kernel::product::ProductWeights;
 use crate::kernel::shared::FromCorners;
 use crate::material::LibraryLaw;
-use crate::node::Node;
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
-use crate::support::Support;
 
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {

@@ -2,11 +2,11 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use crate::domain::Support;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::Block;
 use crate::kernel::copies::BLOCK;
 use crate::simd::Lanes;
-use crate::support::Support;
 
 /// What a pass over blocks computes with. Entries beyond the particles of a block are left from another block, and not read.
 pub(crate) struct Buffers<T, const D: usize> {

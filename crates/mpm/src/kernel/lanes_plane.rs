@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
+use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Receive};
-use crate::node::{LANES, Node};
+use crate::shape::weights::{Weights, is_middle};
 use crate::simd::{Lane4, Lanes, Vectors};
-use crate::weights::{Weights, is_middle};
 
 /// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
 #[inline(always)]
@@ -92,7 +92,7 @@ fn rows<const D: usize, const W: usize>() -> usize {
 /// P2G of the first `count` particles, particle `k` with the weights `weights(k)`; as [`p2g`](crate::kernel::any::p2g).
 ///
 /// Successive particles with the same nodes form a run, whose contributions are summed in registers. Of three nodes in a
-/// row the [middle](crate::weights::is_middle) one needs no weight: it sums whole contributions, and the sums of the outer two are
+/// row the [middle](crate::shape::weights::is_middle) one needs no weight: it sums whole contributions, and the sums of the outer two are
 /// subtracted at the end of the run.
 #[inline(always)]
 pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usize>(
@@ -185,7 +185,7 @@ struct Given<T> {
     mass: Lane4<T>,
 }
 
-/// The weights along axis 0, one for [middle](crate::weights::is_middle) nodes.
+/// The weights along axis 0, one for [middle](crate::shape::weights::is_middle) nodes.
 #[inline(always)]
 fn weights_along_row<T: Lanes, const D: usize, const W: usize>(
     weights: &impl Weights<T, D, W>,
@@ -197,7 +197,7 @@ fn weights_along_row<T: Lanes, const D: usize, const W: usize>(
     lanes
 }
 
-/// Nodes from one outer node to the next. A branch for the [middle](crate::weights::is_middle) one in the loop would keep the compiler from unrolling it.
+/// Nodes from one outer node to the next. A branch for the [middle](crate::shape::weights::is_middle) one in the loop would keep the compiler from unrolling it.
 const fn to_next_outer<const W: usize>() -> usize {
     if W == 3 { 2 } else { 1 }
 }
@@ -330,7 +330,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
 }
 
 /// Replaces values at successive nodes of an axis by their differences; one value stays, that of the
-/// [middle](crate::weights::is_middle) one of three nodes or of the first of two.
+/// [middle](crate::shape::weights::is_middle) one of three nodes or of the first of two.
 #[inline(always)]
 fn differ<T: Lanes, V: Vectors, const W: usize>(vectors: V, values: &mut [Lane4<T>; W]) {
     match &mut values[..] {
@@ -393,7 +393,7 @@ mod tests {
     use super::*;
     use crate::kernel::any::{Interpolated, g2p, p2g};
     use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
-    use crate::shape_function::{
+    use crate::shape::one_axis::{
         AxisWeights, CubicSpline, Gimp, Hat, QuadraticSpline, ShapeFunction, index, moment,
     };
 

@@ -2,10 +2,10 @@
 //!
 //! Loops, not closures: functions of the standard library that call one are compiled without the registers of the kernel.
 
+use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::node::{LANES, Node};
+use crate::shape::weights::Weights;
 use crate::simd::{Lane8, Lanes, Vectors};
-use crate::weights::Weights;
 
 /// The weights of a particle along an axis, each as a factor of eight numbers.
 #[inline(always)]

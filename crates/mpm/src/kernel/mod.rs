@@ -17,5 +17,6 @@ mod lanes_plane;
 mod lanes_space;
 pub(crate) mod parallelograms;
 pub(crate) mod points;
+pub(crate) mod prefetch;
 mod product;
 pub(crate) mod shared;

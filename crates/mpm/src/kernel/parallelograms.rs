@@ -12,16 +12,16 @@
 
 use std::array;
 
-use crate::domain::{
-    HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, deformed, inverse, is_upper,
-    slopes_of_parallelogram,
-};
-use crate::geometry::Constants;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::points::start_of_row;
-use crate::node::Node;
-use crate::shape_function::{index, node_below};
+use crate::shape::cells::{
+    HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram, deformed, inverse, is_upper,
+    slopes_of_parallelogram,
+};
+use crate::shape::one_axis::{index, node_below};
 use crate::simd::{Eight, Lane8, Lanes, Loop, Vectors, dispatch};
 use crate::tensor::real;
 

@@ -2,11 +2,11 @@
 
 use nalgebra::SVector;
 
-use crate::corner_values::AlongAxes;
-use crate::geometry::Constants;
-use crate::node::Node;
-use crate::shape_function::{Hat, ShapeFunction, index};
-use crate::shared_corners::SharedCorners;
+use crate::domain::corner_values::AlongAxes;
+use crate::domain::shared_corners::SharedCorners;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
+use crate::shape::one_axis::{Hat, ShapeFunction, index};
 use crate::simd::{Lane8, Lanes, Loop, Vectors};
 
 /// The nodes around a point.

@@ -5,19 +5,19 @@ use std::marker::PhantomData;
 use nalgebra::{SMatrix, SVector};
 
 use crate::fault::{Fault, Planted};
-use crate::geometry::Constants;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
-use crate::node::Node;
-use crate::shape_function::{
+use crate::shape::one_axis::{
     CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, half_size, index,
     moment,
 };
+use crate::shape::weights::{ExtendedWeights, Weights, is_middle};
 use crate::simd::{Lanes, Loop, Vectors, dispatch};
 use crate::tensor::real;
-use crate::weights::{ExtendedWeights, Weights, is_middle};
 
 /// One number for every particle of a block.
 type PerParticle<T> = [T; BLOCK];

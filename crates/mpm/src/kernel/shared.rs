@@ -5,15 +5,15 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::corner_values::{AlongAxes, CornerValues};
-use crate::domain::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
-use crate::geometry::Constants;
+use crate::domain::corner_values::{AlongAxes, CornerValues};
+use crate::domain::shared_corners::SharedCorners;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
 use crate::kernel::parallelograms::GROUP;
-use crate::mesh::{Mesh, Share};
-use crate::node::Node;
-use crate::shared_corners::SharedCorners;
+use crate::particles::mesh::{Mesh, Share};
+use crate::shape::cells::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
 use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.

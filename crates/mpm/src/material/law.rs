@@ -7,7 +7,7 @@ use mmsmith_vocabulary::{Material, Moduli, Term};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
 use super::{SIDE_BY_SIDE, Stressed, jacobian};
-use crate::geometry::Constants;
+use crate::grid::geometry::Constants;
 use crate::kernel::any::Contributions;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::copies::BLOCK;

@@ -16,7 +16,6 @@ use super::coordinates::{Coordinates, Row};
 use super::fit::{Fit, Line};
 use super::mass::{Band, Mass};
 use super::piece;
-use crate::body_force::BodyForce;
 use crate::error::{SetupError, StepError};
 use crate::fault::{Fault, Planted};
 use crate::kernel::copies::BLOCK;
@@ -26,7 +25,8 @@ use crate::material::{
 };
 use crate::parallel::chunks::{each, each_chunk};
 use crate::particles::Particles;
-use crate::saved_state::{SavedState, SavedStateError, replace_whole};
+use crate::processes::saved_state::{SavedState, SavedStateError, replace_whole};
+use crate::step::body_force::BodyForce;
 use crate::tensor::determinant;
 
 /// A tensor-product grid that covers the body, with the particles in it.

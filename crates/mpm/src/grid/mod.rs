@@ -1,0 +1,342 @@
+//! The background grid: its cells and walls, and the layout of its nodes in memory with ghost nodes beyond walls.
+
+pub(crate) mod extension;
+pub(crate) mod geometry;
+pub(crate) mod grid_update;
+pub(crate) mod node;
+
+use std::ops::Range;
+
+use nalgebra::{RealField, SVector};
+
+use crate::error::SetupError;
+use crate::tensor::real;
+
+/// Background grid: a box of cubic cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid<T, const D: usize> {
+    /// The corner with the smallest coordinates, a length.
+    pub lower: SVector<T, D>,
+    /// Edge of a cell, a length.
+    pub spacing: T,
+    /// Number of cells along each axis.
+    pub cells: [usize; D],
+    /// `walls[axis][0]` for the lower and `walls[axis][1]` for the upper face across an axis: whether it is a frictionless sliding
+    /// wall, which is also a plane of symmetry. All other faces are open: no particle's centre may pass them.
+    pub walls: [[bool; 2]; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Grid<T, D> {
+    /// The corner with the largest coordinates, a length.
+    pub fn upper(&self) -> SVector<T, D> {
+        SVector::from_fn(|a, _| self.lower[a] + self.spacing * real(self.cells[a] as f64))
+    }
+}
+
+/// Rows in a bin in one dimension, the largest number in any dimension.
+pub(crate) const BIN_ROWS: usize = 256;
+/// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may need one more.
+pub(crate) const PAD_BELOW: usize = 3;
+/// Node layers above the last cell, for the extended support of a particle on the upper face.
+const PAD_ABOVE: usize = 5;
+
+/// Node indices along an axis are formed in 32 bits.
+const MAX_LAYERS: usize = i32::MAX as usize;
+
+/// A layer of ghost nodes beyond a wall, and the layer of its mirror image.
+#[derive(Clone, Copy, Debug)]
+struct Ghost {
+    axis: usize,
+    layer: usize,
+    image: usize,
+    /// Whether the component across the wall changes its sign between the two (an odd number of reflections).
+    flips: bool,
+}
+
+impl Ghost {
+    /// The component that changes its sign.
+    fn flip(&self) -> Option<usize> {
+        self.flips.then_some(self.axis)
+    }
+}
+
+/// Layout of the nodes in memory: node `(i, j, k)` is at `i strides[0] + j strides[1] + k strides[2]`, axis 0 fastest, with padding
+/// on all sides.
+///
+/// Operations on ghost nodes come in two parts: within rows, and from row to row for walls across the last axis.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout<const D: usize> {
+    pub(crate) dims: [usize; D],
+    pub(crate) strides: [usize; D],
+    /// Number of nodes that this process holds: all, or those of some successive rows.
+    pub(crate) nodes: usize,
+    /// The first row that it holds.
+    pub(crate) first_row: usize,
+    ghosts: Vec<Ghost>,
+    /// Axis and layer of each wall.
+    walls: Vec<(usize, usize)>,
+}
+
+impl<const D: usize> Layout<D> {
+    /// Lays out the nodes of `grid`, if `bytes_per_node` times their number can be addressed at all.
+    pub(crate) fn new<T>(grid: &Grid<T, D>, bytes_per_node: usize) -> Result<Self, SetupError> {
+        let too_large = || {
+            let nodes = grid.cells.iter().fold(1_u128, |n, &c| n.saturating_mul(c as u128 + 9));
+            let bytes = nodes.saturating_mul(bytes_per_node as u128);
+            SetupError::GridTooLarge { cells: grid.cells.to_vec(), bytes }
+        };
+        let mut layout = Self {
+            dims: [0; D],
+            strides: [0; D],
+            nodes: 1,
+            first_row: 0,
+            ghosts: vec![],
+            walls: vec![],
+        };
+        for (axis, &cells) in grid.cells.iter().enumerate() {
+            if cells == 0 {
+                return Err(SetupError::NoCells { axis });
+            }
+            let dim = cells.checked_add(1 + PAD_BELOW + PAD_ABOVE).ok_or_else(too_large)?;
+            if dim > MAX_LAYERS {
+                return Err(too_large());
+            }
+            layout.dims[axis] = dim;
+            layout.strides[axis] = layout.nodes;
+            layout.nodes = layout.nodes.checked_mul(dim).ok_or_else(too_large)?;
+            let (first, last) = (PAD_BELOW, PAD_BELOW + cells);
+            let [lower, upper] = grid.walls[axis];
+            layout.walls.extend(lower.then_some((axis, first)));
+            layout.walls.extend(upper.then_some((axis, last)));
+            for layer in (0..dim).filter(|&l| (lower && l < first) || (upper && l > last)) {
+                // Between two walls on a coarse grid a far layer is mirrored more than once.
+                let (low, high) = (first as isize, last as isize);
+                let (mut image, mut flips) = (layer as isize, false);
+                while (lower && image < low) || (upper && image > high) {
+                    image = if lower && image < low { 2 * low - image } else { 2 * high - image };
+                    flips = !flips;
+                }
+                // Across from an open face the image may lie beyond all padding; no box reaches such a layer.
+                if let Ok(image) = usize::try_from(image)
+                    && image < dim
+                {
+                    layout.ghosts.push(Ghost { axis, layer, image, flips });
+                }
+            }
+        }
+        // One bin of slack keeps the arithmetic on rows from overflowing.
+        let addressable =
+            layout.nodes.checked_mul(bytes_per_node).map(|b| b <= isize::MAX as usize);
+        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * BIN_ROWS) {
+            return Err(too_large());
+        }
+        Ok(layout)
+    }
+
+    /// Holds some rows alone.
+    pub(crate) fn hold(&mut self, rows: Range<usize>) {
+        self.first_row = rows.start;
+        self.nodes = rows.len() * self.row();
+    }
+
+    /// The rows that this process holds.
+    pub(crate) fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.nodes / self.row().max(1)
+    }
+
+    /// Nodes in a row: all that share an index along the last axis.
+    pub(crate) fn row(&self) -> usize {
+        self.strides[D - 1]
+    }
+
+    /// Calls `visit` with the index of every node in a layer across an axis, of `nodes` nodes from the beginning of a row on.
+    fn for_layer(&self, nodes: usize, (axis, layer): (usize, usize), mut visit: impl FnMut(usize)) {
+        let (stride, slab) = (self.strides[axis], self.strides[axis] * self.dims[axis]);
+        for start in (layer * stride..nodes).step_by(slab) {
+            (start..start + stride).for_each(&mut visit);
+        }
+    }
+
+    /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, Some(axis))`, where the component along
+    /// `axis` changes its sign.
+    #[cfg(test)]
+    pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
+        self.fold_rows(nodes, &add);
+        self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
+    }
+
+    /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, Some(axis))`, with the axis as in `fold`.
+    #[cfg(test)]
+    pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
+        self.unfold_rows(nodes, &mirror);
+        self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);
+    }
+
+    /// The part of [`fold`](Self::fold) that stays within a row, for some rows.
+    pub(crate) fn fold_rows<N: Copy>(
+        &self,
+        rows: &mut [N],
+        add: &impl Fn(&mut N, N, Option<usize>),
+    ) {
+        self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
+            let ghost = rows[ghost];
+            add(&mut rows[image], ghost, flip);
+        });
+    }
+
+    /// The part of [`unfold`](Self::unfold) that stays within a row, for some rows.
+    pub(crate) fn unfold_rows<N: Copy>(
+        &self,
+        rows: &mut [N],
+        mirror: &impl Fn(N, Option<usize>) -> N,
+    ) {
+        self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
+            rows[ghost] = mirror(rows[image], flip);
+        });
+    }
+
+    /// The part of [`fold`](Self::fold) that goes from row to row, which comes after that within rows: for one of the
+    /// [edges](Self::edges), among the rows from row `first` on.
+    pub(crate) fn fold_edge<N: Copy>(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        rows: &mut [N],
+        add: &impl Fn(&mut N, N, Option<usize>),
+    ) {
+        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
+            let ghost = rows[ghost];
+            add(&mut rows[image], ghost, flip);
+        });
+    }
+
+    /// The part of [`unfold`](Self::unfold) that goes from row to row, as [`fold_edge`](Self::fold_edge).
+    pub(crate) fn unfold_edge<N: Copy>(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        rows: &mut [N],
+        mirror: &impl Fn(N, Option<usize>) -> N,
+    ) {
+        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
+            rows[ghost] = mirror(rows[image], flip);
+        });
+    }
+
+    /// Calls `visit(ghost, image, flip)` for every ghost node with its mirror image in the same row, among `nodes` nodes from the
+    /// beginning of a row on; `flip` is the component that changes its sign.
+    #[inline(always)]
+    fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Option<usize>)) {
+        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
+            let (ghost, image) = (g.layer * self.strides[g.axis], g.image * self.strides[g.axis]);
+            self.for_layer(nodes, (g.axis, g.layer), |index| {
+                visit(index, index - ghost + image, g.flip());
+            });
+        }
+    }
+
+    /// As [`for_ghosts_in_rows`](Self::for_ghosts_in_rows) for ghost nodes with mirror images in other rows, both at one edge;
+    /// indices count from the beginning of row `first`.
+    #[inline(always)]
+    fn for_ghosts_of_edge(
+        &self,
+        edge: &Range<usize>,
+        first: usize,
+        mut visit: impl FnMut(usize, usize, Option<usize>),
+    ) {
+        let row = self.row();
+        for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
+            let (ghost, image) = ((g.layer - first) * row, (g.image - first) * row);
+            (0..row).for_each(|node| visit(ghost + node, image + node, g.flip()));
+        }
+    }
+
+    /// The rows that are on walls across the last axis or beyond, and their mirror images: those at the lower end of the
+    /// grid and those at its upper end. On a coarse grid all rows are at the lower end.
+    pub(crate) fn edges(&self) -> [Range<usize>; 2] {
+        let end = self.dims[D - 1];
+        let (mut low, mut high) = (0, end);
+        for g in self.ghosts.iter().filter(|g| g.axis == D - 1) {
+            if g.layer < PAD_BELOW {
+                low = low.max(g.image + 1);
+            } else {
+                high = high.min(g.image);
+            }
+        }
+        if low < high { [0..low, high..end] } else { [0..end, end..end] }
+    }
+
+    /// Calls `clear(node, axis)` for every node on a wall across `axis`, in the rows from row `first` on.
+    pub(crate) fn on_walls<N>(&self, first: usize, rows: &mut [N], clear: impl Fn(&mut N, usize)) {
+        for &(axis, layer) in &self.walls {
+            if axis < D - 1 {
+                self.for_layer(rows.len(), (axis, layer), |index| clear(&mut rows[index], axis));
+            } else if let Some(layer) = layer.checked_sub(first) {
+                let row = rows.chunks_mut(self.row()).nth(layer).unwrap_or_default();
+                row.iter_mut().for_each(|node| clear(node, axis));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(cells: [usize; 2], walls: [[bool; 2]; 2]) -> Grid<f64, 2> {
+        Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls }
+    }
+
+    #[test]
+    fn folding_conserves_the_sum_and_unfolding_mirrors() {
+        for cells in [[1, 1], [2, 3], [5, 4]] {
+            let layout = Layout::new(&grid(cells, [[true; 2]; 2]), 8).unwrap();
+            // Unfolding restores weights that are symmetric about both walls of an axis.
+            let mut nodes = vec![0.0; layout.nodes];
+            layout.fold(&mut nodes, |_, _, _| {});
+            for (index, node) in nodes.iter_mut().enumerate() {
+                *node = (index % 7) as f64;
+            }
+            let (mut inside, total) = (0.0, nodes.iter().sum::<f64>());
+            layout.fold(&mut nodes, |image, ghost, _| *image += ghost);
+            for j in PAD_BELOW..=PAD_BELOW + cells[1] {
+                for i in PAD_BELOW..=PAD_BELOW + cells[0] {
+                    inside += nodes[i + layout.row() * j];
+                }
+            }
+            assert_eq!(inside, total);
+
+            // A field that is odd about the walls across axis 0 and even about those across axis 1.
+            let wave = |i: usize, j: usize| {
+                let angle = |k: usize, n: usize| {
+                    std::f64::consts::PI * (k as f64 - PAD_BELOW as f64) / n as f64
+                };
+                angle(i, cells[0]).sin() * angle(j, cells[1]).cos()
+            };
+            let exact: Vec<f64> =
+                (0..layout.nodes).map(|k| wave(k % layout.row(), k / layout.row())).collect();
+            let mut field = exact.clone();
+            for (k, value) in field.iter_mut().enumerate() {
+                let (i, j) = (k % layout.row(), k / layout.row());
+                let within = |k: usize, n: usize| (PAD_BELOW..=PAD_BELOW + n).contains(&k);
+                if !within(i, cells[0]) || !within(j, cells[1]) {
+                    *value = f64::NAN;
+                }
+            }
+            layout.unfold(&mut field, |image, flip| if flip == Some(0) { -image } else { image });
+            for (a, b) in field.iter().zip(&exact) {
+                assert!((a - b).abs() < 1e-12, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn grids_beyond_memory_are_refused() {
+        let huge = grid([usize::MAX / 2, 16], [[false; 2]; 2]);
+        assert!(matches!(Layout::new(&huge, 40), Err(SetupError::GridTooLarge { .. })));
+        let long = grid([usize::MAX, 1], [[false; 2]; 2]);
+        assert!(matches!(Layout::new(&long, 40), Err(SetupError::GridTooLarge { .. })));
+        let empty = grid([3, 0], [[false; 2]; 2]);
+        assert_eq!(Layout::new(&empty, 40).err(), Some(SetupError::NoCells { axis: 1 }));
+    }
+}

@@ -1,0 +1,101 @@
+//! Particles go to the process of their bin.
+
+mod mesh;
+
+use std::ops::Range;
+use std::slice;
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::domain::Support;
+use crate::grid::node::Node;
+use crate::parallel::coloring::Held;
+use crate::particles::Particles;
+use crate::processes::decomposition::Move;
+use crate::shape::cells::HalfEdges;
+use crate::simd::Lanes;
+use crate::step::state::State;
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,
+    /// or of each corner that they share.
+    pub(crate) fn sort_as(&mut self, mut keys: Vec<u32>) {
+        if self.part.is_some() {
+            keys = match self.support {
+                Support::Mesh(_) => self.give_mesh(&keys),
+                _ => self.give_to_bins(keys),
+            };
+        }
+        self.bins.sort_as(keys);
+    }
+
+    /// Gives every particle to the process of its bin. Gives the sub-bins of those that are here then.
+    fn give_to_bins(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
+        let bins: Vec<usize> = keys.iter().map(|&key| self.bins.bin_of_key(key)).collect();
+        let mut counts = vec![0_u64; self.bins.rows().count()];
+        bins.iter().for_each(|&bin| counts[bin] += 1);
+        let Some(part) = &mut self.part else { return keys };
+        let own = part.cut(counts);
+        let holders: Vec<usize> = bins.into_iter().map(|bin| part.holder(bin)).collect();
+        if let Some(moved) = self.give(&|p| slice::from_ref(&holders[p])) {
+            moved.replace(&mut keys);
+        }
+        self.hold(own, keys.len());
+        keys
+    }
+
+    /// Gives every particle to the processes `to(particle)`, and tells how they move; a mesh stays.
+    pub(crate) fn give<'a>(&mut self, to: &dyn Fn(usize) -> &'a [usize]) -> Option<Move> {
+        let Self { particles, support, part, .. } = self;
+        let part = part.as_mut()?;
+        let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
+        part.version += 1;
+        let before = std::mem::replace(&mut part.ids, Arc::new(ids)).len();
+        let Particles { X, x, v, F, mass, volume, half_size: _ } = particles;
+        [X, x, v].into_iter().for_each(|vectors| moved.replace(vectors));
+        moved.replace(F);
+        [&mut *mass, &mut *volume].into_iter().for_each(|numbers| moved.replace(numbers));
+        match support {
+            Support::Product(_) | Support::Mesh(_) => {}
+            Support::Cpdi { half_edges } => {
+                let each: Vec<_> = (0..before).map(|p| *half_edges.of(p)).collect();
+                *half_edges = HalfEdges::new(moved.all(&each));
+            }
+        }
+        if part.is_affine {
+            moved.replace(&mut self.affine);
+        }
+        if self.keeps_F_early {
+            self.F_early.resize(x.len(), SMatrix::identity());
+        }
+        let (first_mass, first_volume) = (mass.first().copied(), volume.first().copied());
+        self.uniform = first_mass.zip(first_volume).filter(|(m, V)| {
+            mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
+        });
+        Some(moved)
+    }
+
+    /// Makes room for the bins `own`, with so many particles or corners, and for the rows that those reach.
+    fn hold(&mut self, own: Range<usize>, points: usize) {
+        let Self { constants, layout, bins, .. } = self;
+        let rows = bins.rows();
+        let held = Held { bands: own, all: rows.count() };
+        let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
+        bins.hold(held, points);
+        if rows == layout.rows() {
+            return;
+        }
+        layout.hold(rows);
+        constants.nodes_before = (layout.first_row * layout.row()) as f64;
+        let resize = |nodes: &mut Vec<Node<T, D>>| {
+            if !nodes.is_empty() {
+                *nodes = vec![Node::zero(); layout.nodes];
+            }
+        };
+        [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
+        if !self.filtered.is_empty() {
+            self.filtered = vec![SVector::zeros(); layout.nodes];
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! The state of a simulation between two steps, as bytes, and simulations that go on from it.
+//!
+//! A process saves the particles that it holds. Any number of processes goes on with them: first each particle goes to a process that
+//! follows from its number, where its state is put in place, then to the process of the bin that it was sorted into before the state was
+//! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
+
+use std::slice;
+
+use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
+use mmsmith_ranks::total;
+use nalgebra::{SMatrix, SVector};
+use thiserror::Error;
+
+use crate::domain::Support;
+use crate::particles::Particles;
+use crate::processes::decomposition::Move;
+use crate::processes::directory::Directory;
+use crate::simd::Lanes;
+use crate::simulation::Simulation;
+use crate::step::state::State;
+
+/// The arrays that one process saved, in this machine's byte order.
+pub type SavedState = Vec<Vec<u8>>;
+
+/// A saved state that a simulation cannot go on from.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum SavedStateError {
+    /// Another number of arrays.
+    #[error("it has {found} arrays where this run has {expected}")]
+    Arrays {
+        /// The number of arrays saved.
+        found: usize,
+        /// The number of this run's.
+        expected: usize,
+    },
+    /// An array of another length.
+    #[error("an array has {found} bytes where this run's has {expected}")]
+    Length {
+        /// Bytes saved.
+        found: usize,
+        /// Bytes of this run's.
+        expected: usize,
+    },
+    /// Not each of the particles once.
+    #[error("it has other particles than this run")]
+    Particles,
+    /// Numbers that do not belong together.
+    #[error("it has a corner or a bin that this run does not have")]
+    Place,
+    /// Saved by several processes, for a scheme that one simulates.
+    #[error("it is in {found} parts where this run has one")]
+    Parts {
+        /// The number of parts.
+        found: usize,
+    },
+    /// Found by another process.
+    #[error("another process has found it to be of another run")]
+    Elsewhere,
+}
+
+/// Puts saved arrays in place of those of a state that one process has as a whole.
+pub(crate) fn replace_whole(
+    state: &mut [&mut [u8]],
+    saved: &[SavedState],
+) -> Result<(), SavedStateError> {
+    let [saved] = saved else { return Err(SavedStateError::Parts { found: saved.len() }) };
+    let (found, expected) = (saved.len(), state.len());
+    if found != expected {
+        return Err(SavedStateError::Arrays { found, expected });
+    }
+    for (array, saved) in state.iter().zip(saved) {
+        let (found, expected) = (saved.len(), array.len());
+        if found != expected {
+            return Err(SavedStateError::Length { found, expected });
+        }
+    }
+    state.iter_mut().zip(saved).for_each(|(array, saved)| array.copy_from_slice(saved));
+    Ok(())
+}
+
+/// The state of some particles, each array in the same order.
+struct Saved<T, const D: usize> {
+    kind: Kind,
+    steps_done: usize,
+    ids: Vec<u64>,
+    /// The sub-bin of each at the last sort.
+    keys: Vec<u32>,
+    x: Vec<SVector<T, D>>,
+    v: Vec<SVector<T, D>>,
+    F: Vec<SMatrix<T, D, D>>,
+    affine: Vec<SMatrix<T, D, D>>,
+    /// Shared corners: the numbers of those that have the keys.
+    corner_ids: Vec<u64>,
+    /// Their positions.
+    corner_x: Vec<SVector<T, D>>,
+}
+
+/// What the particles of a scheme have.
+#[derive(Clone, Copy)]
+struct Kind {
+    is_affine: bool,
+    /// Whether they share corners. Keys are theirs then: those of the first ones, which one process alone has.
+    has_corners: bool,
+}
+
+/// The elements of a saved array, which are as many as `count`.
+fn elements<E: Pod>(bytes: Vec<u8>, count: usize) -> Result<Vec<E>, SavedStateError> {
+    let (found, expected) = (bytes.len(), count * size_of::<E>());
+    if found != expected {
+        return Err(SavedStateError::Length { found, expected });
+    }
+    let mut elements = vec![E::zeroed(); count];
+    cast_slice_mut(&mut elements).copy_from_slice(&bytes);
+    Ok(elements)
+}
+
+impl<T: Lanes, const D: usize> Saved<T, D> {
+    fn of_parts(parts: Vec<SavedState>, kind: Kind) -> Result<Self, SavedStateError> {
+        let mut saved = Self {
+            kind,
+            steps_done: 0,
+            ids: Vec::new(),
+            keys: Vec::new(),
+            x: Vec::new(),
+            v: Vec::new(),
+            F: Vec::new(),
+            affine: Vec::new(),
+            corner_ids: Vec::new(),
+            corner_x: Vec::new(),
+        };
+        parts.into_iter().try_for_each(|part| saved.add(part))?;
+        Ok(saved)
+    }
+
+    fn add(&mut self, part: SavedState) -> Result<(), SavedStateError> {
+        let Kind { is_affine, has_corners } = self.kind;
+        let (found, expected) = (part.len(), if has_corners { 9 } else { 7 });
+        if found != expected {
+            return Err(SavedStateError::Arrays { found, expected });
+        }
+        let mut arrays = part.into_iter();
+        let mut next = || arrays.next().unwrap_or_default();
+        self.steps_done = elements(next(), 1)?[0];
+        let (ids, keys, x) = (next(), next(), next());
+        let count = x.len() / size_of::<SVector<T, D>>();
+        // Where one process had all, numbers are places.
+        let numbers = |ids: Vec<u8>, count: usize| {
+            if ids.is_empty() { Ok((0..count as u64).collect()) } else { elements(ids, count) }
+        };
+        self.ids.extend(numbers(ids, count)?);
+        self.x.extend(elements::<SVector<T, D>>(x, count)?);
+        self.v.extend(elements::<SVector<T, D>>(next(), count)?);
+        self.F.extend(elements::<SMatrix<T, D, D>>(next(), count)?);
+        let affine = if is_affine { count } else { 0 };
+        self.affine.extend(elements::<SMatrix<T, D, D>>(next(), affine)?);
+        let keyed = if has_corners { keys.len() / size_of::<u32>() } else { count };
+        self.keys.extend(elements::<u32>(keys, keyed)?);
+        if has_corners {
+            let (x, ids) = (next(), next());
+            let corners = x.len() / size_of::<SVector<T, D>>();
+            let (x, ids) = (elements::<SVector<T, D>>(x, corners)?, numbers(ids, corners)?);
+            if keyed > corners {
+                return Err(SavedStateError::Place);
+            }
+            self.corner_x.extend(&x[..keyed]);
+            self.corner_ids.extend(&ids[..keyed]);
+        }
+        Ok(())
+    }
+
+    /// Those that are here after a move.
+    fn follow(&mut self, moved: &Move) {
+        moved.replace(&mut self.keys);
+        [&mut self.x, &mut self.v].into_iter().for_each(|vectors| moved.replace(vectors));
+        moved.replace(&mut self.F);
+        if self.kind.is_affine {
+            moved.replace(&mut self.affine);
+        }
+    }
+}
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// The arrays of the particles here, but for the number of steps.
+    fn arrays(&self) -> Vec<&[u8]> {
+        let Self { particles, affine, support, bins, part, .. } = self;
+        let Particles { x, v, F, .. } = particles;
+        let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
+        let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
+        arrays.extend([cast_slice(x), cast_slice(v), cast_slice(F), cast_slice(affine)]);
+        if let Support::Mesh(corners) = support {
+            let numbers = corners.mesh.numbers.as_ref();
+            let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
+            arrays.extend([cast_slice(&corners.mesh.x), cast_slice(numbers)]);
+        }
+        arrays
+    }
+
+    /// Whether this holds, for all processes.
+    fn agreed<R>(&self, here: Result<R, SavedStateError>) -> Result<R, SavedStateError> {
+        let is_elsewhere =
+            self.part.as_ref().is_some_and(|part| part.ranks.largest(here.is_err().into()) > 0);
+        here.and_then(|here| if is_elsewhere { Err(SavedStateError::Elsewhere) } else { Ok(here) })
+    }
+
+    /// Puts the saved state of all particles in place, of which this process has read some parts. Gives the number of steps.
+    fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
+        let kind = Kind {
+            is_affine: self.transfer.is_affine(),
+            has_corners: matches!(self.support, Support::Mesh(_)),
+        };
+        let saved = self.agreed(Saved::of_parts(parts, kind))?;
+        let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
+        self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
+        let steps_done = saved.steps_done as u64;
+        // Those that have read no part do not know it.
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let steps_done = ranks.as_ref().map_or(steps_done, |ranks| ranks.largest(steps_done));
+        let keys = match self.support {
+            Support::Mesh(_) => self.put_mesh(saved)?,
+            _ => self.put_particles(saved)?,
+        };
+        self.sort_as(keys);
+        Ok(steps_done as usize)
+    }
+
+    /// Puts particles in place that do not share corners, at processes that follow from their numbers. Gives their keys.
+    fn put_particles(&mut self, mut saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
+        // No process knows where another one keeps a particle, and all know where it goes for the time being.
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let here = self.particles.len() as u64;
+        let (processes, all) =
+            ranks.as_ref().map_or((1, here), |ranks| (ranks.count(), total(&**ranks, here)));
+        let is_known = saved.ids.iter().all(|&id| id < all);
+        self.agreed(if is_known { Ok(()) } else { Err(SavedStateError::Particles) })?;
+        let per_process = all.div_ceil(processes as u64).max(1);
+        let home = |id: &u64| (id / per_process) as usize;
+        if let Some(part) = &self.part {
+            let homes: Vec<usize> = part.ids.iter().map(home).collect();
+            self.give(&|p| slice::from_ref(&homes[p]));
+        }
+        let homes: Vec<usize> = saved.ids.iter().map(home).collect();
+        let (moved, ids) = Move::new(ranks.as_ref(), &saved.ids, &|p| slice::from_ref(&homes[p]));
+        saved.follow(&moved);
+        let is_whole = match &self.part {
+            Some(part) => ids == *part.ids,
+            None => ids.iter().copied().eq(0..all),
+        };
+        self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
+
+        let Saved { keys, x, v, F, affine, .. } = saved;
+        (self.particles.x, self.particles.v, self.particles.F) = (x, v, F);
+        self.affine = affine;
+        Ok(keys)
+    }
+
+    /// Puts particles that share corners in place, where they are. Gives the keys of their corners.
+    fn put_mesh(&mut self, saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
+        let Support::Mesh(corners) = &self.support else { return Ok(Vec::new()) };
+        let ranks = self.part.as_ref().map(|part| part.ranks.clone());
+        let ids = match &self.part {
+            Some(part) => part.ids.to_vec(),
+            None => (0..self.particles.len() as u64).collect(),
+        };
+        let numbers: Vec<u64> =
+            (0..corners.count()).map(|corner| corners.mesh.number(corner)).collect();
+        let particles = Directory::new(ranks.as_ref(), &saved.ids).ask(&ids);
+        let points = Directory::new(ranks.as_ref(), &saved.corner_ids).ask(&numbers);
+        // All processes ask before one of them gives up.
+        let is_whole = particles.is_whole && points.is_whole && points.is_unique;
+        self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
+        self.particles.x = particles.fetch(&saved.x);
+        self.particles.v = particles.fetch(&saved.v);
+        self.particles.F = particles.fetch(&saved.F);
+        if self.transfer.is_affine() {
+            self.affine = particles.fetch(&saved.affine);
+        }
+        let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
+        if let Support::Mesh(corners) = &mut self.support {
+            corners.positions().copy_from_slice(&x);
+        }
+        Ok(keys)
+    }
+}
+
+impl<T: Lanes, const D: usize> Simulation<T, D> {
+    /// The state between two steps of the particles here: arrays as bytes in this machine's order.
+    pub fn state(&self) -> Vec<&[u8]> {
+        let mut state = vec![bytes_of(&self.steps_done)];
+        state.extend(self.state.arrays());
+        state
+    }
+
+    /// See [`take_up`](Self::take_up).
+    pub(crate) fn put(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        // The grid no longer belongs to the particles.
+        self.state.is_ahead = false;
+        self.steps_done = self.state.take_up(parts)?;
+        self.failed = None;
+        Ok(())
+    }
+}

@@ -1,0 +1,211 @@
+//! Steps of particles on shared corners in one pass over them: G2P of a step, then P2G of the next one to the corners.
+//!
+//! As in [`g2p2g`](crate::step::g2p2g) particles are read once a step. Corners move before particles, so that both ends of the pass know where
+//! they are: G2P where they were, P2G where they go.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::domain::Support;
+use crate::domain::corner_exchange::ChunkSums;
+use crate::domain::corner_values::CornerValues;
+use crate::domain::shared_corners::{Measured, MeasuredPart, SharedCorners};
+use crate::grid::geometry::Constants;
+use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::{BufferPool, Buffers};
+use crate::kernel::copies::{BLOCK, Copies, successive};
+use crate::kernel::shared::{FromCorners, ToCorners};
+use crate::parallel::chunks::each;
+use crate::particles::Particles;
+use crate::scheme::Transfer;
+use crate::simd::Lanes;
+use crate::step::StepTimes;
+use crate::step::body_force::BodyForce;
+use crate::step::forcing::Forcing;
+use crate::step::g2p::{OfBlock, advance, check_all};
+use crate::step::health::Outcome;
+use crate::step::state::State;
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// Advances by a step.
+    pub(crate) fn step_at_corners(
+        &mut self,
+        body_force: &dyn BodyForce<T, D>,
+        times: StepTimes<T>,
+    ) -> Outcome {
+        if self.is_ahead {
+            self.update_from_corners(body_force, times);
+        } else {
+            self.p2g(body_force, times);
+        }
+        self.move_corners();
+        let outcome = self.g2p_and_to_corners(body_force, times.end);
+        let outcome = self.agree(outcome);
+        // A sort may bring other particles here, and after a failure the sums are of no use.
+        self.is_ahead = outcome.is_clean();
+        self.resort_if(outcome)
+    }
+
+    /// The grid update from the sums that corners have already.
+    fn update_from_corners(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
+        let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
+        let Support::Mesh(corners) = &self.support else { return };
+        let c = *constants;
+        let time = Forcing::new(body_force, &particles.X, times.start, &c, of_time).time();
+        let vectors = NodeVectors::of(self.transfer);
+        let update =
+            GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
+        exchange.load(corners, Some((body_force, time)));
+        exchange.update_grid(&update, corners, bins, nodes);
+    }
+
+    /// G2P of this step, and P2G of the next one, which starts at `t_next`, to the corners.
+    fn g2p_and_to_corners(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
+        let Self { particles, affine, constants, bins, of_time, exchange, support, .. } = self;
+        let (law, transfer, buffers, c) = (&*self.law, self.transfer, &self.buffers, *constants);
+        let uniform = self.uniform;
+        let Support::Mesh(corners) = support else { return Outcome::default() };
+        let mut measured = std::mem::replace(&mut corners.measured, Measured::none());
+        let values = std::mem::replace(&mut exchange.values, CornerValues::none());
+        let Particles { X, x, v, F, mass, volume, .. } = &mut *particles;
+        let (at_start, is_in_doubt) = (&*support, AtomicBool::new(false));
+        if let Support::Mesh(corners) = at_start {
+            let pass = Pass {
+                c: &c,
+                support: at_start,
+                corners,
+                values: &values,
+                law,
+                transfer,
+                forcing: Forcing::new(body_force, X, t_next, &c, of_time),
+                mass,
+                volume,
+                uniform,
+                buffers,
+                is_in_doubt: &is_in_doubt,
+            };
+            let chunks = &corners.chunks;
+            let particles = chunks.iter().map(|chunk| chunk.particles.clone());
+            let parts = measured.split(&corners.mesh, particles.clone());
+            let sums = exchange.begin(chunks, transfer.is_affine());
+            let (mut x, mut v, mut F) = (&mut x[..], &mut v[..], &mut F[..]);
+            let mut affine = &mut affine[..];
+            let pieces = particles.zip(parts).zip(sums).map(|((particles, measured), sums)| {
+                let count = particles.len();
+                let of_affine = affine.len().min(count);
+                Piece {
+                    first: particles.start,
+                    x: x.split_off_mut(..count).unwrap_or_default(),
+                    v: v.split_off_mut(..count).unwrap_or_default(),
+                    F: F.split_off_mut(..count).unwrap_or_default(),
+                    affine: affine.split_off_mut(..of_affine).unwrap_or_default(),
+                    measured,
+                    sums,
+                }
+            });
+            each(pieces.collect(), &|piece| pass.advance(piece));
+        }
+        exchange.values = values;
+        let Support::Mesh(corners) = support else { return Outcome::default() };
+        corners.measured = measured;
+        corners.arrive(true);
+        let outcome = exchange.check(&c, corners, bins.bin_of());
+        if !is_in_doubt.into_inner() {
+            return outcome;
+        }
+        outcome.merge(check_all((particles, affine), (&c, support), bins.bin_of()))
+    }
+}
+
+/// The particles of a chunk, and what belongs to them.
+struct Piece<'a, T, const D: usize> {
+    first: usize,
+    x: &'a mut [SVector<T, D>],
+    v: &'a mut [SVector<T, D>],
+    F: &'a mut [SMatrix<T, D, D>],
+    /// Empty without affine velocities.
+    affine: &'a mut [SMatrix<T, D, D>],
+    measured: MeasuredPart<'a, T, D>,
+    sums: ChunkSums<'a, T, D>,
+}
+
+/// The inputs common to all chunks.
+struct Pass<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    support: &'a Support<T, D>,
+    corners: &'a SharedCorners<T, D>,
+    /// The values of the grid at corners.
+    values: &'a CornerValues<T, D>,
+    law: &'a dyn BlockLaw<T, D>,
+    transfer: Transfer,
+    /// The body force at the start of the next step.
+    forcing: Forcing<'a, T, D>,
+    mass: &'a [T],
+    volume: &'a [T],
+    uniform: Option<(T, T)>,
+    buffers: &'a BufferPool<T, D>,
+    /// Whether a particle may be invalid.
+    is_in_doubt: &'a AtomicBool,
+}
+
+impl<T: Lanes, const D: usize> Pass<'_, T, D> {
+    /// Advances the particles of a chunk, then sums their contributions to the next step at corners.
+    fn advance(&self, piece: Piece<'_, T, D>) {
+        let &Self { c, support, corners, values, law, transfer, ref forcing, .. } = self;
+        let &Self { mass, volume, uniform, buffers: pool, is_in_doubt, .. } = self;
+        let Piece { first: of_chunk, x, v, F, affine, mut measured, mut sums } = piece;
+        let SharedCorners { mesh, next, .. } = corners;
+        let (is_affine, of_cells) = (transfer.is_affine(), mesh.is_of_cells());
+        sums.clear();
+        let mut copies = Copies::new();
+        let mut buffers = pool.take(support, is_affine);
+        let Buffers { contributions, interpolated, .. } = &mut *buffers;
+        if let Some((mass, volume)) = uniform {
+            contributions.set_uniform(mass, volume);
+        }
+        let (mut of_affine, mut start) = (affine.chunks_mut(BLOCK), 0);
+        let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(F.chunks_mut(BLOCK));
+        for ((x, v), F) in blocks {
+            let (first, count) = (of_chunk + start, x.len());
+            let affine = of_affine.next().unwrap_or_default();
+            let interpolated = &mut interpolated[..count];
+            let shares = measured.from(mesh, (of_chunk, first));
+            FromCorners { c, corners, shares, values, first, receiver: interpolated }
+                .interpolate(is_affine);
+            let mut of_block = OfBlock { x, v, F, affine };
+            advance(c, transfer, (c.time_step, None), interpolated, &mut of_block);
+            let OfBlock { x, v, F, affine } = of_block;
+
+            let mut is_valid =
+                of_cells || measured.at(mesh, next, (of_chunk, first..first + count));
+            is_valid &= corners.are_inside(c, x, F);
+            let ids = successive(first);
+            let ids = &ids[..count];
+            let kinematics = copies.of_successive(x, F);
+            forcing.evaluate(ids, kinematics.x, &mut contributions.b);
+            if uniform.is_none() {
+                contributions.take(ids, mass, volume);
+            }
+            contributions.set_values(c, v, affine);
+            law.stress(c, kinematics.F, contributions);
+            is_valid &= ToCorners {
+                c,
+                corners,
+                at: next,
+                shares: measured.from(mesh, (of_chunk, first)),
+                particles: (first, count),
+                contributions,
+                sums: sums.sums,
+                affine_sums: sums.affine_sums,
+            }
+            .add();
+            if !is_valid {
+                is_in_doubt.store(true, Ordering::Relaxed);
+            }
+            start += count;
+        }
+        pool.give_back(buffers);
+    }
+}

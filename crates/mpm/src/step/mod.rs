@@ -1,0 +1,100 @@
+//! One time step: a sequence of P2G, grid update and G2P.
+//!
+//! Integrators differ in the time at which F follows the grid: before forces are computed, after it, or both. To add one, say so
+//! in [`Integrator`](crate::Integrator).
+
+pub(crate) mod body_force;
+pub(crate) mod corner_step;
+pub(crate) mod forcing;
+pub(crate) mod g2p;
+pub(crate) mod g2p2g;
+pub(crate) mod health;
+pub(crate) mod p2g;
+pub(crate) mod state;
+pub(crate) mod xpic;
+
+use crate::domain::Support;
+use crate::scheme::{Integrator, Taken, Transfer};
+use crate::simd::Lanes;
+use crate::step::body_force::BodyForce;
+use crate::step::health::Outcome;
+use crate::step::state::State;
+use crate::tensor::real;
+
+/// Times of a step, and the factor on its accelerations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StepTimes<T> {
+    pub(crate) start: T,
+    pub(crate) end: T,
+    /// Factor on all accelerations of the step: 1, or 1/2 for the first step of centred differences.
+    pub(crate) scale: T,
+}
+
+/// Whether steps are single passes, G2P of one fused with P2G of the next.
+///
+/// They are where F follows the grid last, and all that P2G needs is known of a particle right after G2P.
+pub(crate) fn is_fused(integrator: Integrator, transfer: Transfer) -> bool {
+    integrator.early() == 0.0
+        && !integrator.reprojects()
+        && !matches!(transfer.taken(), Taken::Filtered(_))
+}
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// Advances by a step.
+    pub(crate) fn step(
+        &mut self,
+        integrator: Integrator,
+        body_force: &dyn BodyForce<T, D>,
+        times: StepTimes<T>,
+    ) -> Outcome {
+        if let Support::Mesh(corners) = &mut self.support {
+            corners.measure();
+        }
+        if is_fused(integrator, self.transfer) {
+            return match self.support {
+                Support::Mesh(_) => self.step_at_corners(body_force, times),
+                Support::Product(_) | Support::Cpdi { .. } => self.fused_step(body_force, times),
+            };
+        }
+        let early = integrator.early();
+        let dt = self.constants.time_step;
+        let late = dt * real(1.0 - early);
+        if early > 0.0 {
+            self.p2g_momentum();
+            let outcome = self.g2p_stretch(dt * real(early));
+            let outcome = self.agree(outcome);
+            if outcome.failure.is_some() {
+                std::mem::swap(&mut self.particles.F, &mut self.F_early);
+                return outcome;
+            }
+            self.p2g_force(body_force, times);
+        } else {
+            self.p2g(body_force, times);
+        }
+        if let Taken::Filtered(filter) = self.transfer.taken() {
+            self.filter(filter);
+        }
+        self.move_corners();
+        let outcome = if integrator.reprojects() {
+            self.g2p_velocity();
+            self.p2g_updated_momentum();
+            self.g2p_reprojected(late)
+        } else {
+            self.g2p(late)
+        };
+        let outcome = self.agree(outcome);
+        self.resort_if(outcome)
+    }
+
+    /// A step in a single pass.
+    fn fused_step(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) -> Outcome {
+        if !self.is_ahead {
+            self.p2g(body_force, times);
+        }
+        let outcome = self.g2p2g(body_force, times.end);
+        let outcome = self.agree(outcome);
+        // After a sort or a failure the partial sums on the grid are of no use.
+        self.is_ahead = outcome.is_clean();
+        self.resort_if(outcome)
+    }
+}

@@ -1,0 +1,249 @@
+//! Particles to grid: sums of mass, momentum and force at the nodes, followed by the grid update.
+//!
+//! ```text
+//! m_i = sum m_p S_ip;  m_i v_i = sum m_p (v_p + C_p (x_i - x_p)) S_ip;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip
+//! ```
+//!
+//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
+//! [`parallel`](crate::parallel).
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::domain::Support;
+use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
+use crate::domain::corner_values::CornerValues;
+use crate::domain::shared_corners::{Chunk, SharedCorners};
+use crate::fault::Fault;
+use crate::grid::geometry::Constants;
+use crate::grid::grid_update::{
+    Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
+    VelocityAndAcceleration,
+};
+use crate::grid::node::Node;
+use crate::kernel::buffers::{BufferPool, Buffers};
+use crate::kernel::copies::{BLOCK, Copies, successive};
+use crate::kernel::shared::ToCorners;
+use crate::parallel::bins::Bins;
+use crate::parallel::chunks::each;
+use crate::particles::Particles;
+use crate::simd::Lanes;
+use crate::step::StepTimes;
+use crate::step::body_force::BodyForce;
+use crate::step::forcing::Forcing;
+use crate::step::state::State;
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// P2G of mass, momentum and force, and from them velocities and accelerations.
+    pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
+        let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
+        let (support, law, affine, transfer) =
+            (&self.support, &self.law, &self.affine, self.transfer);
+        let buffers = &self.buffers;
+        let Particles { X, x, v, F, mass, volume, .. } = &*particles;
+        let c = *constants;
+        let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
+        let vectors = NodeVectors::of(transfer);
+        let update =
+            GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
+        let loading = Some((body_force, forcing.time()));
+        let set =
+            |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
+                forcing.evaluate(ids, &copies.x, &mut contributions.b);
+                contributions.take(ids, mass, volume);
+                for (k, &p) in ids.iter().enumerate() {
+                    contributions.set_value(&c, k, &v[p as usize]);
+                }
+                contributions.take_affine(ids, mass, affine);
+                law.stress(&c, &copies.F, contributions);
+            };
+        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
+    }
+
+    /// P2G of mass and momentum, and from them the velocities at the start of the step.
+    pub(crate) fn p2g_momentum(&mut self) {
+        let Self { particles, constants, layout, bins, nodes, exchange, .. } = self;
+        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
+        let buffers = &self.buffers;
+        let Particles { x, v, F, mass, .. } = &*particles;
+        let c = *constants;
+        let update = GridUpdate::new(layout, &c, Velocity);
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
+        p2g.to_grid(&update, (bins, exchange, None), nodes, &momenta(mass, v, affine));
+    }
+
+    /// P2G of forces, by the stress of the F that has followed the grid with the weights of the one before; from them
+    /// accelerations and the velocities at the end of the step.
+    pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
+        let Self { particles, constants, layout, bins, nodes, F_early, of_time, exchange, .. } =
+            self;
+        let (support, law, transfer) = (&self.support, &self.law, self.transfer);
+        let buffers = &self.buffers;
+        let Particles { X, x, F, mass, volume, .. } = &*particles;
+        let (c, F_early) = (*constants, &F_early[..]);
+        let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
+        let vectors = NodeVectors::of(transfer);
+        let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
+        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
+        let loading = Some((body_force, forcing.time()));
+        let set =
+            |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
+                forcing.evaluate(ids, &copies.x, &mut contributions.b);
+                contributions.take(ids, mass, volume);
+                (0..ids.len()).for_each(|k| contributions.set_force(&c, k));
+                if !c.planted.is(Fault::StressOfOldStretch) {
+                    copies.pick_F(ids, F_early);
+                }
+                law.stress(&c, &copies.F, contributions);
+            };
+        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
+    }
+
+    /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
+    pub(crate) fn p2g_updated_momentum(&mut self) {
+        let Self { particles, constants, layout, bins, reprojected, exchange, .. } = self;
+        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
+        let buffers = &self.buffers;
+        let Particles { x, v, F, mass, .. } = &*particles;
+        let c = *constants;
+        let update = GridUpdate::new(layout, &c, Reprojection);
+        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
+        p2g.to_grid(&update, (bins, exchange, None), reprojected, &momenta(mass, v, affine));
+    }
+
+    /// XPIC: the grid's velocities go to the particles and back. `next` gets those of `reprojected`, or of `nodes` at first.
+    pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
+        let Self { particles, constants, layout, bins, nodes, reprojected, next, exchange, .. } =
+            self;
+        let (support, buffers) = (&self.support, &self.buffers);
+        let Particles { x, F, mass, .. } = &*particles;
+        let c = *constants;
+        let from = if is_first { &nodes[..] } else { &reprojected[..] };
+        if let Support::Mesh(corners) = support {
+            exchange.interpolate(&c, corners, from);
+        }
+        let at_corners = std::mem::replace(&mut exchange.values, CornerValues::none());
+        let seen = support.seen(from, &at_corners);
+        let update = GridUpdate::new(layout, &c, Reprojection);
+        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
+        let set = |Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
+                   _: &mut Copies<T, D>,
+                   ids: &[u32]| {
+            let interpolated = &mut interpolated[..ids.len()];
+            block.g2p((&c, support), seen, interpolated);
+            contributions.without_stress();
+            for (value, (interpolated, &p)) in
+                contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
+            {
+                let m = mass[p as usize];
+                *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
+            }
+        };
+        p2g.to_grid(&update, (bins, exchange, None), next, &set);
+        exchange.values = at_corners;
+    }
+}
+
+/// Sets momenta of a block, with the affine part where there is one.
+fn momenta<'a, T: Lanes, const D: usize>(
+    mass: &'a [T],
+    v: &'a [SVector<T, D>],
+    affine: &'a [SMatrix<T, D, D>],
+) -> impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync + 'a {
+    move |Buffers { contributions, .. }, _, ids| {
+        contributions.take_momenta(ids, mass, v);
+        contributions.take_affine(ids, mass, affine);
+    }
+}
+
+/// P2G of all particles.
+struct P2g<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    support: &'a Support<T, D>,
+    buffers: &'a BufferPool<T, D>,
+    is_affine: bool,
+    x: &'a [SVector<T, D>],
+    F: &'a [SMatrix<T, D, D>],
+}
+
+impl<T: Lanes, const D: usize> P2g<'_, T, D> {
+    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and by
+    /// way of corners where particles share them, with the loads on these.
+    fn to_grid<S: NodeUpdate<T, D>>(
+        &self,
+        update: &GridUpdate<'_, T, S, D>,
+        (bins, exchange, loading): (&mut Bins, &mut Exchange<T, D>, Loading<'_, T, D>),
+        nodes: &mut [Node<T, D>],
+        set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
+    ) {
+        let Support::Mesh(corners) = self.support else {
+            update.p2g(bins, nodes, &|band, first, ids| self.bin(band, first, ids, set));
+            return;
+        };
+        self.to_corners(corners, exchange, set);
+        exchange.load(corners, loading);
+        exchange.update_grid(update, corners, bins, nodes);
+    }
+
+    /// Sums what `set` says of each particle at its corners, chunk by chunk.
+    fn to_corners(
+        &self,
+        corners: &SharedCorners<T, D>,
+        exchange: &mut Exchange<T, D>,
+        set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
+    ) {
+        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
+        let chunks = &corners.chunks;
+        let pieces = chunks.iter().zip(exchange.begin(chunks, is_affine)).collect();
+        each(pieces, &|(Chunk { particles, .. }, mut of_chunk)| {
+            of_chunk.clear();
+            let ChunkSums { sums, affine_sums } = of_chunk;
+            let mut copies = Copies::new();
+            let mut buffers = pool.take(support, is_affine);
+            for first in particles.clone().step_by(BLOCK) {
+                let ids = successive(first);
+                let ids = &ids[..BLOCK.min(particles.end - first)];
+                copies.pick(ids, x, F);
+                buffers.block.compute_weights(c, support, ids, copies.kinematics());
+                set(&mut buffers, &mut copies, ids);
+                ToCorners {
+                    c,
+                    corners,
+                    at: &corners.mesh.x,
+                    shares: corners.measured.from(&corners.mesh, first),
+                    particles: (first, ids.len()),
+                    contributions: &buffers.contributions,
+                    sums,
+                    affine_sums,
+                }
+                .add();
+            }
+            pool.give_back(buffers);
+        });
+    }
+
+    /// Adds the particles `ids`, block by block, to the band of nodes that starts at node `first`.
+    /// `set(buffers, copies, ids)` sets the contributions of a block.
+    fn bin(
+        &self,
+        band: &mut [Node<T, D>],
+        first: usize,
+        ids: &[u32],
+        set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
+    ) {
+        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
+        let mut copies = Copies::new();
+        let mut buffers = pool.take(support, is_affine);
+        for ids in ids.chunks(BLOCK) {
+            copies.pick(ids, x, F);
+            buffers.block.compute_weights(c, support, ids, copies.kinematics());
+            if c.planted.is(Fault::LastNodeSkipped) {
+                buffers.block.skip_last_node(c, &copies.x);
+            }
+            set(&mut buffers, &mut copies, ids);
+            let Buffers { block, contributions, .. } = &mut *buffers;
+            block.p2g(&c.strides, band, first, contributions, ids.len());
+        }
+        pool.give_back(buffers);
+    }
+}

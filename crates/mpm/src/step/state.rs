@@ -1,0 +1,81 @@
+//! The state of a running simulation: particles, grid and bins.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::domain::Support;
+use crate::domain::corner_exchange::Exchange;
+use crate::grid::Layout;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::BufferPool;
+use crate::parallel::bins::Bins;
+use crate::particles::Particles;
+use crate::processes::decomposition::Part;
+use crate::scheme::Transfer;
+use crate::simd::Lanes;
+use crate::step::health::Outcome;
+
+/// Everything that a step reads and changes.
+pub(crate) struct State<T, const D: usize> {
+    pub(crate) particles: Particles<T, D>,
+    pub(crate) support: Support<T, D>,
+    pub(crate) law: Box<dyn BlockLaw<T, D>>,
+    pub(crate) transfer: Transfer,
+    /// APIC: the affine velocity of each particle per cell; else empty.
+    pub(crate) affine: Vec<SMatrix<T, D, D>>,
+    /// Mass and volume of every particle, where they are uniform.
+    pub(crate) uniform: Option<(T, T)>,
+    pub(crate) constants: Constants<T, D>,
+    pub(crate) layout: Layout<D>,
+    pub(crate) bins: Bins,
+    pub(crate) nodes: Vec<Node<T, D>>,
+    /// Where other processes hold the rest of the body: this one's part.
+    pub(crate) part: Option<Part>,
+    /// F after the early part of a step, while the weights still need F at its start; empty without such a part.
+    pub(crate) F_early: Vec<SMatrix<T, D, D>>,
+    /// Whether there is such a part.
+    pub(crate) keeps_F_early: bool,
+    /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
+    pub(crate) reprojected: Vec<Node<T, D>>,
+    /// The fused pass: the grid of the next step while particles add to it; XPIC: the next term of the filter.
+    pub(crate) next: Vec<Node<T, D>>,
+    /// The fused pass: whether `nodes` has the velocities and accelerations of the next step, with no factor on the latter.
+    pub(crate) is_ahead: bool,
+    /// XPIC: the filtered velocity at each node.
+    pub(crate) filtered: Vec<SVector<T, D>>,
+    /// Buffers for blocks of particles.
+    pub(crate) buffers: BufferPool<T, D>,
+    /// What passes between polygons and grid.
+    pub(crate) exchange: Exchange<T, D>,
+    /// Buffer for the part of the body force that depends on time alone.
+    pub(crate) of_time: Vec<T>,
+}
+
+impl<T: Lanes, const D: usize> State<T, D> {
+    /// Sorts the particles into bins, if one of them left its bin in the last pass.
+    pub(crate) fn resort_if(&mut self, outcome: Outcome) -> Outcome {
+        if outcome.resort && outcome.failure.is_none() {
+            self.sort();
+        }
+        outcome
+    }
+
+    /// The outcome of all processes.
+    pub(crate) fn agree(&self, outcome: Outcome) -> Outcome {
+        self.part.as_ref().map_or(outcome, |part| part.agree(outcome))
+    }
+
+    /// Sorts the particles into bins, those of other processes too.
+    pub(crate) fn sort(&mut self) {
+        let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
+        let Particles { x, F, .. } = &*particles;
+        let keys = match support {
+            Support::Mesh(corners) => bins.keys_of(layout, corners.count(), &|corner| {
+                exchange.first_node(c, corners, corner)
+            }),
+            _ => bins.keys_of(layout, x.len(), &|p| support.first_node(c, p, &x[p], &F[p])),
+        };
+        self.sort_as(keys);
+    }
+}
