@@ -4,6 +4,7 @@ mod batch;
 mod blind;
 mod certify;
 mod check;
+mod checkpoint_folder;
 mod converge;
 mod coverage;
 mod diagnose;

@@ -152,12 +152,6 @@ pub struct Host {
 }
 
 impl Host {
-    /// The host that `--target` calls `name`.
-    #[must_use]
-    pub fn named(name: &str) -> Option<&'static Host> {
-        crate::targets::HOSTS.iter().find(|host| host.name == name)
-    }
-
     /// The name of the file of a solution.
     #[must_use]
     pub fn file_name(&self, module: &str) -> String {

@@ -18,6 +18,14 @@ mod ufl;
 
 use crate::target::Host;
 
+impl Host {
+    /// The host that `--target` calls `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Host> {
+        HOSTS.iter().find(|host| host.name == name)
+    }
+}
+
 /// Every host, in the order in which help lists them.
 pub const HOSTS: &[Host] = &[
     Host {

@@ -57,6 +57,7 @@
 
 mod build;
 mod cross_check;
+mod error;
 mod listing;
 mod sample;
 mod token;
@@ -65,5 +66,6 @@ pub use build::BuildError;
 pub use cross_check::{
     Component, CrossCheck, CrossCheckError, Report, Target, Verdict, cross_check,
 };
-pub use listing::{Assignment, Listing, ListingError, Problem};
+pub use error::{ListingError, Problem};
+pub use listing::{Assignment, Listing};
 pub use sample::sample;

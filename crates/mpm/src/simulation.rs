@@ -2,19 +2,21 @@
 
 use std::fmt;
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::{determinant, real};
+use mmsmith_laws::fault::Fault;
+use mmsmith_laws::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, Stressed};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::domain::Support;
 use crate::domain::corner_exchange::Exchange;
 use crate::domain::corner_exchange::invalidity_of_corner;
 use crate::error::{SetupError, StepError};
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::grid::{Grid, Layout};
-use crate::kernel::block::BlockLaw;
+use crate::kernel::block::{BlockLaw, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
-use crate::material::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, OwnBlocks, Stressed};
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::particles::body::Body;
@@ -22,12 +24,10 @@ use crate::particles::mesh::{Interpolation, Mesh};
 use crate::processes::decomposition::{Arrangement, Part, Share, admit};
 use crate::scheme::{Settings, Shape, Taken};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
-use crate::simd::Lanes;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome};
 use crate::step::state::State;
 use crate::step::{StepTimes, is_fused};
-use crate::tensor::{determinant, real};
 
 /// A running simulation.
 pub struct Simulation<T, const D: usize> {
@@ -285,7 +285,7 @@ fn figure<T: RealField>(value: T) -> f64 {
 
 /// The law, for blocks of particles.
 fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn BlockLaw<T, D>> {
-    let planted = crate::fault::Planted::here();
+    let planted = mmsmith_laws::fault::Planted::here();
     let material = match law {
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),

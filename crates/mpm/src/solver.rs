@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
+use mmsmith_laws::Law;
 use nalgebra::SVector;
 
 use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
-use crate::material::Law;
 use crate::particles::Particles;
 use crate::particles::body::{self, Annulus, Body};
 use crate::particles::clip::{self, Clip, Facet};
@@ -15,7 +15,6 @@ use crate::processes::saved_state::{SavedState, SavedStateError};
 use crate::scheme::Settings;
 use crate::simulation::{Simulated, Simulation};
 use crate::step::body_force::BodyForce;
-use crate::total_lagrangian::{self, BoundaryData, Scheme, TotalLagrangian};
 
 /// A solver that can be stepped and looked at.
 pub trait Solver<T, const D: usize> {
@@ -79,22 +78,6 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
     }
 }
 
-/// A simulation in the total Lagrangian formulation, and its motion at time 0.
-pub struct TotalSetUp<'a, const D: usize> {
-    /// The splines' cells, and the particles in them.
-    pub grid: total_lagrangian::Grid<D>,
-    /// Degree, mass matrix, composition in time.
-    pub scheme: Scheme,
-    /// The law.
-    pub law: Law<f64, D>,
-    /// The reference density.
-    pub density: f64,
-    /// Time step dt.
-    pub time_step: f64,
-    /// Displacement and velocity at a reference position.
-    pub motion: &'a dyn Fn(&SVector<f64, D>) -> [SVector<f64, D>; 2],
-}
-
 impl<T: Scalar<D>, const D: usize> Body<T, D> {
     /// Some successive particles alone, with their corners.
     #[must_use]
@@ -150,12 +133,6 @@ impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
     }
 }
 
-/// A body in the total Lagrangian formulation, with given motion and traction on its sides.
-struct DrivenBody<'a, const D: usize> {
-    body: TotalLagrangian<D>,
-    boundary: Box<dyn BoundaryData<D> + 'a>,
-}
-
 /// The precisions of the solver: `f64` and `f32`. The functions here are not generic, so that they are compiled with this crate, and not
 /// again by whoever sets a solver up.
 pub trait Scalar<const D: usize>: Simulated<D> {
@@ -200,16 +177,6 @@ pub trait Scalar<const D: usize>: Simulated<D> {
         simulation: &mut Simulation<Self, D>,
         parts: Vec<SavedState>,
     ) -> Result<(), SavedStateError>;
-
-    /// A simulation in the total Lagrangian formulation.
-    ///
-    /// # Errors
-    ///
-    /// As [`TotalLagrangian::new`] and [`TotalLagrangian::start_with_boundary`], and [`SetupError::DoublePrecisionOnly`] for `f32`.
-    fn total_lagrangian<'a>(
-        set_up: TotalSetUp<'_, D>,
-        boundary: Box<dyn BoundaryData<D> + 'a>,
-    ) -> Result<Box<dyn Solver<Self, D> + 'a>, SetupError>;
 }
 
 macro_rules! scalar {
@@ -254,68 +221,12 @@ macro_rules! scalar {
                 ) -> Result<(), SavedStateError> {
                     simulation.put(parts)
                 }
-
-                fn total_lagrangian<'a>(
-                    set_up: TotalSetUp<'_, $D>,
-                    boundary: Box<dyn BoundaryData<$D> + 'a>,
-                ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
-                    scalar!(@total $T, $D, set_up, boundary)
-                }
             }
         )*)*
     };
-    (@total f64, $D:literal, $set_up:ident, $boundary:ident) => {{
-        let TotalSetUp { grid, scheme, law, density, time_step, motion } = $set_up;
-        let mut body = TotalLagrangian::<$D>::new(grid, scheme, law, density, time_step)?;
-        let (u, v): (Vec<_>, Vec<_>) =
-            body.positions().iter().map(motion).map(|[u, v]| (u, v)).unzip();
-        body.start_with_boundary(&u, &v, $boundary.as_ref())?;
-        Ok(Box::new(DrivenBody { body, boundary: $boundary }))
-    }};
-    (@total f32, $D:literal, $set_up:ident, $boundary:ident) => {{
-        let _ = ($set_up, $boundary);
-        Err(SetupError::DoublePrecisionOnly)
-    }};
 }
 
 scalar! {
     f64: 1 2 3;
     f32: 1 2 3;
 }
-
-macro_rules! driven {
-    ($($D:literal)*) => {
-        $(impl Solver<f64, $D> for DrivenBody<'_, $D> {
-            fn step(&mut self, body_force: &dyn BodyForce<f64, $D>) -> Result<(), StepError> {
-                self.body.step_with_boundary(body_force, self.boundary.as_ref())
-            }
-
-            fn observe(&mut self) -> (&Particles<f64, $D>, &Law<f64, $D>) {
-                self.body.observe();
-                (self.body.particles(), self.body.law())
-            }
-
-            fn arrangement(&self) -> Option<Arrangement<'_>> {
-                None
-            }
-
-            fn forced(&self) -> &[SVector<f64, $D>] {
-                &self.body.particles().X
-            }
-
-            fn velocity_lag(&self) -> f64 {
-                0.0
-            }
-
-            fn state(&self) -> Vec<&[u8]> {
-                self.body.state()
-            }
-
-            fn take_up(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
-                self.body.take_up(&parts)
-            }
-        })*
-    };
-}
-
-driven! { 1 2 3 }

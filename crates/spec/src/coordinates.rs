@@ -306,3 +306,16 @@ pub(crate) fn identity(dimension: usize) -> Vec<Vec<Expr>> {
     let entry = |i, j| if i == j { Graph::ONE } else { Graph::ZERO };
     (0..dimension).map(|i| (0..dimension).map(|j| entry(i, j)).collect()).collect()
 }
+
+/// Physical components to Cartesian ones: `x_i = sum_a Q_ia x_a`.
+pub(crate) fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &[Expr]) -> Vec<Expr> {
+    (0..geometry.dimension())
+        .map(|i| {
+            let terms: Vec<Expr> = (0..geometry.dimension())
+                .map(|a| graph.mul(geometry.rotation[i][a], vector[a]))
+                .collect();
+            let component = graph.sum_of(terms);
+            geometry.without_angles(graph, component)
+        })
+        .collect()
+}

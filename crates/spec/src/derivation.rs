@@ -3,7 +3,8 @@
 use crate::Spec;
 use crate::coordinates::Geometry;
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Derivatives, Expr, Graph};
+use mmsmith_expr::{Derivatives, Expr, Graph, Node};
+use num_traits::Zero;
 use std::collections::BTreeSet;
 
 /// The graph of one derivation, with the coordinates and what they make of derivatives.
@@ -110,5 +111,42 @@ impl Derivation {
             }
         }
         terms
+    }
+}
+
+/// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
+pub(crate) fn is_joined(
+    graph: &mut Graph,
+    sum: Expr,
+    [a, b]: [Expr; 2],
+    variables: &BTreeSet<Expr>,
+) -> bool {
+    let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
+    let others = graph.sub(sum, a);
+    let own = match graph.node(a) {
+        Node::Sum { terms, .. } => terms.len(),
+        _ => usize::from(a != Graph::ZERO),
+    };
+    // Terms of equal factors are grouped; where they are joined, the whole is shorter.
+    terms(graph, sum) != terms(graph, others) + own
+        && graph.reachable(&[sum]).len() < graph.reachable(&[a, b]).len()
+}
+
+/// How many terms an expression has, common factors apart.
+fn terms(graph: &Graph, expr: Expr) -> usize {
+    match graph.node(expr) {
+        // A product with a number in front of it.
+        Node::Sum { constant, terms: one } if one.len() == 1 && constant.is_zero() => {
+            terms(graph, one[0].0)
+        }
+        Node::Sum { terms, .. } => terms.len(),
+        Node::Product(factors) => {
+            let sums = factors.iter().filter_map(|(base, _)| match graph.node(*base) {
+                Node::Sum { terms, .. } => Some(terms.len()),
+                _ => None,
+            });
+            sums.max().unwrap_or(1)
+        }
+        _ => usize::from(expr != Graph::ZERO),
     }
 }

@@ -9,14 +9,12 @@
 //! part is joined with the acceleration in symbols, where the two may cancel identically.
 
 use crate::Spec;
-use crate::coordinates::{Geometry, identity};
-use crate::derivation::Derivation;
+use crate::coordinates::{Geometry, identity, turn_vector};
+use crate::derivation::{Derivation, is_joined};
 use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
 use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Dependence, Expr, Graph, Node, Program};
-use num_traits::Zero;
-use std::collections::BTreeSet;
+use mmsmith_expr::{Dependence, Expr, Graph, Program};
 use thiserror::Error;
 
 /// Every field of a solution, in Cartesian components, as expressions of the graph.
@@ -180,56 +178,6 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
         b.push(zero_if_vanishing(graph, component));
     }
     b
-}
-
-/// Whether terms of `a` and `-b` were joined in `sum`, which is `a - b` after cancellation.
-pub(crate) fn is_joined(
-    graph: &mut Graph,
-    sum: Expr,
-    [a, b]: [Expr; 2],
-    variables: &BTreeSet<Expr>,
-) -> bool {
-    let (a, b) = (graph.cancel(a, variables), graph.cancel(b, variables));
-    let others = graph.sub(sum, a);
-    let own = match graph.node(a) {
-        Node::Sum { terms, .. } => terms.len(),
-        _ => usize::from(a != Graph::ZERO),
-    };
-    // Terms of equal factors are grouped; where they are joined, the whole is shorter.
-    terms(graph, sum) != terms(graph, others) + own
-        && graph.reachable(&[sum]).len() < graph.reachable(&[a, b]).len()
-}
-
-/// How many terms an expression has, common factors apart.
-fn terms(graph: &Graph, expr: Expr) -> usize {
-    match graph.node(expr) {
-        // A product with a number in front of it.
-        Node::Sum { constant, terms: one } if one.len() == 1 && constant.is_zero() => {
-            terms(graph, one[0].0)
-        }
-        Node::Sum { terms, .. } => terms.len(),
-        Node::Product(factors) => {
-            let sums = factors.iter().filter_map(|(base, _)| match graph.node(*base) {
-                Node::Sum { terms, .. } => Some(terms.len()),
-                _ => None,
-            });
-            sums.max().unwrap_or(1)
-        }
-        _ => usize::from(expr != Graph::ZERO),
-    }
-}
-
-/// Physical components to Cartesian ones: `x_i = sum_a Q_ia x_a`.
-pub(crate) fn turn_vector(graph: &mut Graph, geometry: &Geometry, vector: &[Expr]) -> Vector {
-    (0..geometry.dimension())
-        .map(|i| {
-            let terms: Vec<Expr> = (0..geometry.dimension())
-                .map(|a| graph.mul(geometry.rotation[i][a], vector[a]))
-                .collect();
-            let component = graph.sum_of(terms);
-            geometry.without_angles(graph, component)
-        })
-        .collect()
 }
 
 /// Physical components to Cartesian ones: `A_ij = sum_ab Q_ia A_ab Q_jb`.

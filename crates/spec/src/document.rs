@@ -1,7 +1,7 @@
 //! The TOML document as it stands: tables, keys and strings with their places, no meaning yet.
 
 use crate::Diagnostic;
-use crate::scope::Source;
+use crate::source::Source;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 use std::marker::PhantomData;

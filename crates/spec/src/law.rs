@@ -460,6 +460,15 @@ pub(crate) fn zero_if_vanishing(graph: &mut Graph, expr: Expr) -> Expr {
     if graph.vanishes(expr) { Graph::ZERO } else { expr }
 }
 
+/// A modulus at rest with its constants as they are written, so that identities among them cancel in symbols, here and against the
+/// inertia: `kappa - 2 mu/3` is `lambda` where bulk and shear modulus are stated in Young's modulus and Poisson's ratio, and rounding
+/// would keep something where that vanishes.
+fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
+    let modulus = zero_if_vanishing(graph, modulus);
+    let open = graph.open(modulus);
+    graph.single_term(open).unwrap_or(open)
+}
+
 /// What [`Graph::whole`] kept in one piece.
 pub(crate) fn inside(graph: &Graph, expr: Expr) -> Expr {
     match graph.node(expr) {

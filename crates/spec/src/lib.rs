@@ -20,6 +20,7 @@ mod rotation;
 mod scope;
 mod sense;
 mod solve;
+mod source;
 mod spec;
 mod surface;
 mod tensor;

@@ -3,37 +3,14 @@
 use crate::Diagnostic;
 use crate::diagnostic::nearest;
 use crate::document::Text;
+use crate::source::Source;
 use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Names have at most this many characters.
 const LONGEST_NAME: usize = 64;
 
-/// The text of a specification and its name, for messages.
-pub(crate) struct Source<'a> {
-    pub(crate) file: &'a str,
-    pub(crate) text: &'a str,
-}
-
 impl Source<'_> {
-    pub(crate) fn error(
-        &self,
-        message: impl Into<String>,
-        span: std::ops::Range<usize>,
-        help: Option<String>,
-    ) -> Diagnostic {
-        // A place that the TOML reader gives may lie within a character.
-        let span =
-            self.text.floor_char_boundary(span.start)..self.text.ceil_char_boundary(span.end);
-        Diagnostic {
-            message: message.into(),
-            file: self.file.to_owned(),
-            source: self.text.to_owned(),
-            span,
-            help,
-        }
-    }
-
     pub(crate) fn parse(&self, text: &Text) -> Result<Ast, Diagnostic> {
         Ast::parse(&text.value)
             .map_err(|e| self.error(e.message, text.locate(self.text, &e.span), None))

@@ -9,7 +9,8 @@ use crate::document::{BoundaryTable, Document, DomainTable, Entries, List, Param
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::law::energy_text;
 use crate::read::LONGEST_FILE;
-use crate::scope::{Scope, Source};
+use crate::scope::Scope;
+use crate::source::Source;
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
 use mmsmith_expr::{Expr, Function, Graph, Node, Program, Rational};
 use mmsmith_vocabulary::{

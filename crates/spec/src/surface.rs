@@ -4,7 +4,7 @@
 //! first column of the stress in those coordinates with `R` put at the rim: where the rim is free of traction it
 //! simplifies to zero, in symbols.
 
-use crate::coordinates::Geometry;
+use crate::coordinates::{Geometry, turn_vector};
 use crate::{Boundary, Condition, Coordinates, Domain, Spec, Surface};
 use mmsmith_expr::{Expr, Graph, Replacement};
 
@@ -166,7 +166,7 @@ impl OnSurface<'_, '_> {
             }
         }
         if plane(self.spec, self.surface).is_none() && radial {
-            traction = crate::derive::turn_vector(self.graph, self.geometry, &traction);
+            traction = turn_vector(self.graph, self.geometry, &traction);
             traction = traction.into_iter().map(|t| self.placed(t)).collect();
         }
         SurfaceFields { surface: self.surface, traction, claims }

@@ -31,6 +31,7 @@
 mod function;
 mod moduli;
 mod program;
+mod slope;
 mod stress;
 mod tape;
 mod text;

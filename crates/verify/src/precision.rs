@@ -1,7 +1,8 @@
 //! The numbers of runs.
 
+use mmsmith_galerkin::{BoundaryData, SetUp};
 use mmsmith_measure::Compared;
-use mmsmith_mpm::{Scalar, Stressed};
+use mmsmith_mpm::{Scalar, SetupError, Solver, Stressed};
 use mmsmith_runtime::Real;
 use mmsmith_stated_law::Compiled;
 
@@ -9,9 +10,35 @@ use mmsmith_stated_law::Compiled;
 pub(crate) trait Precision<const D: usize>:
     Real + Scalar<D> + Stressed<3> + Compared<D> + Compiled<D>
 {
+    /// The solver in the total Lagrangian formulation, which is in double precision alone.
+    fn total_lagrangian<'a>(
+        set_up: SetUp<'_, D>,
+        boundary: Box<dyn BoundaryData<D> + 'a>,
+    ) -> Result<Box<dyn Solver<Self, D> + 'a>, SetupError>;
 }
 
-impl<T: Real + Scalar<D> + Stressed<3> + Compared<D> + Compiled<D>, const D: usize> Precision<D>
-    for T
-{
+macro_rules! precisions {
+    ($($D:literal)*) => {
+        $(
+            impl Precision<$D> for f64 {
+                fn total_lagrangian<'a>(
+                    set_up: SetUp<'_, $D>,
+                    boundary: Box<dyn BoundaryData<$D> + 'a>,
+                ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
+                    set_up.solver(boundary)
+                }
+            }
+
+            impl Precision<$D> for f32 {
+                fn total_lagrangian<'a>(
+                    _: SetUp<'_, $D>,
+                    _: Box<dyn BoundaryData<$D> + 'a>,
+                ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
+                    Err(SetupError::DoublePrecisionOnly)
+                }
+            }
+        )*
+    };
 }
+
+precisions! { 1 2 3 }

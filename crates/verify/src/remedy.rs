@@ -151,8 +151,8 @@ fn total_candidate(exact: &AnySolution<f64>, stopped: &Case) -> Option<Case> {
     let coordinates = Total::coordinates_for(exact);
     let total = Total { layout, coordinates, ..Total::of_degree(3) };
     let per_cell = match layout {
-        mmsmith_mpm::total_lagrangian::Layout::Gauss => total.degree + 1,
-        mmsmith_mpm::total_lagrangian::Layout::Lattice => 2,
+        mmsmith_galerkin::Layout::Gauss => total.degree + 1,
+        mmsmith_galerkin::Layout::Lattice => 2,
     };
     let cfl_speed = CflSpeed::PWave;
     let cfl = total.usual_cfl(exact, cfl_speed).ok()?;

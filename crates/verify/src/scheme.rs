@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
+use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
 use mmsmith_mpm::{Integrator, Shape, Transfer};
 
 /// How particles and grid exchange, and how a run goes on in time.

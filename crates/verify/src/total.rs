@@ -1,10 +1,11 @@
 //! Runs in the reference configuration: from a solution to splines, a layout of particles, and their motion.
 
-use mmsmith_mpm::total_lagrangian::{
+use mmsmith_galerkin::SetUp;
+use mmsmith_galerkin::{
     Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
     Side,
 };
-use mmsmith_mpm::{SetupError, Solver, TotalSetUp};
+use mmsmith_mpm::{SetupError, Solver};
 use mmsmith_runtime::{AnySolution, Condition, Domain, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
@@ -241,7 +242,7 @@ where
     f64: Precision<D>,
 {
     let Total { degree, mass, composition, .. } = *total;
-    let set_up = TotalSetUp {
+    let set_up = SetUp {
         grid: total.grid(scene, case.per_cell)?,
         scheme: Scheme { degree, mass, composition },
         law: law(exact.law())?,

@@ -12,7 +12,7 @@
 //!
 //! Nothing here knows a clock or a solver: both are given, so that tests can state them.
 
-use mmsmith_mpm::total_lagrangian::{Composition, Coordinates, Layout, MassMatrix};
+use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
 use mmsmith_mpm::{Shape, Transfer};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
 //! the expected one.
 
+use mmsmith_galerkin::{Layout, MassMatrix};
 use mmsmith_measure::norms::{PerField, PerNorm};
-use mmsmith_mpm::total_lagrangian::{Layout, MassMatrix};
 use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain, Solution};
 use serde::Serialize;

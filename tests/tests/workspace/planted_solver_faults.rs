@@ -5,10 +5,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use mmsmith_mpm::fault::{self, Fault};
-use mmsmith_mpm::total_lagrangian::{
+use mmsmith_galerkin::{
     Axis, End, Grid as SplineGrid, MassMatrix, Scheme as SplineScheme, TotalLagrangian,
 };
+use mmsmith_mpm::fault::{self, Fault};
 use mmsmith_mpm::{Body, Grid, Material, NoBodyForce, Particles, Settings, Simulation};
 use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_verify::{

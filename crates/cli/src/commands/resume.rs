@@ -1,77 +1,15 @@
 //! `mms resume`: a run that wrote checkpoints, from the last of them on.
 
-use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
-use mmsmith_verify::{CheckpointError, CheckpointFolder, Checkpoints};
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
-use sha2::{Digest, Sha256};
+use mmsmith_verify::CheckpointFolder;
 
+use super::checkpoint_folder::{FILE, Place, recall, take};
 use super::run::{self, Origin};
-use crate::arguments::{Arguments, Command, ResumeOptions, RunOptions};
-use crate::json::{self, Output};
-use crate::keep;
-use crate::processes;
+use crate::arguments::{Arguments, Command, ResumeOptions};
 use crate::terminal;
-
-/// What a run leaves in its folder before its first step.
-const FILE: &str = "run.json";
-const SCHEMA: &str = "mmsmith.checkpoint/1";
-/// What that file begins with, and what stands between its checksum and all that the checksum is of.
-const BEFORE: &str = "{\"sha256\":\"";
-const AFTER: &str = "\",";
-
-/// How a run was started.
-#[derive(Serialize, Deserialize)]
-struct Start {
-    schema: String,
-    /// The folder that the run was started in, to which the files of its arguments are relative.
-    folder: PathBuf,
-    /// What followed the program's name.
-    arguments: Vec<String>,
-}
-
-/// The text of a JSON object with the SHA-256 of what follows it as its first member.
-fn sealed(object: &str) -> Option<String> {
-    let rest = object.strip_prefix('{')?;
-    Some(format!("{BEFORE}{}{AFTER}{rest}", sum(rest)))
-}
-
-/// Whether `text` is what [`sealed`] made, to the bit.
-fn is_whole(text: &str) -> bool {
-    let parts = text.strip_prefix(BEFORE).and_then(|text| text.split_once(AFTER));
-    parts.is_some_and(|(found, rest)| found == sum(rest))
-}
-
-fn sum(text: &str) -> String {
-    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// How the run of `folder` was started.
-fn recall(folder: &Path) -> Result<Start> {
-    let path = folder.join(FILE);
-    let (shown, folder) = (path.display(), folder.display());
-    let bytes = fs::read(&path).with_context(|| {
-        format!("cannot read {shown}, which mms run --checkpoint {folder} writes")
-    })?;
-    let text = String::from_utf8(bytes).ok().filter(|text| is_whole(text));
-    let Some(text) = text else {
-        bail!(
-            "{shown} is not what mms run --checkpoint wrote: its checksum does not match; delete {folder} to start the run \
-             anew"
-        );
-    };
-    let start: Start = serde_json::from_str(&text)
-        .with_context(|| format!("{shown} is not what mms run --checkpoint writes"))?;
-    if start.schema != SCHEMA {
-        bail!("{shown} is of the form '{}', not '{SCHEMA}'", start.schema);
-    }
-    Ok(start)
-}
 
 /// Goes on with the run of a folder.
 pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
@@ -98,98 +36,4 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
         None => terminal::note(format_args!("{given}: no checkpoint yet, the run begins anew")),
     }
     run::follow(&run, Origin::Checkpoint(Place { folder, resume: true }))
-}
-
-/// The folder, for this run alone: the first of its processes locks it.
-fn take(folder: &Path) -> Result<CheckpointFolder, CheckpointError> {
-    if processes::is_first() {
-        CheckpointFolder::lock(folder)
-    } else {
-        Ok(CheckpointFolder::of_first(folder))
-    }
-}
-
-/// Where a run keeps its state, and whether it goes on from there.
-pub(super) struct Place {
-    folder: CheckpointFolder,
-    resume: bool,
-}
-
-/// Takes the folder for this run, and writes down how it was started: by the words of this command line.
-pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
-    if !processes::is_first() {
-        return Ok(Place { folder: CheckpointFolder::of_first(folder), resume: false });
-    }
-    let path = folder.join(FILE);
-    if path.exists() {
-        let shown = folder.display();
-        bail!(
-            "--checkpoint: {shown} holds a run already; mms resume {shown} goes on with it, and without the folder's \
-             files a run starts anew"
-        );
-    }
-    fs::create_dir_all(folder)
-        .with_context(|| format!("--checkpoint: cannot create {}", folder.display()))?;
-    let locked = CheckpointFolder::lock(folder).context("--checkpoint")?;
-    // Another run may have come and gone since.
-    if path.exists() {
-        bail!("--checkpoint: {} holds a run already", folder.display());
-    }
-    let arguments = line.iter().skip(1).map(|argument| {
-        argument.to_str().map(str::to_owned).with_context(|| {
-            let shown = argument.to_string_lossy();
-            format!("--checkpoint: the argument {shown:?} is not valid Unicode and cannot be kept")
-        })
-    });
-    let start = Start {
-        schema: SCHEMA.into(),
-        folder: std::env::current_dir().context("--checkpoint: cannot tell the current folder")?,
-        arguments: arguments.collect::<Result<_>>()?,
-    };
-    let text = sealed(&json::text(&start)?).context("cannot form JSON")?;
-    Output::prepare(&path)?.write_text(&text)?;
-    let shown = folder.display();
-    terminal::note(format_args!("if this run is stopped, mms resume {shown} goes on with it"));
-    Ok(Place { folder: locked, resume: false })
-}
-
-/// The checkpoints of the run with these settings.
-pub(super) fn checkpoints(
-    place: Place,
-    options: &RunOptions,
-    settings: &Value,
-) -> Result<Checkpoints> {
-    let (settings, origin) = (keep::decisive(settings), keep::origin(&options.name)?);
-    let identity = Sha256::digest(format!("{settings}{origin}")).into();
-    let Place { folder, resume } = place;
-    processes::keep_in(folder.path());
-    Ok(Checkpoints { folder, every: options.every, identity, resume })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whatever bit of it is turned, the file is refused, and named.
-    #[test]
-    fn every_altered_bit_of_a_start_is_noticed() {
-        let folder = tempfile::tempdir().unwrap();
-        let start = Start {
-            schema: SCHEMA.into(),
-            folder: "/home/user/study".into(),
-            arguments: ["run", "ring", "--cells", "16", "--json", "a.json"].map(Into::into).into(),
-        };
-        let path = folder.path().join(FILE);
-        let text = sealed(&json::text(&start).unwrap()).unwrap();
-        let whole = text.clone().into_bytes();
-        fs::write(&path, &whole).unwrap();
-        assert_eq!(recall(folder.path()).unwrap().arguments, start.arguments);
-        for bit in 0..8 * whole.len() {
-            let mut bytes = whole.clone();
-            bytes[bit / 8] ^= 1 << (bit % 8);
-            fs::write(&path, bytes).unwrap();
-            let Err(error) = recall(folder.path()) else { panic!("bit {bit} of {text}") };
-            assert!(error.to_string().contains(FILE), "{error}");
-        }
-    }
 }

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::picture::Picture;
 use super::remedy::{Advice, Given};
 use super::scheme::Settled;
-use super::{Model, caption, inversion, resume, settings, with_threads};
+use super::{Model, caption, checkpoint_folder, inversion, settings, with_threads};
 use crate::arguments::RunOptions;
 use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
@@ -35,7 +35,7 @@ pub(super) enum Origin<'a> {
     /// The words of a command line.
     Line(&'a [OsString]),
     /// The last checkpoint in a folder.
-    Checkpoint(resume::Place),
+    Checkpoint(checkpoint_folder::Place),
 }
 
 /// The run, from its beginning or from its last checkpoint.
@@ -64,13 +64,13 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let settings = || settings(&selection, settled, extent, cells, case.cfl);
     // Nothing is left in the folder of a run that cannot begin.
     let place = match (origin, &options.checkpoint) {
-        (Origin::Line(line), Some(folder)) => Some(resume::remember(folder, line)?),
+        (Origin::Line(line), Some(folder)) => Some(checkpoint_folder::remember(folder, line)?),
         (Origin::Line(_), None) => None,
         (Origin::Checkpoint(place), _) => Some(place),
     };
     let mut traffic = RunTraffic::default();
     let checkpoints = match place {
-        Some(place) => Some(resume::checkpoints(place, options, &settings())?),
+        Some(place) => Some(checkpoint_folder::checkpoints(place, options, &settings())?),
         None => None,
     };
     with_threads(settled.threads, || {

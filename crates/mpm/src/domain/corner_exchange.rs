@@ -8,6 +8,7 @@
 //! Sums over the particles at a corner are in the order of ids, sums over corners at a node in that of [`bins`](crate::parallel::bins)
 //! of corners: no sum depends on the number of threads.
 
+use mmsmith_lanes::simd::{Lane4, Lanes, dispatch};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -24,7 +25,6 @@ use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::particles::mesh::Mesh;
 use crate::shape::one_axis::{OnAxis, ProductShape};
-use crate::simd::{Lane4, Lanes, dispatch};
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome, SharedOutcome};
 

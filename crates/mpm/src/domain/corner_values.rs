@@ -1,7 +1,8 @@
 //! Values of the grid at the corners that domains share.
 
+use mmsmith_lanes::simd::{Lane4, Lanes};
+
 use crate::grid::node::Node;
-use crate::simd::{Lane4, Lanes};
 
 /// Vectors at a corner, one for each axis: of momenta that go by the arm to a node, or of moments of velocities. The last number of four is
 /// zero.

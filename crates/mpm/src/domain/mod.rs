@@ -6,6 +6,8 @@ pub(crate) mod shared_corners;
 
 use std::array;
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::{product, real};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::domain::corner_values::{CornerValues, Seen};
@@ -17,8 +19,6 @@ use crate::particles::mesh::Interpolation;
 use crate::scheme::Shape;
 use crate::shape::cells::{HalfEdges, REACHED};
 use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, first_layer, node_below};
-use crate::simd::Lanes;
-use crate::tensor::{product, real};
 
 /// The shape function of a simulation.
 #[derive(Debug)]

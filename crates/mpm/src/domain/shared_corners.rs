@@ -3,9 +3,11 @@
 use std::array;
 use std::ops::Range;
 
+use mmsmith_lanes::simd::{Lanes, One};
+use mmsmith_lanes::tensor::determinant;
+use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::parallel::chunks::each;
@@ -13,8 +15,6 @@ use crate::particles::mesh::{Interpolation, Mesh, Share};
 use crate::processes::corner_halo::CornerHalo;
 use crate::shape::cells::{PAIRS, volume_of_cell};
 use crate::shape::one_axis::ProductShape;
-use crate::simd::{Lanes, One};
-use crate::tensor::determinant;
 
 /// Corners handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 pub(crate) const CHUNK: usize = 1024;

@@ -16,6 +16,8 @@
 
 use std::ops::Range;
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::real;
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
@@ -25,8 +27,6 @@ use crate::grid::grid_update::{GridUpdate, NodeUpdate, receive_nodes, send_nodes
 use crate::grid::node::Node;
 use crate::parallel::bins::{AddToBand, Bins};
 use crate::parallel::chunks::each_chunk;
-use crate::simd::Lanes;
-use crate::tensor::real;
 
 /// Nodes with less than this share of the mass of a whole cell are light.
 ///

@@ -2,14 +2,14 @@
 
 use std::array;
 
+use mmsmith_lanes::tensor::{product, real};
+use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::fault::{Fault, Planted};
 use crate::grid::node::Node;
 use crate::grid::{Grid, Layout};
 use crate::parallel::bins::{BinRows, Bins};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
-use crate::tensor::{product, real};
 
 /// Constants of a run: the grid's geometry, the rows of each bin, the time step.
 #[derive(Clone, Copy, Debug)]

@@ -7,10 +7,10 @@ pub(crate) mod node;
 
 use std::ops::Range;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
 use crate::error::SetupError;
-use crate::tensor::real;
 
 /// Background grid: a box of cubic cells.
 #[derive(Clone, Debug, PartialEq)]

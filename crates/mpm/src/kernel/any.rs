@@ -1,13 +1,13 @@
 //! P2G and G2P of one particle, in any dimension and for any support: row by row along axis 0.
 
+use mmsmith_lanes::simd::{Lane4, Lane8, Lanes, Vectors};
+use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::grid::node::{LANES, Node};
 use crate::shape::one_axis::EXTENDED;
 use crate::shape::weights::Weights;
-use crate::simd::{Lane4, Lane8, Lanes, Vectors};
 
 /// Values of the grid at a particle, the result of G2P.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,10 @@
 //! Blocks of 64 particles: their stresses, and the kernels for P2G and G2P that serve a simulation.
 
+use std::sync::Arc;
+
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::tensor::product;
+use mmsmith_laws::{BlockOfStresses, ConstitutiveLaw, LibraryLaw};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -11,8 +16,6 @@ use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::parallelograms::ParallelogramWeights;
 use crate::kernel::product::ProductWeights;
 use crate::kernel::shared::FromCorners;
-use crate::material::LibraryLaw;
-use crate::simd::{Lanes, Loop, Vectors, dispatch};
 
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
@@ -142,6 +145,29 @@ impl<T: Lanes, const D: usize> Block<T, D> {
     }
 }
 
+/// A law that the caller brings, for blocks of particles in the updated Lagrangian formulation.
+pub(crate) struct OwnBlocks<T, const D: usize>(pub(crate) Arc<dyn ConstitutiveLaw<T, D>>);
+
+impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
+    fn stress(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        let mut block = BlockOfStresses::at_rest();
+        for (n, F) in F.iter().enumerate() {
+            block.set(n, F);
+        }
+        block.evaluate(self.0.as_ref());
+        for (n, F) in F.iter().enumerate() {
+            let tau = product(&block.stress(n), &F.transpose());
+            let tau = c.planted.stress_in_forces(tau, F);
+            contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
+        }
+    }
+}
+
 struct Stress<'a, T, L, const D: usize> {
     F: &'a [SMatrix<T, D, D>; BLOCK],
     c: &'a Constants<T, D>,
@@ -188,8 +214,8 @@ pub(super) mod tests {
 
     use crate::Grid;
     use crate::grid::Layout;
-    use crate::material::NeoHookean;
     use crate::parallel::bins::Bins;
+    use mmsmith_laws::NeoHookean;
 
     pub(in crate::kernel) fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
         let grid =

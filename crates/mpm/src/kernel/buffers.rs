@@ -2,11 +2,12 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use mmsmith_lanes::simd::Lanes;
+
 use crate::domain::Support;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::Block;
 use crate::kernel::copies::BLOCK;
-use crate::simd::Lanes;
 
 /// What a pass over blocks computes with. Entries beyond the particles of a block are left from another block, and not read.
 pub(crate) struct Buffers<T, const D: usize> {

@@ -2,10 +2,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::simd::Lanes;
+use mmsmith_lanes::simd::Lanes;
 
-/// Particles in a block: as many as keep all of it in the first-level cache.
-pub const BLOCK: usize = 64;
+pub(crate) use mmsmith_laws::BLOCK;
 
 /// Positions and deformation gradients of the particles of a block.
 #[derive(Clone, Copy)]

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use mmsmith_lanes::simd::{Lane4, Lanes, Vectors};
+
 use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Receive};
 use crate::shape::weights::{Weights, is_middle};
-use crate::simd::{Lane4, Lanes, Vectors};
 
 /// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
 #[inline(always)]

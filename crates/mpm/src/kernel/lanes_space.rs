@@ -2,10 +2,11 @@
 //!
 //! Loops, not closures: functions of the standard library that call one are compiled without the registers of the kernel.
 
+use mmsmith_lanes::simd::{Lane8, Lanes, Vectors};
+
 use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::shape::weights::Weights;
-use crate::simd::{Lane8, Lanes, Vectors};
 
 /// The weights of a particle along an axis, each as a factor of eight numbers.
 #[inline(always)]

@@ -12,6 +12,9 @@
 
 use std::array;
 
+use mmsmith_lanes::simd::{Eight, Lane8, Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::tensor::real;
+
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
@@ -22,8 +25,6 @@ use crate::shape::cells::{
     slopes_of_parallelogram,
 };
 use crate::shape::one_axis::{index, node_below};
-use crate::simd::{Eight, Lane8, Lanes, Loop, Vectors, dispatch};
-use crate::tensor::real;
 
 /// One number for every particle of a block, `[group].0[n]`; aligned with vector registers.
 type PerParticle<T> = [Lane8<T>; BLOCK / GROUP];

@@ -1,5 +1,6 @@
 //! P2G and G2P of corners as points, by hat functions: values alone pass, and affine momenta.
 
+use mmsmith_lanes::simd::{Lane8, Lanes, Loop, Vectors};
 use nalgebra::SVector;
 
 use crate::domain::corner_values::AlongAxes;
@@ -7,7 +8,6 @@ use crate::domain::shared_corners::SharedCorners;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::shape::one_axis::{Hat, ShapeFunction, index};
-use crate::simd::{Lane8, Lanes, Loop, Vectors};
 
 /// The nodes around a point.
 struct Around<T, const D: usize> {

@@ -2,9 +2,11 @@
 
 use std::marker::PhantomData;
 
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::tensor::real;
+use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{SMatrix, SVector};
 
-use crate::fault::{Fault, Planted};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
@@ -16,8 +18,6 @@ use crate::shape::one_axis::{
     moment,
 };
 use crate::shape::weights::{ExtendedWeights, Weights, is_middle};
-use crate::simd::{Lanes, Loop, Vectors, dispatch};
-use crate::tensor::real;
 
 /// One number for every particle of a block.
 type PerParticle<T> = [T; BLOCK];

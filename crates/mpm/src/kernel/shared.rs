@@ -3,6 +3,7 @@
 //! Shares of cells are computed for eight particles at once, here and again where they are needed next: that takes less time than to
 //! read them from memory. Those of polygons, of which there are few, are stored.
 
+use mmsmith_lanes::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_values::{AlongAxes, CornerValues};
@@ -14,7 +15,6 @@ use crate::kernel::copies::BLOCK;
 use crate::kernel::parallelograms::GROUP;
 use crate::particles::mesh::{Mesh, Share};
 use crate::shape::cells::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
-use crate::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
 type GroupCorners<T, V, const D: usize> = [[Eight<T, V>; D]; MOST_CORNERS];

@@ -7,11 +7,7 @@
 use rayon::prelude::*;
 
 /// Calls `work` with the number of each chunk of `size` elements, and the chunk.
-pub(crate) fn each_chunk<A: Send>(
-    array: &mut [A],
-    size: usize,
-    work: &(dyn Fn(usize, &mut [A]) + Sync),
-) {
+pub fn each_chunk<A: Send>(array: &mut [A], size: usize, work: &(dyn Fn(usize, &mut [A]) + Sync)) {
     if array.len() <= size {
         work(0, array);
         return;
@@ -21,7 +17,7 @@ pub(crate) fn each_chunk<A: Send>(
 }
 
 /// Calls `work` with each of several pieces of work.
-pub(crate) fn each<A: Send>(pieces: Vec<A>, work: &(dyn Fn(A) + Sync)) {
+pub fn each<A: Send>(pieces: Vec<A>, work: &(dyn Fn(A) + Sync)) {
     if pieces.len() <= 1 {
         pieces.into_iter().for_each(work);
         return;

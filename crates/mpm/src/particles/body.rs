@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
 use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::particles::mesh::{Mesh, Numbers};
-use crate::tensor::real;
 
 /// Particles, and the region of the body that each represents.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,10 +4,10 @@ pub(crate) mod body;
 pub(crate) mod clip;
 pub(crate) mod mesh;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::grid::Grid;
-use crate::tensor::real;
 
 /// State of the particles as a structure of arrays; the index is the particle's id and never changes.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,12 +5,12 @@
 
 use std::sync::Arc;
 
+use mmsmith_lanes::simd::Lanes;
 use mmsmith_ranks::{Ranks, announce, exchange};
 use nalgebra::SVector;
 
 use crate::domain::corner_values::CornerValues;
 use crate::grid::node::Node;
-use crate::simd::Lanes;
 
 /// Which values come from other processes, and which go there.
 pub(crate) struct CornerHalo {

@@ -7,6 +7,7 @@
 use std::slice;
 
 use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
+use mmsmith_lanes::simd::Lanes;
 use mmsmith_ranks::total;
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
@@ -15,7 +16,6 @@ use crate::domain::Support;
 use crate::particles::Particles;
 use crate::processes::decomposition::Move;
 use crate::processes::directory::Directory;
-use crate::simd::Lanes;
 use crate::simulation::Simulation;
 use crate::step::state::State;
 
@@ -59,10 +59,7 @@ pub enum SavedStateError {
 }
 
 /// Puts saved arrays in place of those of a state that one process has as a whole.
-pub(crate) fn replace_whole(
-    state: &mut [&mut [u8]],
-    saved: &[SavedState],
-) -> Result<(), SavedStateError> {
+pub fn replace_whole(state: &mut [&mut [u8]], saved: &[SavedState]) -> Result<(), SavedStateError> {
     let [saved] = saved else { return Err(SavedStateError::Parts { found: saved.len() }) };
     let (found, expected) = (saved.len(), state.len());
     if found != expected {

@@ -3,9 +3,8 @@
 //! Where a hat function is replaced by its interpolation between the corners `x_c`, its mean over the domain is
 //! `sum_c w_c phi_i(x_c)` and that of its gradient `sum_c g_c phi_i(x_c)`. Formulas are for one particle or for eight at once.
 
+use mmsmith_lanes::simd::Number;
 use nalgebra::{RealField, SMatrix};
-
-use crate::simd::Number;
 
 // Loops are written out, as a closure would hide from the compiler that it may use vector instructions.
 
@@ -404,8 +403,8 @@ mod tests {
     use std::array;
 
     use super::*;
-    use crate::simd::One;
-    use crate::tensor::{determinant, inverse_transpose};
+    use mmsmith_lanes::simd::One;
+    use mmsmith_lanes::tensor::{determinant, inverse_transpose};
 
     /// Signs of `s` at the corners of the cube `|s_a| <= 1`.
     const SIGNS: [[f64; 3]; MOST_CORNERS] = [

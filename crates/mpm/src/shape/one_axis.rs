@@ -6,11 +6,11 @@
 //! To add one: name it in [`Shape`], implement [`ShapeFunction`] here and add it to [`OnAxis`]. The compiler tells of the rest, which is
 //! in this file and in `kernel/product.rs`.
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
 use crate::grid::PAD_BELOW;
 use crate::scheme::Shape;
-use crate::tensor::real;
 
 /// Largest supported half-size of a particle's box, in cells.
 pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;

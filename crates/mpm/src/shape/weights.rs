@@ -1,10 +1,10 @@
 //! Weights of one particle at its nodes, as products over the axes.
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::real;
 use nalgebra::SMatrix;
 
 use crate::shape::one_axis::{AxisWeights, EXTENDED, extended_axes, moment};
-use crate::simd::Lanes;
-use crate::tensor::real;
 
 /// The weights `S_ip` of one particle and their gradients `G_ip`, however they are stored.
 ///

@@ -5,6 +5,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -20,7 +21,6 @@ use crate::kernel::shared::{FromCorners, ToCorners};
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
 use crate::scheme::Transfer;
-use crate::simd::Lanes;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;

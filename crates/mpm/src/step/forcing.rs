@@ -1,8 +1,8 @@
 //! The body force on all particles at one time.
 
+use mmsmith_laws::fault::Fault;
 use nalgebra::{RealField, SVector};
 
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::kernel::copies::BLOCK;
 use crate::step::body_force::{AtTime, BodyForce};

@@ -8,12 +8,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
 use crate::domain::corner_exchange::Exchange;
 use crate::domain::corner_values::Seen;
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::Block;
@@ -24,7 +25,6 @@ use crate::parallel::bins::Bins;
 use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
 use crate::particles::Particles;
 use crate::scheme::{Taken, Transfer};
-use crate::simd::Lanes;
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::State;
 

@@ -6,11 +6,12 @@
 //!
 //! Source: Wang et al., "A massively parallel and scalable multi-GPU material point method", ACM Trans. Graph. 39 (2020) 30.
 
+use mmsmith_lanes::simd::{Lane4, Lanes, Vectors};
+use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
 use crate::domain::corner_values::Seen;
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::grid::node::Node;
@@ -23,7 +24,6 @@ use crate::parallel::disjoint::{Contiguous, PartElements};
 use crate::particles::Particles;
 use crate::scheme::Transfer;
 use crate::shape::weights::Weights;
-use crate::simd::{Lane4, Lanes, Vectors};
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::g2p::{OfBlock, advance};

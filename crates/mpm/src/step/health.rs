@@ -2,6 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use mmsmith_lanes::simd::{Eight, Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::tensor::{determinant, real};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::{Rows, Support};
@@ -12,8 +14,6 @@ use crate::shape::cells::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_para
 use crate::shape::one_axis::{
     EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
 };
-use crate::simd::{Eight, Lanes, Loop, Vectors, dispatch};
-use crate::tensor::{determinant, real};
 
 /// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

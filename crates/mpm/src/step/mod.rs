@@ -13,13 +13,14 @@ pub(crate) mod p2g;
 pub(crate) mod state;
 pub(crate) mod xpic;
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::real;
+
 use crate::domain::Support;
 use crate::scheme::{Integrator, Taken, Transfer};
-use crate::simd::Lanes;
 use crate::step::body_force::BodyForce;
 use crate::step::health::Outcome;
 use crate::step::state::State;
-use crate::tensor::real;
 
 /// Times of a step, and the factor on its accelerations.
 #[derive(Clone, Copy, Debug)]

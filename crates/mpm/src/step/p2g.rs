@@ -7,13 +7,14 @@
 //! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
 //! [`parallel`](crate::parallel).
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
 use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
 use crate::domain::corner_values::CornerValues;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
-use crate::fault::Fault;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
     Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
@@ -26,7 +27,6 @@ use crate::kernel::shared::ToCorners;
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
-use crate::simd::Lanes;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;

@@ -1,5 +1,6 @@
 //! The state of a running simulation: particles, grid and bins.
 
+use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -13,7 +14,6 @@ use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::processes::decomposition::Part;
 use crate::scheme::Transfer;
-use crate::simd::Lanes;
 use crate::step::health::Outcome;
 
 /// Everything that a step reads and changes.

@@ -6,15 +6,15 @@
 //!
 //! Source: Hammerquist and Nairn, CMAME 318 (2017) 724-738.
 
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::real;
+use mmsmith_laws::fault::Fault;
 use nalgebra::SVector;
 
-use crate::fault::Fault;
 use crate::grid::node::Node;
 use crate::parallel::chunks::each_chunk;
 use crate::scheme::Filter;
-use crate::simd::Lanes;
 use crate::step::state::State;
-use crate::tensor::real;
 
 /// Nodes handed to a thread at a time.
 const CHUNK: usize = 1024;

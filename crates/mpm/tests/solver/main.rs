@@ -1,6 +1,5 @@
 //! The solver as a library: what it keeps, its orders, and how it refuses. One program, so that its schemes are compiled once.
 
-mod boundary;
 mod failures;
 mod mechanics;
 mod order;
@@ -12,4 +11,3 @@ mod registers;
 mod ring;
 mod schemes;
 mod state;
-mod total_lagrangian;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_mpm::total_lagrangian::{
+use mmsmith_galerkin::{
     self as total, Axis, BoundaryData, Composition, Coordinates, End, HeldBoundary, Layout,
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };

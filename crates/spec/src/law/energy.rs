@@ -6,7 +6,7 @@
 //! `Div P = A(0) : grad H + (A - A(0)) : grad H`, linear part and remainder.
 
 use super::kinematics::doubled_strain;
-use super::{Deformation, Stress, zero_if_vanishing};
+use super::{Deformation, Stress, modulus_at_rest, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
 use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node};
@@ -190,15 +190,6 @@ impl ComponentLaw {
         terms.push(graph.beyond_linear(entry, small)?);
         Some(graph.sum_of(terms))
     }
-}
-
-/// A modulus at rest with its constants as they are written, so that identities among them cancel in symbols, here and against the
-/// inertia: `kappa - 2 mu/3` is `lambda` where bulk and shear modulus are stated in Young's modulus and Poisson's ratio, and rounding
-/// would keep something where that vanishes.
-pub(super) fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
-    let modulus = zero_if_vanishing(graph, modulus);
-    let open = graph.open(modulus);
-    graph.single_term(open).unwrap_or(open)
 }
 
 /// `lambda ln J` and `P - lambda ln J I`, for a `P` that is linear in `ln J`: with its slope `c` this is

@@ -17,11 +17,11 @@
 //! - Cube roots replace the power: with `c = J^(1/3)` it is `s - 1 = -(J - 1) (c + 1)/(c^2 (c^2 + c + 1))`, which keeps its digits for
 //!   every `J`. An exponential of `-2/3 ln J` loses them where a stretch almost vanishes.
 
-use super::energy::{EXCESS, modulus_at_rest, own_symbol};
+use super::energy::{EXCESS, own_symbol};
 use super::kinematics::{
     DilationGradient, Kinematics, row_times, volume_symbols, volume_values, work_along,
 };
-use super::{Deformation, Divergence, OfGradient, Stress, zero_if_vanishing};
+use super::{Deformation, Divergence, OfGradient, Stress, modulus_at_rest, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Derivatives, Expr, Graph, Rational};

@@ -1,9 +1,8 @@
 //! Measures of strain that are small where the displacement gradient is, and what laws in invariants need of their gradients.
 
-use super::energy::modulus_at_rest;
-use super::{Deformation, Divergence, OfGradient, zero_if_vanishing};
+use super::{Deformation, Divergence, OfGradient, modulus_at_rest, zero_if_vanishing};
 use crate::derivation::Derivation;
-use crate::derive::is_joined;
+use crate::derivation::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
 use std::collections::BTreeMap;

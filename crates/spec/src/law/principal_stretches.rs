@@ -13,11 +13,11 @@
 //! since the divergence of `J F^-T` is zero (Piola's identity); `z = |M|^2/(4 J)`, and `grad z = (M : grad F)/J - z g`. Along the
 //! diagonal `P` is formed as `(phi - psi (J - 1)) F^-T + psi (F - F^-T)`, whose factor of `F^-T` is `lambda (J - 1)` to first order.
 
-use super::energy::{RATIO, modulus_at_rest, own_symbol};
+use super::energy::{RATIO, own_symbol};
 use super::kinematics::{
     ChainRule, Kinematics, volume_symbols, volume_values, with_transpose, work_along,
 };
-use super::{Deformation, Divergence, Stress, zero_if_vanishing};
+use super::{Deformation, Divergence, Stress, modulus_at_rest, zero_if_vanishing};
 use crate::DeriveError;
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};

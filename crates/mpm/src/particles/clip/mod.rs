@@ -13,6 +13,7 @@ mod space;
 
 use std::collections::BTreeMap;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
@@ -20,7 +21,6 @@ use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::mesh::Mesh;
-use crate::tensor::real;
 
 /// What is left of a box with less than this share of its volume is a sliver.
 const SLIVER: f64 = 0.2;

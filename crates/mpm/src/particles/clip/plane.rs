@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{Matrix2, RealField, SVector, Vector2, vector};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
 use crate::grid::Grid;
 use crate::particles::body::Body;
 use crate::particles::mesh::{Interpolation, Mesh, cross};
-use crate::tensor::real;
 
 /// What tells corners apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -5,13 +5,13 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector, Vector3};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
 use crate::grid::Grid;
 use crate::particles::body::Body;
 use crate::particles::mesh::{Interpolation, Mesh};
-use crate::tensor::real;
 
 /// What tells corners apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

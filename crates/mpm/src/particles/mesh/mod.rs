@@ -19,10 +19,10 @@
 pub(crate) mod part;
 mod polyhedra;
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::error::SetupError;
-use crate::tensor::real;
 
 /// How a function is interpolated between the corners of a particle's domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

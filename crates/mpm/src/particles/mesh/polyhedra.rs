@@ -11,10 +11,10 @@
 //!
 //! A face between two particles has opposite area vectors in both.
 
+use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
 use super::{Mesh, Share, start};
-use crate::tensor::real;
 
 /// As [`Mesh::means`].
 pub(super) fn means<T: RealField + Copy, const D: usize>(

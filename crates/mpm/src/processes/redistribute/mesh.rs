@@ -5,13 +5,14 @@
 
 use std::sync::Arc;
 
+use mmsmith_lanes::simd::Lanes;
+
 use crate::domain::Support;
 use crate::domain::shared_corners::SharedCorners;
 use crate::particles::mesh::Mesh;
 use crate::particles::mesh::part::{LoadRecords, Records};
 use crate::processes::corner_halo::CornerHalo;
 use crate::processes::decomposition::{Lists, Move, Own};
-use crate::simd::Lanes;
 use crate::step::state::State;
 
 impl<T: Lanes, const D: usize> State<T, D> {

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
+use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -14,7 +15,6 @@ use crate::parallel::coloring::Held;
 use crate::particles::Particles;
 use crate::processes::decomposition::Move;
 use crate::shape::cells::HalfEdges;
-use crate::simd::Lanes;
 use crate::step::state::State;
 
 impl<T: Lanes, const D: usize> State<T, D> {

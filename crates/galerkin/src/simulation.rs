@@ -1,0 +1,1029 @@
+//! The simulation: coefficients of displacement and velocity, and the forces on them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::{array, mem};
+
+use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
+use mmsmith_lanes::tensor::determinant;
+use mmsmith_laws::BLOCK;
+use mmsmith_laws::fault::{Fault, Planted};
+use mmsmith_laws::{
+    AnyLaw, BlockOfStresses, ConstitutiveLaw, Law, LibraryLaw, Material, NeoHookean,
+    NeoHookeanNoLog,
+};
+use mmsmith_mpm::BodyForce;
+use mmsmith_mpm::Particles;
+use mmsmith_mpm::{SavedState, SavedStateError, replace_whole};
+use mmsmith_mpm::{SetupError, StepError};
+use mmsmith_mpm::{each, each_chunk};
+use nalgebra::{SMatrix, SVector};
+
+use super::axis::{Axis, End, Layout};
+use super::basis::{Basis, MOST_DEGREE};
+use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
+use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
+use super::composition::Composition;
+use super::coordinates::{Coordinates, Row};
+use super::fit::{Fit, Line};
+use super::mass::{Band, Mass};
+use super::piece;
+
+/// A tensor-product grid that covers the body, with the particles in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid<const D: usize> {
+    /// The axes of the coordinates.
+    pub axes: [Axis; D],
+    /// The coordinate system.
+    pub coordinates: Coordinates,
+    /// Particles in a cell along each direction.
+    pub per_cell: usize,
+    /// Where they lie.
+    pub layout: Layout,
+}
+
+/// Mass matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MassMatrix {
+    /// Row sums on the diagonal: of second order for every degree.
+    Lumped,
+    /// `M_ij = sum m_p N_i N_j`.
+    Consistent,
+}
+
+/// The discretisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scheme {
+    /// The splines' degree, 2 to 5.
+    pub degree: usize,
+    /// The mass matrix.
+    pub mass: MassMatrix,
+    /// The integration in time.
+    pub composition: Composition,
+}
+
+/// A running simulation in the reference configuration.
+///
+/// All loops over particles and coefficients are shared among the threads of the pool; no sum depends on their number.
+#[derive(Clone, Debug)]
+pub struct TotalLagrangian<const D: usize> {
+    grid: Grid<D>,
+    scheme: Scheme,
+    law: Law<f64, D>,
+    time_step: f64,
+    operators: Operators<D>,
+    /// Sides whose motion or traction is given.
+    faces: Vec<Face<D>>,
+    components: [Component<D>; D],
+    /// The body force at the particles.
+    b: Vec<SVector<f64, D>>,
+    particles: Particles<f64, D>,
+    density: f64,
+    /// Curvilinear coordinates: reciprocal radius by place along axis 0, and what a row of places along it has in common.
+    reciprocal_radius: Vec<f64>,
+    rows: Vec<Row<D>>,
+    steps_done: usize,
+    failed: Option<StepError>,
+    planted: Planted,
+}
+
+impl<const D: usize> TotalLagrangian<D> {
+    /// Sets up a body at rest and undeformed, of density `density` per reference volume, at time 0.
+    ///
+    /// # Errors
+    ///
+    /// Where the scene makes no sense (see [`SetupError`]) or does not fit into memory.
+    pub fn new(
+        grid: Grid<D>,
+        scheme: Scheme,
+        law: impl Into<Law<f64, D>>,
+        density: f64,
+        time_step: f64,
+    ) -> Result<Self, SetupError> {
+        const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+        check(&grid, &scheme, density, time_step)?;
+        reserve(&grid, scheme.degree)?;
+        let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
+        let faces = faces(&grid, &lines);
+        let basis = |k: usize, normal: bool| {
+            let axis = &grid.axes[k];
+            Basis::new(axis, scheme.degree, normal, &lines[k].points)
+                .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
+        };
+        let mut bases = Vec::with_capacity(D);
+        for k in 0..D {
+            bases.push([basis(k, false)?, basis(k, true)?]);
+        }
+        let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
+        let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
+        let fits = fits(&grid, &bases, &lines).map_err(singular);
+        if let (Err(error), true) = (&fits, faces.iter().any(|face| face.moved)) {
+            return Err(error.clone());
+        }
+        if Planted::here().is(Fault::WeightOff) {
+            lines.iter_mut().for_each(|line| line.weights[0] *= 1.001);
+        }
+        let mut masses = Vec::with_capacity(D);
+        for (k, (axis, pair)) in grid.axes.iter().zip(&bases).enumerate() {
+            // The density belongs to the product over the axes, so to one of them.
+            let factor = if k == 0 { density } else { 1.0 };
+            let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
+            let mass = |normal: usize| match scheme.mass {
+                MassMatrix::Consistent => {
+                    Mass::consistent(axis, &Band::consistent(&pair[normal], &weights))
+                }
+                MassMatrix::Lumped => {
+                    let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
+                    let skipped = usize::from(on_wall && normal == 1);
+                    let count = pair[normal].functions;
+                    Some(Mass::lumped(axis, &pair[0], &weights, skipped, count))
+                }
+            };
+            let pair_of_masses = mass(0).zip(mass(1)).ok_or_else(|| singular(k))?;
+            masses.push(<[Mass; 2]>::from(pair_of_masses));
+        }
+        let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let particles = particles(&grid, &lines, density);
+        Ok(Self {
+            reciprocal_radius: match grid.coordinates.are_curvilinear() {
+                true => lines[0].points.iter().map(|R| R.recip()).collect(),
+                false => Vec::new(),
+            },
+            rows: rows(&grid, &lines),
+            faces,
+            components: array::from_fn(|index| Component::new(index, &bases)),
+            b: vec![SVector::zeros(); particles.len()],
+            grid,
+            scheme,
+            law: law.into(),
+            time_step,
+            operators: Operators { bases, mass, fits },
+            particles,
+            density,
+            steps_done: 0,
+            failed: None,
+            planted: Planted::here(),
+        })
+    }
+
+    /// The particles' reference positions, Cartesian.
+    pub fn positions(&self) -> &[SVector<f64, D>] {
+        &self.particles.X
+    }
+
+    /// Starts anew at time 0 as [`start_with_boundary`](Self::start_with_boundary) does, with sides that are held.
+    ///
+    /// # Errors
+    ///
+    /// As [`start_with_boundary`](Self::start_with_boundary).
+    pub fn start(
+        &mut self,
+        u: &[SVector<f64, D>],
+        v: &[SVector<f64, D>],
+    ) -> Result<(), SetupError> {
+        self.start_with_boundary(u, v, &HeldBoundary)
+    }
+
+    /// Starts anew at time 0 from the displacements and velocities nearest to those given at the particles, in the
+    /// mean of squares weighted with the particles' masses, among those that have the motion given on the sides.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::SingularMass`] where lumped masses hide that the particles do not determine the coefficients, and
+    /// [`SetupError::LengthMismatch`] for slices of another length than [`positions`](Self::positions).
+    pub fn start_with_boundary(
+        &mut self,
+        u: &[SVector<f64, D>],
+        v: &[SVector<f64, D>],
+        boundary: &dyn BoundaryData<D>,
+    ) -> Result<(), SetupError> {
+        let expected = self.particles.len();
+        for (array, found) in [("u", u.len()), ("v", v.len())] {
+            if found != expected {
+                return Err(SetupError::LengthMismatch { array, found, expected });
+            }
+        }
+        if let Err(error) = &self.operators.fits {
+            return Err(error.clone());
+        }
+        self.fit(u, boundary, Quantity::Displacement, |component| &mut component.u);
+        self.fit(v, boundary, Quantity::Velocity, |component| &mut component.v);
+        self.steps_done = 0;
+        self.failed = None;
+        Ok(())
+    }
+
+    /// Turns coefficients into those of the field nearest to given values, which is `quantity` on the sides at time 0.
+    fn fit(
+        &mut self,
+        values: &[SVector<f64, D>],
+        boundary: &dyn BoundaryData<D>,
+        quantity: Quantity,
+        of: fn(&mut Component<D>) -> &mut Vec<f64>,
+    ) {
+        self.components.iter_mut().for_each(|component| of(component).fill(0.0));
+        self.prescribe(boundary, quantity, 0.0, of);
+        let row = self.row();
+        for (p, value) in values.iter().enumerate() {
+            let value = self.in_frame(p / row, value);
+            for component in &mut self.components {
+                component.values[p] = value[component.index] * self.particles.volume[p];
+            }
+        }
+        let Self { operators: Operators { bases, fits, .. }, faces, components, .. } = self;
+        let Ok(fits) = fits else { return };
+        for component in components {
+            let index = component.index;
+            let functions = component.functions(bases);
+            let given = mem::take(of(component));
+            let mut sums = vec![0.0; given.len()];
+            component.integrate(bases, Factors::Values, &mut sums);
+            let matrix = |k: usize| &along(fits, k, index).matrix;
+            component.subtract_product(&functions, matrix, 1.0, &given, &mut sums);
+            solve(&functions, |k| &along(fits, k, index).mass, &mut sums);
+            for face in faces.iter().filter(|face| face.moved) {
+                face.copy(&functions, &given, &mut sums);
+            }
+            *of(component) = sums;
+        }
+    }
+
+    /// Advances by one time step as [`step_with_boundary`](Self::step_with_boundary) does, with sides that are held, and
+    /// without traction.
+    ///
+    /// # Errors
+    ///
+    /// As [`step_with_boundary`](Self::step_with_boundary).
+    pub fn step(&mut self, body_force: &dyn BodyForce<f64, D>) -> Result<(), StepError> {
+        self.step_with_boundary(body_force, &HeldBoundary)
+    }
+
+    /// Advances by one time step.
+    ///
+    /// # Errors
+    ///
+    /// Where a particle turns inside out or takes on values that are not finite, at any stage of the step. Every
+    /// further call returns the same error.
+    pub fn step_with_boundary(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
+    ) -> Result<(), StepError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
+        let outcome = self.advance(body_force, boundary);
+        if let Err(error) = &outcome {
+            self.failed = Some(error.clone());
+        }
+        outcome
+    }
+
+    fn advance(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
+    ) -> Result<(), StepError> {
+        let start = self.time();
+        if self.steps_done == 0 {
+            self.accelerate(body_force, boundary, start)?;
+        }
+        // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
+        let mut done = 0.0;
+        let stages = self.scheme.composition.stages();
+        for (stage, &gamma) in stages.iter().enumerate() {
+            let part = self.planted.stage(gamma) * self.time_step;
+            each_component(&mut self.components, &|component| {
+                component.kick(0.5 * part);
+                component.drift(part);
+            });
+            let before = start + done * self.time_step;
+            done += if self.planted.is(Fault::StagesAtOneTime) { 0.0 } else { gamma };
+            let now = start + done * self.time_step;
+            let moved = if self.planted.is(Fault::LateBoundary) { before } else { now };
+            // On the way the sides are integrated like all the rest: beside a motion without the errors of the stages they
+            // would leave a layer of order two in the velocities.
+            if stage + 1 == stages.len() {
+                self.prescribe(boundary, Quantity::Displacement, moved, |of| &mut of.u);
+            }
+            self.accelerate(body_force, boundary, now)?;
+            each_component(&mut self.components, &|component| component.kick(0.5 * part));
+        }
+        let end = start + done * self.time_step;
+        self.prescribe(boundary, Quantity::Velocity, end, |of| &mut of.v);
+        self.steps_done += 1;
+        Ok(())
+    }
+
+    /// Writes what is given on moved sides over coefficients.
+    fn prescribe(
+        &mut self,
+        boundary: &dyn BoundaryData<D>,
+        quantity: Quantity,
+        time: f64,
+        of: fn(&mut Component<D>) -> &mut Vec<f64>,
+    ) {
+        let Self { faces, operators: Operators { bases, fits, .. }, components, .. } = self;
+        // Without fits there are no sides of that kind.
+        let Ok(fits) = fits else { return };
+        for face in faces.iter_mut().filter(|face| face.moved) {
+            face.ask(boundary, quantity, time);
+            for component in components.iter_mut() {
+                let index = component.index;
+                let axis = |k: usize| (along(fits, k, index), along(bases, k, index));
+                let of_side = face.fit(index, axis);
+                face.set(&component.functions(bases), &of_side, of(component));
+            }
+        }
+    }
+
+    /// The particles as they are now, with velocities of the same time; computed at each call.
+    pub fn observe(&mut self) -> &Particles<f64, D> {
+        let row = self.row();
+        let Self { components, operators, particles, rows, grid, reciprocal_radius, .. } = self;
+        let rows = &rows[..];
+        let evaluate = |components: &mut [Component<D>; D], field: Field| {
+            each_component(components, &|component| {
+                component.evaluate(&operators.bases, field, true);
+            });
+        };
+        evaluate(components, Field::Velocity);
+        let size = piece(particles.v.len());
+        let at = &*components;
+        each_chunk(&mut particles.v, size, &|piece, v| {
+            for (v, p) in v.iter_mut().zip(piece * size..) {
+                let local = SVector::from_fn(|i, _| at[i].values[p]);
+                *v = cartesian(rows, p / row, &local);
+            }
+        });
+        evaluate(components, Field::Displacement);
+        let at = &*components;
+        let Particles { X, x, F, .. } = particles;
+        let X = &X[..];
+        let pieces = x.chunks_mut(size).zip(F.chunks_mut(size)).enumerate().collect();
+        each(pieces, &|(piece, (x, F))| {
+            for ((x, F), p) in x.iter_mut().zip(F).zip(piece * size..) {
+                let local = SVector::from_fn(|i, _| at[i].values[p]);
+                let mut H = SMatrix::from_fn(|i, k| at[i].slopes[k][p]);
+                if let Some(at) = rows.get(p / row) {
+                    let reciprocal_radius = reciprocal_radius[p % row];
+                    H = grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
+                    H = at.frame * H * at.frame.transpose();
+                }
+                *F = SMatrix::identity() + H;
+                *x = X[p] + cartesian(rows, p / row, &local);
+            }
+        });
+        &self.particles
+    }
+
+    /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
+    pub fn particles(&self) -> &Particles<f64, D> {
+        &self.particles
+    }
+
+    /// The state between two steps: arrays as bytes in this machine's order.
+    pub fn state(&self) -> Vec<&[u8]> {
+        let Self { components, steps_done, .. } = self;
+        let coefficients = components.iter().flat_map(|Component { u, v, a, .. }| [u, v, a]);
+        let mut state: Vec<&[u8]> = coefficients.map(|c| cast_slice(c)).collect();
+        state.push(bytes_of(steps_done));
+        state
+    }
+
+    /// Goes on from a state that was saved, of a simulation with the same set-up, to the bits of that one.
+    ///
+    /// # Errors
+    ///
+    /// Where the state is not one of this set-up; nothing is changed then.
+    pub fn take_up(&mut self, parts: &[SavedState]) -> Result<(), SavedStateError> {
+        let Self { components, steps_done, .. } = self;
+        let coefficients = components.iter_mut().flat_map(|Component { u, v, a, .. }| [u, v, a]);
+        let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
+        state.push(bytes_of_mut(steps_done));
+        replace_whole(&mut state, parts)
+    }
+
+    /// Number of completed steps.
+    pub fn steps_done(&self) -> usize {
+        self.steps_done
+    }
+
+    /// Current time: completed steps times the time step.
+    pub fn time(&self) -> f64 {
+        self.time_step * self.steps_done as f64
+    }
+
+    /// The law.
+    pub fn law(&self) -> &Law<f64, D> {
+        &self.law
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// The discretisation.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Particles along axis 0.
+    fn row(&self) -> usize {
+        self.operators.bases[0][0].points
+    }
+
+    /// A vector's components that the unknowns stand for, in row `row` of particles.
+    fn in_frame(&self, row: usize, vector: &SVector<f64, D>) -> SVector<f64, D> {
+        self.rows.get(row).map_or(*vector, |row| row.frame.tr_mul(vector))
+    }
+
+    /// The accelerations at the current displacement and at `time`.
+    fn accelerate(
+        &mut self,
+        body_force: &dyn BodyForce<f64, D>,
+        boundary: &dyn BoundaryData<D>,
+        time: f64,
+    ) -> Result<(), StepError> {
+        let curvilinear = self.grid.coordinates.are_curvilinear();
+        let Self { components, operators, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, Field::Displacement, curvilinear);
+        });
+        let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
+        let force = forced.then_some((body_force, time));
+        let planted = self.planted;
+        let bad = match self.law.clone() {
+            // One law has kernels of its own; those of `AnyLaw` serve every law.
+            Law::Library(material) => {
+                if let Material::NeoHookean { lambda, mu } = material {
+                    if lambda == 0.0 {
+                        self.stress(NeoHookeanNoLog { mu }, force)
+                    } else {
+                        self.stress(NeoHookean { lambda, mu, planted }, force)
+                    }
+                } else {
+                    self.stress(AnyLaw(planted.law_in_stresses(material)), force)
+                }
+            }
+            Law::Own(law) => self.stress(OwnRows(law), force),
+        };
+        if bad {
+            return Err(self.describe());
+        }
+        let factors = if curvilinear || forced { Factors::Both } else { Factors::Slopes };
+        for face in self.faces.iter_mut().filter(|face| !face.moved) {
+            face.ask(boundary, Quantity::Traction, time);
+            if self.planted.is(Fault::TractionSign) {
+                face.values.iter_mut().for_each(|traction| *traction = -*traction);
+            }
+        }
+        self.prescribe(boundary, Quantity::Acceleration, time, |of| &mut of.given);
+        let moves = self.faces.iter().any(|face| face.moved);
+        let couples = moves
+            && self.scheme.mass == MassMatrix::Consistent
+            && !self.planted.is(Fault::BoundaryInertiaDropped);
+        let coupling = couples.then_some(self.density);
+        let Self { components, operators, faces, .. } = self;
+        let faces = &faces[..];
+        each_component(components, &|component| {
+            component.accelerate(operators, factors, faces, coupling);
+        });
+        Ok(())
+    }
+
+    /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
+    /// forces, with the body force at a time if there is one. True where a particle has no stress.
+    fn stress<L: LawOfRows<D>>(
+        &mut self,
+        law: L,
+        force: Option<(&dyn BodyForce<f64, D>, f64)>,
+    ) -> bool {
+        let row = self.row();
+        let Self { components, b, particles, .. } = self;
+        let size = piece(b.len()).div_ceil(row) * row;
+        let mut arrays = components.each_mut().map(|Component { values, slopes, .. }| {
+            (values.chunks_mut(size), slopes.each_mut().map(|array| array.chunks_mut(size)))
+        });
+        let pieces: Vec<_> = b
+            .chunks_mut(size)
+            .enumerate()
+            .map(|(piece, b)| Places {
+                first: piece * size,
+                values: arrays.each_mut().map(|(values, _)| values.next().unwrap_or_default()),
+                slopes: arrays.each_mut().map(|(_, slopes)| {
+                    slopes.each_mut().map(|chunks| chunks.next().unwrap_or_default())
+                }),
+                b,
+            })
+            .collect();
+        let stress = Stress {
+            law,
+            force,
+            row,
+            particles,
+            density: self.density,
+            coordinates: self.grid.coordinates,
+            rows: &self.rows,
+            reciprocal_radius: &self.reciprocal_radius,
+            planted: self.planted,
+        };
+        let bad = AtomicBool::new(false);
+        each(pieces, &|places| {
+            if stress.at(places) {
+                bad.store(true, Ordering::Relaxed);
+            }
+        });
+        bad.into_inner()
+    }
+
+    /// The error of an invalid displacement.
+    #[cold]
+    fn describe(&mut self) -> StepError {
+        let step = self.steps_done + 1;
+        let time = self.time_step * step as f64;
+        let particles = self.observe();
+        let is_bad = |F: &SMatrix<f64, D, D>| !is_deformation(F);
+        let particle = particles.F.iter().position(is_bad).unwrap_or(0);
+        let J = determinant(&particles.F[particle]);
+        let position = &particles.x[particle];
+        if J.is_finite() && position.iter().all(|x| x.is_finite()) {
+            StepError::Inverted { step, time, particle, J }
+        } else {
+            let position = position.iter().copied().collect();
+            StepError::NotFinite { step, time, particle, position, J }
+        }
+    }
+}
+
+/// Some rows of particles, with what stands there.
+struct Places<'a, const D: usize> {
+    /// Index of the first particle.
+    first: usize,
+    values: [&'a mut [f64]; D],
+    slopes: [[&'a mut [f64]; D]; D],
+    b: &'a mut [SVector<f64, D>],
+}
+
+/// From displacements to forces, at the particles.
+struct Stress<'a, L, const D: usize> {
+    law: L,
+    /// The body force, and its time.
+    force: Option<(&'a dyn BodyForce<f64, D>, f64)>,
+    /// Particles in a row along axis 0.
+    row: usize,
+    particles: &'a Particles<f64, D>,
+    density: f64,
+    coordinates: Coordinates,
+    rows: &'a [Row<D>],
+    reciprocal_radius: &'a [f64],
+    planted: Planted,
+}
+
+impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
+    /// See [`TotalLagrangian::stress`].
+    fn at(&self, Places { first, mut values, mut slopes, b }: Places<'_, D>) -> bool {
+        let Self { row, planted, coordinates, reciprocal_radius, .. } = *self;
+        if let Some((body_force, time)) = self.force {
+            body_force.evaluate(first, &self.particles.X[first..first + b.len()], time, b);
+        }
+        let volumes = &self.particles.volume[first..first + b.len()];
+        let mut bad = false;
+        for (index, volume) in volumes.chunks_exact(row).enumerate() {
+            let start = index * row;
+            let at = self.rows.get(first / row + index);
+            let (values, slopes) = (&mut values, &mut slopes);
+            let mut places = RowOfPlaces {
+                start,
+                volume,
+                values,
+                slopes,
+                at,
+                coordinates,
+                reciprocal_radius,
+                planted,
+                is_bad: false,
+            };
+            self.law.stresses(&mut places);
+            bad |= places.is_bad;
+            if self.force.is_some() {
+                for (i, b) in b[start..start + row].iter().enumerate() {
+                    let mut b = b * (volume[i] * self.density);
+                    if let Some(at) = at {
+                        b = at.frame.tr_mul(&b);
+                    }
+                    for c in 0..D {
+                        let value = &mut values[c][start + i];
+                        *value = if at.is_some() { *value + b[c] } else { b[c] };
+                    }
+                }
+            }
+        }
+        bad
+    }
+}
+
+/// A row of particles along axis 0: displacements and their slopes, and then the factors of values and slopes in the forces.
+struct RowOfPlaces<'a, 'b, const D: usize> {
+    start: usize,
+    volume: &'a [f64],
+    values: &'a mut [&'b mut [f64]; D],
+    slopes: &'a mut [[&'b mut [f64]; D]; D],
+    at: Option<&'a Row<D>>,
+    coordinates: Coordinates,
+    reciprocal_radius: &'a [f64],
+    planted: Planted,
+    /// Whether any F is no deformation gradient.
+    is_bad: bool,
+}
+
+impl<const D: usize> RowOfPlaces<'_, '_, D> {
+    /// The deformation gradient of particle `i` of the row.
+    #[inline(always)]
+    fn deformation_gradient(&mut self, i: usize) -> SMatrix<f64, D, D> {
+        let place = self.start + i;
+        let mut H = SMatrix::<f64, D, D>::from_fn(|c, k| self.slopes[c][k][place]);
+        if let Some(at) = self.at {
+            let u = SVector::from_fn(|c, _| self.values[c][place]);
+            H = self.coordinates.gradient(&u, &H, self.reciprocal_radius[i], at);
+        }
+        let F = SMatrix::identity() + H;
+        self.is_bad |= !is_deformation(&F);
+        F
+    }
+
+    /// Puts the factors of the forces in place of what they follow from.
+    #[inline(always)]
+    fn set_stress(&mut self, i: usize, F: &SMatrix<f64, D, D>, P: SMatrix<f64, D, D>) {
+        let Self { planted, coordinates, reciprocal_radius, .. } = *self;
+        let place = self.start + i;
+        let mut force = planted.piola_in_forces(P, F) * -self.volume[i];
+        if let Some(at) = self.at {
+            let of_values;
+            (of_values, force) = coordinates.transposed_gradient(&force, reciprocal_radius[i], at);
+            for c in 0..D {
+                self.values[c][place] = of_values[c];
+            }
+            if planted.is(Fault::HoopStressDropped) {
+                self.values[0][place] = 0.0;
+            }
+            if planted.is(Fault::HoopShearDropped) {
+                self.values[1][place] = 0.0;
+            }
+            if planted.is(Fault::CotangentDropped) && D == 3 {
+                self.values[1][place] -= force[(2, 2)] * at.cotangent * reciprocal_radius[i];
+            }
+        }
+        for c in 0..D {
+            for k in 0..D {
+                self.slopes[c][k][place] = force[(c, k)];
+            }
+        }
+    }
+}
+
+/// A law for rows of particles.
+trait LawOfRows<const D: usize>: Sync {
+    /// Replaces the displacements of a row by its stresses.
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>);
+}
+
+impl<L: LibraryLaw<f64>, const D: usize> LawOfRows<D> for L {
+    #[inline(always)]
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        for i in 0..row.volume.len() {
+            let F = row.deformation_gradient(i);
+            row.set_stress(i, &F, self.first_piola_kirchhoff(&F));
+        }
+    }
+}
+
+/// A law that the caller brings.
+struct OwnRows<const D: usize>(Arc<dyn ConstitutiveLaw<f64, D>>);
+
+impl<const D: usize> LawOfRows<D> for OwnRows<D> {
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        let mut block = BlockOfStresses::at_rest();
+        let count = row.volume.len();
+        for first in (0..count).step_by(BLOCK) {
+            let here = BLOCK.min(count - first);
+            let mut F = [SMatrix::identity(); BLOCK];
+            for (n, F) in F[..here].iter_mut().enumerate() {
+                *F = row.deformation_gradient(first + n);
+                block.set(n, F);
+            }
+            block.evaluate(self.0.as_ref());
+            for (n, F) in F[..here].iter().enumerate() {
+                row.set_stress(first + n, F, block.stress(n));
+            }
+        }
+    }
+}
+
+/// The Cartesian vector with these components in row `row` of particles.
+fn cartesian<const D: usize>(
+    rows: &[Row<D>],
+    row: usize,
+    components: &SVector<f64, D>,
+) -> SVector<f64, D> {
+    rows.get(row).map_or(*components, |row| row.frame * components)
+}
+
+/// Whether F is a deformation gradient; false where it is not a number, too.
+#[inline(always)]
+fn is_deformation<const D: usize>(F: &SMatrix<f64, D, D>) -> bool {
+    let J = determinant(F);
+    J > 0.0 && J < f64::INFINITY
+}
+
+/// The particles along an axis.
+fn line<const D: usize>(grid: &Grid<D>, k: usize) -> Line {
+    let density = |x| grid.coordinates.density(k, x);
+    Line::new(&grid.axes[k], grid.per_cell, grid.layout, density)
+}
+
+/// Factors common to a row of particles along axis 0; empty where components are Cartesian.
+fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row<D>> {
+    let mut counts = lines.each_ref().map(|line| line.points.len());
+    counts[0] = 1;
+    let place = |index: [usize; D]| SVector::from_fn(|k, _| lines[k].points[index[k]]);
+    products(counts).filter_map(|index| grid.coordinates.row(&place(index))).collect()
+}
+
+/// What takes values to coefficients, by axis and kind of component; or the axis whose particles do not determine them.
+fn fits<const D: usize>(
+    grid: &Grid<D>,
+    bases: &[[Basis; 2]; D],
+    lines: &[Line; D],
+) -> Result<[[Fit; 2]; D], usize> {
+    let mut fits = Vec::with_capacity(D);
+    for k in 0..D {
+        let fit = |normal: usize| Fit::new(&grid.axes[k], &bases[k][normal], &lines[k].weights);
+        fits.push(<[Fit; 2]>::from(fit(0).zip(fit(1)).ok_or(k)?));
+    }
+    Ok(array::from_fn(|k| fits[k].clone()))
+}
+
+/// The sides where something is given.
+fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Face<D>> {
+    let mut faces = Vec::new();
+    for axis in 0..D {
+        for upper in [false, true] {
+            let end = grid.axes[axis].ends[usize::from(upper)];
+            if !matches!(end, End::Moved | End::Loaded) {
+                continue;
+            }
+            let moved = end == End::Moved;
+            let own = if upper { grid.axes[axis].upper } else { grid.axes[axis].lower };
+            // Coordinates and lengths; the lengths matter for tractions only.
+            let places: [Vec<[f64; 2]>; D] = array::from_fn(|k| {
+                if k == axis {
+                    return vec![[own, 1.0]];
+                }
+                let (axis, line) = (&grid.axes[k], &lines[k]);
+                let ends = axis.moved().map(|other| moved && other);
+                let particles = line.points.iter().zip(&line.lengths).map(|(x, w)| [*x, *w]);
+                let lower = ends[0].then_some([axis.lower, 0.0]);
+                lower
+                    .into_iter()
+                    .chain(particles)
+                    .chain(ends[1].then_some([axis.upper, 0.0]))
+                    .collect()
+            });
+            let count = places.iter().map(Vec::len).product();
+            let mut face = Face {
+                side: Side { axis, upper },
+                moved,
+                X: Vec::with_capacity(count),
+                frames: Vec::new(),
+                areas: Vec::new(),
+                values: vec![SVector::zeros(); count],
+            };
+            for index in products(places.each_ref().map(Vec::len)) {
+                let place = SVector::<f64, D>::from_fn(|k, _| places[k][index[k]][0]);
+                let scales = grid.coordinates.scales(&place);
+                let others = (0..D).filter(|k| *k != axis);
+                face.X.push(grid.coordinates.place(&place));
+                face.frames.extend(grid.coordinates.frame(&place));
+                face.areas.push(others.map(|k| scales[k] * places[k][index[k]][1]).product());
+            }
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+/// All index tuples below `counts`, the first index fastest.
+fn products<const D: usize>(counts: [usize; D]) -> impl Iterator<Item = [usize; D]> {
+    (0..counts.iter().product()).map(move |mut rest| {
+        counts.map(|count| {
+            let index = rest % count;
+            rest /= count;
+            index
+        })
+    })
+}
+
+/// The body at rest.
+fn particles<const D: usize>(grid: &Grid<D>, lines: &[Line; D], density: f64) -> Particles<f64, D> {
+    let count = lines.iter().map(|line| line.points.len()).product();
+    let mut X = Vec::with_capacity(count);
+    let mut volume = Vec::with_capacity(count);
+    for index in products(lines.each_ref().map(|line| line.points.len())) {
+        let place = SVector::<f64, D>::from_fn(|k, _| lines[k].points[index[k]]);
+        X.push(grid.coordinates.place(&place));
+        volume.push((0..D).map(|k| lines[k].weights[index[k]]).product());
+    }
+    Particles {
+        x: X.clone(),
+        v: vec![SVector::zeros(); count],
+        F: vec![SMatrix::identity(); count],
+        mass: volume.iter().map(|V| V * density).collect(),
+        half_size: SVector::from_fn(|k, _| grid.axes[k].spacing() / (2.0 * grid.per_cell as f64)),
+        X,
+        volume,
+    }
+}
+
+fn check<const D: usize>(
+    grid: &Grid<D>,
+    scheme: &Scheme,
+    density: f64,
+    time_step: f64,
+) -> Result<(), SetupError> {
+    let positive = |quantity: &str, value: f64| {
+        if value > 0.0 && value.is_finite() {
+            return Ok(());
+        }
+        Err(SetupError::NotPositive { quantity: quantity.into(), value })
+    };
+    positive("the time step", time_step)?;
+    positive("the density", density)?;
+    positive("the number of particles per cell", grid.per_cell as f64)?;
+    let degree = scheme.degree;
+    if !(2..=MOST_DEGREE).contains(&degree) {
+        return Err(SetupError::Degree { degree, most: MOST_DEGREE });
+    }
+    for (k, axis) in grid.axes.iter().enumerate() {
+        if axis.cells == 0 {
+            return Err(SetupError::NoCells { axis: k });
+        }
+        positive(&format!("the length of axis {k}"), axis.upper - axis.lower)?;
+        let of = |kind: End| axis.ends.map(|end| end == kind);
+        // The mirror images of splines at a wall have to be splines: those at a clamped end are not.
+        let [lower, upper] = of(End::Wall);
+        if lower != upper && axis.cells < degree {
+            return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree });
+        }
+        let [lower, upper] = of(End::Periodic);
+        if lower != upper {
+            return Err(SetupError::HalfPeriodic { axis: k });
+        }
+        if lower && axis.cells <= degree {
+            return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree + 1 });
+        }
+    }
+    grid.coordinates.check(&grid.axes.map(|axis| [axis.lower, axis.upper]))
+}
+
+/// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
+fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
+    // Saturates where no integer is large enough.
+    let bytes = (doubles(grid, degree) * size_of::<f64>() as f64) as u128;
+    let too_large = || SetupError::GridTooLarge {
+        cells: grid.axes.iter().map(|axis| axis.cells).collect(),
+        bytes,
+    };
+    let size = usize::try_from(bytes).map_err(|_| too_large())?;
+    Vec::<u8>::new().try_reserve_exact(size).map_err(|_| too_large())
+}
+
+/// How many numbers of 64 bits a run keeps, walls taken for ends with as many functions as the others have.
+fn doubles<const D: usize>(grid: &Grid<D>, degree: usize) -> f64 {
+    let curvilinear = grid.coordinates.are_curvilinear();
+    let in_vector = D as f64;
+    let in_matrix = in_vector * in_vector;
+    let in_frame = if curvilinear { in_matrix } else { 0.0 };
+    let points = grid.axes.each_ref().map(|axis| axis.cells as f64 * grid.per_cell as f64);
+    let functions = grid.axes.each_ref().map(|axis| axis.cells as f64 + degree as f64);
+    let width = degree as f64 + 1.0;
+    let count = |along: &dyn Fn(usize) -> f64| (0..D).map(along).product::<f64>();
+    // Positions, velocities, values and the body force; gradients and slopes; masses and volumes.
+    let mut doubles = count(&|k| points[k]) * (5.0 * in_vector + 2.0 * in_matrix + 2.0);
+    // Displacements, velocities, accelerations, given ones and two products of the mass matrix.
+    doubles += count(&|k| functions[k]) * (6.0 * in_vector);
+    for axis in 0..D {
+        if axis + 1 < D {
+            let partial = count(&|k| if k <= axis { points[k] } else { functions[k] });
+            doubles += partial * in_vector * (axis as f64 + 2.0);
+        }
+        // Of both kinds of components: values, slopes, the first function and the weight; three matrices.
+        doubles += 2.0 * points[axis] * (2.0 * width + 2.0) + 2.0 * functions[axis] * 3.0 * width;
+        // On sides: positions, values, an area, and the frame.
+        let given =
+            grid.axes[axis].ends.iter().filter(|end| matches!(end, End::Moved | End::Loaded));
+        let places = count(&|k| if k == axis { 1.0 } else { points[k] });
+        doubles += given.count() as f64 * places * (2.0 * in_vector + 1.0 + in_frame);
+    }
+    if curvilinear {
+        doubles += points[0] + count(&|k| if k == 0 { 1.0 } else { points[k] }) * (in_frame + 2.0);
+    }
+    doubles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers that a simulation holds, counted.
+    fn held<const D: usize>(body: &TotalLagrangian<D>) -> usize {
+        let TotalLagrangian { particles, components, b, faces, .. } = body;
+        let Particles { X, x, v, F, mass, volume, .. } = particles;
+        let of_vectors = X.len() + x.len() + v.len() + b.len();
+        let of_particles = D * of_vectors + D * D * F.len() + mass.len() + volume.len();
+        let of_component = |component: &Component<D>| -> usize {
+            let Component { u, v, a, given, values, slopes, partial, product, .. } = component;
+            let arrays = [u, v, a, given, values].into_iter().chain(slopes);
+            arrays.chain(partial.iter().flatten()).chain(product).map(Vec::len).sum()
+        };
+        let of_components: usize = components.iter().map(of_component).sum();
+        let of_sides = |face: &Face<D>| {
+            let vectors = face.X.len() + face.values.len() + D * face.frames.len();
+            D * vectors + face.areas.len()
+        };
+        let rows = body.rows.len() * (D * D + 2) + body.reciprocal_radius.len();
+        // A basis has values and slopes and the first function of each particle, a fit its weight and the matrix, and both the
+        // fit and the mass the matrix's factors.
+        let along = |basis: &Basis| {
+            basis.points * (2 * basis.width + 2) + 3 * basis.functions * basis.width
+        };
+        let along: usize = body.operators.bases.iter().flatten().map(along).sum();
+        let of_sides: usize = faces.iter().map(of_sides).sum();
+        of_particles + of_components + of_sides + rows + along
+    }
+
+    #[test]
+    fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
+        let axis = Axis { lower: 0.0, upper: 1.0, cells: 1 << 22, ends: [End::Free; 2] };
+        let mut grid = Grid {
+            axes: [axis; 2],
+            coordinates: Coordinates::Cartesian,
+            per_cell: 3,
+            layout: Layout::Lattice,
+        };
+        for cells in [1 << 22, 1 << 40] {
+            grid.axes[1].cells = cells;
+            let bytes = (8.0 * doubles(&grid, 2)) as u128;
+            // A position alone takes sixteen.
+            assert!(bytes > (16 * 9 * (cells as u128)) << 22);
+            let cells = vec![1 << 22, cells];
+            assert_eq!(reserve(&grid, 2), Err(SetupError::GridTooLarge { cells, bytes }));
+        }
+        grid.axes = [Axis { cells: 4, ..axis }; 2];
+        assert_eq!(reserve(&grid, 2), Ok(()));
+    }
+
+    #[test]
+    fn the_memory_asked_for_is_what_a_run_holds() {
+        fn check<const D: usize>(
+            coordinates: Coordinates,
+            cells: [usize; D],
+            ends: [[End; 2]; D],
+            per_cell: usize,
+            degree: usize,
+        ) {
+            let axes: [Axis; D] = array::from_fn(|k| {
+                let (lower, upper) = (0.5, 1.0 + 0.5 * k as f64);
+                Axis { lower, upper, cells: cells[k], ends: ends[k] }
+            });
+            let grid: Grid<D> = Grid { axes, coordinates, per_cell, layout: Layout::Gauss };
+            let composition = Composition::Order2;
+            let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition };
+            let expected = doubles(&grid, degree);
+            let law = Material::NeoHookean { lambda: 6.0, mu: 4.0 };
+            let mut body = TotalLagrangian::new(grid, scheme, law, 1.0, 1e-6).unwrap();
+            let still = vec![SVector::zeros(); body.positions().len()];
+            body.start(&still, &still).unwrap();
+            assert_eq!(expected, held(&body) as f64, "{coordinates:?} {cells:?}");
+        }
+        const FREE: [End; 2] = [End::Free; 2];
+        const MOVED: [End; 2] = [End::Moved; 2];
+        const LOADED: [End; 2] = [End::Loaded; 2];
+        let cartesian = Coordinates::Cartesian;
+        for degree in [2, 5] {
+            check(cartesian, [400], [FREE], degree + 1, degree);
+            check(cartesian, [50, 60], [FREE; 2], degree + 1, degree);
+            check(cartesian, [14, 12, 10], [FREE; 3], degree + 1, degree);
+            // Many coefficients between few particles, and long sides.
+            check(cartesian, [1, 300], [LOADED, FREE], degree + 1, degree);
+            check(cartesian, [300, 1], [FREE, MOVED], degree + 1, degree);
+            check(cartesian, [7], [[End::Moved, End::Loaded]], degree + 1, degree);
+            check(cartesian, [1, 1, 200], [FREE, LOADED, FREE], degree + 1, degree);
+            check(cartesian, [200, 1, 1], [FREE, FREE, LOADED], degree + 1, degree);
+            check(Coordinates::Polar, [1, 300], [LOADED, FREE], degree + 1, degree);
+            check(Coordinates::Polar, [300, 1], [FREE, LOADED], degree + 1, degree);
+            check(Coordinates::Spherical, [1, 20, 20], [LOADED, FREE, FREE], degree + 1, degree);
+        }
+    }
+}

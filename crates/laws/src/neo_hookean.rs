@@ -1,0 +1,109 @@
+//! The neo-Hookean law.
+
+use mmsmith_lanes::tensor::{det_minus_one, inverse_transpose_minus_identity, real};
+use nalgebra::{RealField, SMatrix};
+
+use super::{
+    LibraryLaw, displacement_gradient, finger_minus_identity, log_jacobian, log_jacobian_is_short,
+    log_jacobian_short, plus_diagonal,
+};
+use crate::fault::{Fault, Planted};
+
+/// The neo-Hookean law, `W = mu/2 (I1 - 3 - 2 ln J) + lambda/2 (ln J)^2`.
+#[derive(Clone, Copy)]
+pub struct NeoHookean<T> {
+    /// The first Lame constant.
+    pub lambda: T,
+    /// The shear modulus.
+    pub mu: T,
+    /// The fault planted in it, for tests.
+    pub planted: Planted,
+}
+
+impl<T: RealField + Copy> NeoHookean<T> {
+    /// `lambda ln J`.
+    #[inline(always)]
+    fn pressure<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        if self.planted.is(Fault::LinearLogarithm) {
+            return self.lambda * det_minus_one(&displacement_gradient(F));
+        }
+        self.lambda * log_jacobian(F)
+    }
+
+    /// First Piola-Kirchhoff stress, from `lambda ln J`.
+    #[inline(always)]
+    fn first_piola_kirchhoff_at<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+        pressure: T,
+    ) -> SMatrix<T, D, D> {
+        let H = displacement_gradient(F);
+        let K = inverse_transpose_minus_identity(F);
+        let P = plus_diagonal((H - K) * self.mu + K * pressure, pressure);
+        if self.planted.is(Fault::TransposedLaw) { P.transpose() } else { P }
+    }
+}
+
+impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
+    const HAS_SHORT: bool = true;
+
+    #[inline(always)]
+    fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        plus_diagonal(finger_minus_identity(F) * self.mu, self.pressure(F))
+    }
+
+    #[inline(always)]
+    fn is_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> bool {
+        !self.planted.is(Fault::LinearLogarithm) && log_jacobian_is_short(F)
+    }
+
+    #[inline(always)]
+    fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        plus_diagonal(finger_minus_identity(F) * self.mu, self.lambda * log_jacobian_short(F))
+    }
+
+    #[inline(always)]
+    fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        self.first_piola_kirchhoff_at(F, self.pressure(F))
+    }
+
+    #[inline(always)]
+    fn first_piola_kirchhoff_short<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+    ) -> SMatrix<T, D, D> {
+        self.first_piola_kirchhoff_at(F, self.lambda * log_jacobian_short(F))
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        let log_J = log_jacobian(F);
+        let trace = finger_minus_identity(F).trace();
+        let (half, two) = (real::<T>(0.5), real::<T>(2.0));
+        self.lambda * log_J * log_J * half + self.mu * half * (trace - two * log_J)
+    }
+}
+
+/// The neo-Hookean law with lambda = 0.
+#[derive(Clone, Copy)]
+pub struct NeoHookeanNoLog<T> {
+    /// The shear modulus.
+    pub mu: T,
+}
+
+impl<T: RealField + Copy> LibraryLaw<T> for NeoHookeanNoLog<T> {
+    #[inline(always)]
+    fn kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        finger_minus_identity(F) * self.mu
+    }
+
+    #[inline(always)]
+    fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
+        let H = displacement_gradient(F);
+        (H - inverse_transpose_minus_identity(F)) * self.mu
+    }
+
+    fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {
+        let trace = finger_minus_identity(F).trace();
+        self.mu * real(0.5) * (trace - real::<T>(2.0) * log_jacobian(F))
+    }
+}
