@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy
 
 from mmsmith import _mmsmith
+from mmsmith._factors import fitted
 from mmsmith._handed import rows
 from mmsmith._orders import Orders, orders
 from mmsmith._search import Search, Solver, order_of, size_of
@@ -157,23 +158,26 @@ def diagnose(
     made, errors = _bounded(search, made, errors, notes)
     right = made.right
     singles = made.single()
-    causes = [one for one in singles if made.restores(one)]
+    causes = [one for one in singles if made.explains(one, errors)]
     if not causes and made.share == 1 and any(order_of(errors, field) < -0.3 for field in expected):
         # It may grow without bound, only slowly.
         shorter, of_shorter = search(right, 1 / 8)
         of_less_time = shorter.single() if all(numpy.isfinite(size_of(error)) for error in of_shorter.values()) else []
-        if any(shorter.restores(one) for one in of_less_time):
-            made, singles = shorter, of_less_time
-            causes = [one for one in singles if made.restores(one)]
+        if any(shorter.explains(one, of_shorter) for one in of_less_time):
+            made, singles, errors = shorter, of_less_time, of_shorter
+            causes = [one for one in singles if made.explains(one, errors)]
             notes.append("the error grows with the grid; mistakes were looked for in an eighth of the time")
+    sizes = {count: size_of(error) for count, error in errors.items()}
     unused = [] if causes else made.unused()
-    if not causes and not unused and singles:
-        causes = [pair for pair in made.pairs(singles) if made.restores(pair)]
+    factors = [] if causes or unused else fitted(made, sizes)
+    if not causes and not unused and not factors and singles:
+        causes = [pair for pair in made.pairs(singles) if made.explains(pair, errors)]
         if causes:
             notes.append("no single mistake of the list explains it; two at once do")
     first = next(iter(expected))
     told = [_cause(made, one, first) for one in causes]
     told = [Cause(name, None, made.rows[name].text) for name in unused] + told
+    told += [Cause(one.name, one.order, one.text, one.errors) for one in factors]
     if not told:
         notes.append("no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mmsmith.causes())")
     tied = [one.name for one in told[1:] if one.errors and abs(size_of(one.errors) / size_of(told[0].errors or {first: numpy.inf}) - 1) < _ALIKE]

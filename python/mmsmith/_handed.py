@@ -138,6 +138,7 @@ def counter(row: Row, right: Solution, dt: float, h: float) -> Callable[[Asked, 
             "boundary": kind == "u" and late_u,
             "boundary-velocity": kind == "v" and late,
             "initial-velocity": kind == "v" and not late,
+            "everything": True,
         }[row.of]
 
     def timed(ask: Asked, letter: str, X: Array, t: float) -> Array:
@@ -155,6 +156,15 @@ def counter(row: Row, right: Solution, dt: float, h: float) -> Callable[[Asked, 
         back = dt if row.of == "boundary" and dt > 0 else 0.0
         return ask(letter, _reference(right, X, t - back), t)
 
+    def moved(ask: Asked, letter: str, X: Array, t: float) -> Array:
+        late = t > 0.75 * dt or 0.0 < t < 1e-300 or (not dt > 0 and t > 0.0)
+        if letter != ("v" if row.of == "velocity" else "u") or not late:
+            return ask(letter, X, t)
+        u = ask("u", X, t)
+        if row.of == "exchanged":
+            return numpy.concatenate([u[..., 1::-1], u[..., 2:]], axis=-1)
+        return u * {"sign": -1.0, "halved": 2.0, "doubled": 0.5, "velocity": 1.0}[row.of]
+
     def beside(ask: Asked, letter: str, X: Array, t: float) -> Array:
         return ask(letter, X + row.steps * h if letter == "b" else X, t)
 
@@ -165,4 +175,4 @@ def counter(row: Row, right: Solution, dt: float, h: float) -> Callable[[Asked, 
         # A staggered scheme has no velocity at t = 0, but half a step before it.
         return values + ask("v", X, 0.0 if row.steps < 1 else t - dt / 2) / (row.steps * dt)
 
-    return {"time": timed, "place": placed, "cell": beside, "impulse": pushed}.get(row.kind)
+    return {"time": timed, "place": placed, "motion": moved, "cell": beside, "impulse": pushed}.get(row.kind)

@@ -320,6 +320,7 @@ fn causes() -> Vec<(&'static str, &'static str, &'static str, &'static str, &'st
         Counter::Fields(_) => ("fields", "", 0.0),
         Counter::Time { of, steps } => ("time", of.word(), steps),
         Counter::Place(placed) => ("place", placed.word(), 0.0),
+        Counter::Motion(moved) => ("motion", moved.word(), 0.0),
         Counter::Cell { cells } => ("cell", "force", cells),
         Counter::Impulse { steps } => ("impulse", "force", steps),
         Counter::Unused(unused) => ("unused", unused.word(), 0.0),

@@ -54,6 +54,19 @@ def test_two_mistakes_at_once_are_told():
     assert set(diagnosis.causes[0].name.split(" and ")) == {"stress-transposed", "force-sign"}
 
 
+@pytest.mark.parametrize("mistake", ["mu too large by a half", "time passed by"])
+def test_a_size_that_is_in_no_list_is_fitted(mistake):
+    diagnosis = mmsmith.diagnose(planted(mistake), "skew-2d", cells=(6, 12), seconds=300)
+    assert diagnosis.causes[0].name == plane.MISTAKES[mistake]
+    assert mistake != "mu too large by a half" or "1.5 times" in diagnosis.causes[0].text
+
+
+def test_what_vanishes_with_the_cells_explains_no_error_that_stays():
+    diagnosis = mmsmith.diagnose(planted("a pressure of its own"), "skew-2d", cells=(8, 16))
+    assert not diagnosis.passed
+    assert diagnosis.causes == ()
+
+
 def test_what_cannot_be_seen_is_not_tried_and_said():
     diagnosis = mmsmith.diagnose(planted("b subtracted"), "skew-2d", cells=(6, 12))
     assert diagnosis.not_tried["law-neo-hookean"].startswith("blind")

@@ -24,7 +24,7 @@ mod target;
 mod targets;
 mod text;
 
-pub use cause::{CAUSES, Cause, Counter, Placed, Steps, Timed, Unused};
+pub use cause::{CAUSES, Cause, Counter, Moved, Placed, Steps, Timed, Unused};
 pub use code::{Code, Origin};
 pub use fault::{Fault, NoEffect, UnknownFault};
 pub use names::Names;

@@ -51,6 +51,16 @@ MISTAKES = {
     "boundary early": "boundary-step-ahead",
     "boundary held": "boundary-unused",
     "boundary at x": "boundary-at-current-position",
+    "du/dx for du/dX": "law-of-spatial-gradient",
+    "symmetric part of F": "law-of-symmetric-part",
+    "mu too large by a half": "mu-factor",
+    "K - mu for lambda": "bulk-modulus-without-two-thirds",
+    "b at 2 t": "force-at-twice-the-time",
+    "gravity added": "force-with-gravity",
+    "components of the boundary exchanged": "boundary-components-exchanged",
+    "v for u on the boundary": "boundary-velocity-for-displacement",
+    "a step too few": "result-step-behind",
+    "time passed by": "result-time",
     "traction forgotten": "traction-unused",
     "traction subtracted": "traction-sign",
     "traction whole at both nodes": "traction-doubled",
@@ -60,6 +70,10 @@ MISTAKES = {
 
 
 def first_piola_kirchhoff(F, lam, mu, mistake):
+    if mistake == "du/dx for du/dX":
+        F = 2 * np.eye(2) - np.linalg.inv(F)
+    if mistake == "symmetric part of F":
+        F = (F + np.swapaxes(F, -1, -2)) / 2
     J = np.linalg.det(F)[..., None, None]
     inverse = np.linalg.inv(F)
     f = inverse if mistake == "F^-1 for F^-T" else np.swapaxes(inverse, -1, -2)
@@ -84,6 +98,9 @@ def first_piola_kirchhoff(F, lam, mu, mistake):
         P = J * P
     if mistake == "dN/dx with P":
         P = P @ f
+    if mistake == "a pressure of its own":
+        # In no list: no cause may be named.
+        P = P + 0.02 * lam * (J - 1) * np.eye(2)
     if mistake == "shear doubled":
         P = P * np.array([[1, 2], [2, 1]])
     return P
@@ -112,6 +129,10 @@ def solve(solution, cells, mistake="", periods=0.4):
         lam, mu = E, nu
     if mistake == "K for lambda":
         lam = E / (3 * (1 - 2 * nu))
+    if mistake == "mu too large by a half":
+        mu = 1.5 * mu
+    if mistake == "K - mu for lambda":
+        lam = E / (3 * (1 - 2 * nu)) - mu
     if mistake == "mu without 1/2":
         mu = E / (1 + nu)
     mass = np.zeros(len(X))
@@ -124,6 +145,10 @@ def solve(solution, cells, mistake="", periods=0.4):
     period = solution.period
     steps = int(np.ceil(periods * period * speed / (0.3 * h)))
     dt = periods * period / steps
+    end = steps * dt
+    if mistake == "time passed by":
+        # Of the length that stability allows, so that the last step ends beyond the end.
+        dt = 0.3 * h / speed
 
     def load(u, t):
         force = np.zeros_like(X)
@@ -146,10 +171,12 @@ def solve(solution, cells, mistake="", periods=0.4):
         return -force if mistake == "traction subtracted" else force
 
     def body_force(u, t):
-        at = {"b at t + dt": t + dt, "b at t - dt": t - dt, "b at t + dt/2": t + dt / 2, "b of the start": 0.0}.get(mistake, t)
+        at = {"b at t + dt": t + dt, "b at t - dt": t - dt, "b at t + dt/2": t + dt / 2, "b of the start": 0.0, "b at 2 t": 2 * t}.get(mistake, t)
         place = {"b at x": X + u, "b at centres": X + h / 2, "b of X and Y exchanged": X[:, ::-1]}.get(mistake, X)
         b = solution.b(place, at)
         b = {"b subtracted": -b, "rho0 b for b": rho * b, "rho0^2 b for b": rho**2 * b, "b/rho0 for b": b / rho, "components of b exchanged": b[:, ::-1]}.get(mistake, b)
+        if mistake == "gravity added":
+            b = b - [0, 9.81]
         return b * [1, 0] if mistake == "b_Y forgotten" else b
 
     def acceleration(u, t):
@@ -164,13 +191,17 @@ def solve(solution, cells, mistake="", periods=0.4):
         v = np.zeros_like(X)
     if mistake == "starts undeformed":
         u = np.where(held[:, None], u, 0.0)
-    for step in range(steps):
+    for step in range(steps - 1 if mistake == "a step too few" else steps):
         t = step * dt
         v = v + dt * acceleration(u, t)
         place = X[held] + u[held] if mistake == "boundary at x" else X[held]
         u = u + dt * v
         if mistake == "boundary held":
             u[held] = solution.u(X[held], 0.0)
+        elif mistake == "v for u on the boundary":
+            u[held] = solution.v(X[held], t + dt)
+        elif mistake == "components of the boundary exchanged":
+            u[held] = solution.u(X[held], t + dt)[:, ::-1]
         else:
             u[held] = solution.u(place, t + {"boundary late": 0.0, "boundary early": 2 * dt}.get(mistake, dt))
-    return {"X": X, "t": steps * dt, "u": u}
+    return {"X": X, "t": end, "u": u}

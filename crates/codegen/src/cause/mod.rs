@@ -41,6 +41,8 @@ pub enum Counter {
     },
     /// A field at the reference position that the exact motion takes to the point asked for.
     Place(Placed),
+    /// Another motion where it is prescribed, after the start.
+    Motion(Moved),
     /// A field so many cells away along every axis.
     Cell {
         /// How far.
@@ -70,6 +72,23 @@ pub enum Timed {
     BoundaryVelocity,
     /// The velocity at the start.
     InitialVelocity,
+    /// All of them: the result then belongs to another time than it says.
+    Everything,
+}
+
+/// What a solver may take for the motion after the start where this is prescribed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// The displacement with the wrong sign.
+    Sign,
+    /// Half of the displacement.
+    Halved,
+    /// Twice the displacement.
+    Doubled,
+    /// The displacement with its first two components exchanged.
+    Exchanged,
+    /// The velocity as a displacement.
+    Velocity,
 }
 
 /// A field that a solver may ask for at current positions.
@@ -125,6 +144,14 @@ words!(Timed {
     Boundary => "boundary",
     BoundaryVelocity => "boundary-velocity",
     InitialVelocity => "initial-velocity",
+    Everything => "everything",
+});
+words!(Moved {
+    Sign => "sign",
+    Halved => "halved",
+    Doubled => "doubled",
+    Exchanged => "exchanged",
+    Velocity => "velocity",
 });
 words!(Placed {
     Force => "force",
@@ -220,6 +247,7 @@ impl Cause {
                 timing::shift(fields, of, by * steps.dt, steps.start)
             }
             Counter::Place(placed) => timing::seek(fields, placed),
+            Counter::Motion(moved) => timing::moves(fields, moved, steps.start),
             Counter::Impulse { steps: length } => timing::push(fields, length, steps),
             Counter::Cell { cells } => timing::beside(fields, cells * steps.h),
             Counter::Unused(unused) => timing::nudge(fields, unused, steps.start),

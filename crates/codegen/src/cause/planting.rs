@@ -78,6 +78,25 @@ impl<'a> Planting<'a> {
         }
     }
 
+    /// `b` at so many times the time.
+    pub(super) fn scale_time_of_force(&mut self, numerator: i64, denominator: i64) {
+        let Fields { graph, b, .. } = &mut *self.fields;
+        let t = graph.symbol("t");
+        let number = graph.number(Rational::new(numerator.into(), denominator.into()));
+        let other = graph.mul(number, t);
+        let times = BTreeMap::from([(t, other)]);
+        b.iter_mut().for_each(|b| *b = graph.replace(*b, &times));
+    }
+
+    /// The last component of `b` with a number added.
+    pub(super) fn add_to_force(&mut self, numerator: i64, denominator: i64) {
+        let Fields { graph, b, .. } = &mut *self.fields;
+        let number = graph.number(Rational::new(numerator.into(), denominator.into()));
+        if let Some(last) = b.last_mut() {
+            *last = graph.add(*last, number);
+        }
+    }
+
     fn place_force(&mut self, place: &BTreeMap<Expr, Expr>) {
         let Fields { graph, definitions, b, .. } = &mut *self.fields;
         // First what other symbols mean, as the radius, so that it moves with the coordinates.
@@ -95,6 +114,11 @@ impl<'a> Planting<'a> {
         v.iter_mut().for_each(|v| *v = graph.mul(number, *v));
     }
 
+    /// The first two components of `v` exchanged.
+    pub(super) fn exchange_velocity(&mut self) {
+        swap_first_two(&mut self.fields.v);
+    }
+
     /// `b`, `P` and tractions of another stress at the same deformation.
     pub(super) fn stress(&mut self, of: impl Fn(&mut Deformed<'_>) -> Matrix) {
         let Fields { graph, H, F, J, P, .. } = &mut *self.fields;
@@ -107,6 +131,20 @@ impl<'a> Planting<'a> {
     pub(super) fn law(&mut self, of: impl Fn(&mut Deformed<'_>, Expr, Expr) -> Matrix) {
         if let Some([lambda, mu]) = lame(self.spec) {
             self.stress(|deformed| of(deformed, lambda, mu));
+        }
+    }
+
+    /// As [`Planting::stress`], by the neo-Hookean law of another deformation gradient; nothing where the law is another one.
+    pub(super) fn neo_hookean_of(&mut self, other: impl Fn(&mut Deformed<'_>) -> Matrix) {
+        if self.spec.material.name() == "neo-hookean" {
+            self.law(|deformed, lambda, mu| {
+                deformed.F = other(deformed);
+                deformed.J = deformed.determinant();
+                let f = deformed.inverse_transposed();
+                let log = deformed.log_J();
+                let pressure = deformed.product(&[lambda, log]);
+                deformed.neo_hookean(mu, pressure, &f)
+            });
         }
     }
 
@@ -191,6 +229,20 @@ impl<'a> Planting<'a> {
         }
     }
 
+    /// All tractions times a power of the density.
+    pub(super) fn scale_tractions_by_density(&mut self, power: i64) {
+        let density = self.factor([1, 1, power]);
+        let Fields { graph, surfaces, .. } = &mut *self.fields;
+        for entry in surfaces.iter_mut().flat_map(|surface| &mut surface.traction) {
+            *entry = graph.mul(density, *entry);
+        }
+    }
+
+    /// The first two components of all tractions exchanged.
+    pub(super) fn exchange_tractions(&mut self) {
+        self.fields.surfaces.iter_mut().for_each(|surface| swap_first_two(&mut surface.traction));
+    }
+
     /// All tractions times a power of the current area over the reference area, `J |F^-T N|`.
     pub(super) fn by_area(&mut self, power: i64) {
         let surfaces: Vec<Surface> = self.fields.surfaces.iter().map(|own| own.surface).collect();
@@ -272,6 +324,26 @@ impl Deformed<'_> {
     pub(super) fn shear_scaled(&mut self, A: &Matrix, numerator: i64, denominator: i64) -> Matrix {
         let number = self.number(numerator, denominator);
         self.filled(|graph, i, j| if i == j { A[i][j] } else { graph.mul(number, A[i][j]) })
+    }
+
+    /// The determinant of `F`, whichever this is now.
+    fn determinant(&mut self) -> Expr {
+        let F = self.F.clone();
+        let mut minor = |[i, j]: [usize; 2], [k, l]: [usize; 2]| {
+            let down = self.graph.mul(F[i][k], F[j][l]);
+            let up = self.graph.mul(F[i][l], F[j][k]);
+            self.graph.sub(down, up)
+        };
+        match F.len() {
+            1 => F[0][0],
+            2 => minor([0, 1], [0, 1]),
+            _ => {
+                let minors = [minor([1, 2], [1, 2]), minor([1, 2], [2, 0]), minor([1, 2], [0, 1])];
+                let terms: Vec<Expr> =
+                    F[0].iter().zip(minors).map(|(&F, minor)| self.graph.mul(F, minor)).collect();
+                self.graph.sum_of(terms)
+            }
+        }
     }
 
     /// `F^-1`, by cofactors.

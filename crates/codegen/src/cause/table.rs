@@ -1,7 +1,7 @@
 //! The table of mistakes, a row each.
 
 use super::planting::Planting;
-use super::{Cause, Counter, Placed, Timed, Unused};
+use super::{Cause, Counter, Moved, Placed, Timed, Unused};
 use mmsmith_expr::{Expr, Graph, Rational};
 
 macro_rules! causes {
@@ -83,6 +83,15 @@ causes! {
     "force-Y-sign": "the second component of the body force has the wrong sign",
         "the line that adds b_Y; gravity is often written with the sign of its direction",
         fields(|p| p.turn_force(1));
+    "force-at-twice-the-time": "the body force is evaluated at twice the time",
+        "the time in the call of b: t in the unit of the solution, incremented once in each step",
+        fields(|p| p.scale_time_of_force(1, 2));
+    "force-at-half-the-time": "the body force is evaluated at half the time",
+        "the time in the call of b: t in the unit of the solution, incremented by the whole time step",
+        fields(|p| p.scale_time_of_force(2, 1));
+    "force-with-gravity": "gravity, 9.81 against the last axis, is added to the body force",
+        "gravity that was left on: b is the whole body force",
+        fields(|p| p.add_to_force(981, 100));
     "force-half-a-cell-off": "the body force is evaluated half a cell too far along every axis",
         "the points in the call of b: nodes for nodal forces, quadrature points for integrals; centres of cells lie half a cell beside nodes",
         Counter::Cell { cells: -0.5 };
@@ -98,6 +107,59 @@ causes! {
     "force-frozen": "the body force is evaluated at the start alone",
         "whether b is evaluated anew in each time step, with the time of that step",
         Counter::Unused(Unused::ForceLater);
+
+    // Tractions.
+    "traction-sign": "tractions have the wrong sign",
+        "the line that adds tractions: P N with the outward normal N is added to the internal force",
+        fields(|p| p.scale_tractions(-1, 1));
+    "traction-halved": "tractions have half their size",
+        "the weights of the integral over the surface: the length of an edge, the share of each of its nodes",
+        fields(|p| p.scale_tractions(2, 1));
+    "traction-doubled": "tractions have twice their size",
+        "the weights of the integral over the surface: the length of an edge, half of it for each of its two nodes",
+        fields(|p| p.scale_tractions(1, 2));
+    "traction-quartered": "tractions have a quarter of their size",
+        "the weights of the integral over the surface: the length of an edge, the share of each of its nodes",
+        fields(|p| p.scale_tractions(4, 1));
+    "traction-fourfold": "tractions have four times their size",
+        "the weights of the integral over the surface: the length of an edge, half of it for each of its two nodes",
+        fields(|p| p.scale_tractions(1, 4));
+    "traction-times-density": "tractions are multiplied by the density",
+        "the line that adds tractions: they are forces per area, and only b is multiplied by the density",
+        fields(|p| p.scale_tractions_by_density(-1));
+    "traction-over-density": "tractions are divided by the density once too often",
+        "the line that adds tractions: they are forces per area, and are divided by the mass with all forces",
+        fields(|p| p.scale_tractions_by_density(1));
+    "traction-components-exchanged": "the first two components of tractions are exchanged",
+        "the degrees of freedom that tractions are added to",
+        fields(|p| p.exchange_tractions());
+    "traction-per-current-area": "tractions are integrated over the current area",
+        "the integral over the surface: tractions are forces per reference area",
+        fields(|p| p.by_area(-1));
+    "traction-divided-by-area-ratio": "tractions are divided by the ratio of current and reference area",
+        "the integral over the surface: tractions are forces per reference area already",
+        fields(|p| p.by_area(1));
+    "traction-step-ahead": "tractions are those of t + dt, one time step ahead",
+        "the time in the call of tractions: that of the displacements, t_n",
+        time(Timed::Traction, -1.0);
+    "traction-step-behind": "tractions are those of t - dt, one time step behind",
+        "the time in the call of tractions: that of the displacements, t_n",
+        time(Timed::Traction, 1.0);
+    "traction-half-step-ahead": "tractions are those of t + dt/2, half a time step ahead",
+        "the time in the call of tractions: that of the displacements, t_n",
+        time(Timed::Traction, -0.5);
+    "traction-half-step-behind": "tractions are those of t - dt/2, half a time step behind",
+        "the time in the call of tractions: that of the displacements, t_n",
+        time(Timed::Traction, 0.5);
+    "traction-at-current-position": "tractions are evaluated at current positions",
+        "the call of tractions: it takes reference positions X",
+        Counter::Place(Placed::Traction);
+    "traction-unused": "tractions have no effect on the result",
+        "the surfaces whose condition is prescribed-traction: the traction P N is added to their nodal forces",
+        Counter::Unused(Unused::Traction);
+    "traction-frozen": "tractions are evaluated at the start alone",
+        "whether tractions are evaluated anew in each time step, with the time of that step",
+        Counter::Unused(Unused::TractionLater);
 
     // The stress.
     "stress-transposed": "the stress is transposed",
@@ -171,6 +233,12 @@ causes! {
     "p-wave-modulus-for-lambda": "lambda + 2 mu is taken for lambda",
         "lambda, the bulk modulus and the modulus of P-waves, lambda + 2 mu, are three constants",
         fields(|p| p.constants(|g, lambda, mu| (g.sum_of([lambda, mu, mu]), mu)));
+    "bulk-modulus-without-two-thirds": "lambda is taken as K - mu, the relation of the plane",
+        "lambda = K - 2 mu/3, also in plane strain",
+        fields(|p| p.constants(|g, lambda, mu| { let third = { let two_thirds = two_thirds(g, mu); g.sub(mu, two_thirds) }; (g.sub(lambda, third), mu) }));
+    "plane-bulk-modulus-for-lambda": "the bulk modulus of the plane, lambda + mu, is taken for lambda",
+        "lambda, the bulk modulus and lambda + mu are three constants",
+        fields(|p| p.constants(|g, lambda, mu| (g.add(lambda, mu), mu)));
     "E-and-nu-for-lambda-and-mu": "E and nu are taken for lambda and mu",
         "the arguments of the law: lambda = E nu/((1 + nu)(1 - 2 nu)), mu = E/(2 (1 + nu))",
         fields(|p| p.constants(young));
@@ -233,6 +301,18 @@ causes! {
     "strain-without-square": "Green's strain lacks its part of second order",
         "E = (H + H^T + H^T H)/2",
         fields(|p| p.law(|d, lambda, mu| { let strain = d.small_strain(); let S = d.hooke(lambda, mu, &strain); let F = d.F.clone(); d.times(&F, &S) }));
+    "law-of-spatial-gradient": "the law is given F = I + du/dx, with the gradient in the current configuration",
+        "the gradient in F: F = I + du/dX; of dN/dx comes F^-1 = I - du/dx",
+        fields(|p| p.neo_hookean_of(|d| { let identity = d.identity(); let f = d.inverse(); let change = d.minus(&identity, &f); d.plus(&identity, &change) }));
+    "law-of-inverse": "the law is given F^-1 for F",
+        "F = dx/dX = I + du/dX, not dX/dx",
+        fields(|p| p.neo_hookean_of(|d| d.inverse()));
+    "law-of-symmetric-part": "the law is given the symmetric part of F",
+        "F = I + du/dX: its part without symmetry, the rotation, belongs to it",
+        fields(|p| p.neo_hookean_of(|d| { let strain = d.small_strain(); let identity = d.identity(); d.plus(&identity, &strain) }));
+    "strain-sign": "the displacement gradient has the wrong sign",
+        "F = I + du/dX, x = X + u, and the sign of the gradients of the shape functions",
+        fields(|p| p.gradient(-1, 1));
     "strain-doubled": "the displacement gradient has twice its size",
         "the gradients of the shape functions: the derivative of the reference element's coordinate is 2/h on [-1, 1] and 1/h on [0, 1]",
         fields(|p| p.gradient(2, 1));
@@ -325,6 +405,21 @@ causes! {
     "boundary-velocity-half-step-ahead": "boundary velocities are those of t + dt/2, half a time step ahead",
         "the time in the call of v on the boundary: v at t + dt/2, not at t + dt, moves displacements from t to t + dt",
         time(Timed::BoundaryVelocity, -0.5);
+    "boundary-sign": "boundary values have the wrong sign",
+        "the line that sets displacements on the boundary",
+        Counter::Motion(Moved::Sign);
+    "boundary-halved": "boundary values have half their size",
+        "the line that sets displacements on the boundary",
+        Counter::Motion(Moved::Halved);
+    "boundary-doubled": "boundary values have twice their size",
+        "the line that sets displacements on the boundary: an increment that is added twice",
+        Counter::Motion(Moved::Doubled);
+    "boundary-components-exchanged": "the first two components of boundary values are exchanged",
+        "the degrees of freedom of the boundary: those of x and y",
+        Counter::Motion(Moved::Exchanged);
+    "boundary-velocity-for-displacement": "displacements on the boundary are set to the velocity",
+        "the call on the boundary: u(X, t) for displacements, v(X, t) for velocities",
+        Counter::Motion(Moved::Velocity);
     "boundary-at-current-position": "boundary values are evaluated at current positions",
         "the call of u on the boundary: it takes reference positions X",
         Counter::Place(Placed::Boundary);
@@ -367,43 +462,23 @@ causes! {
         "the first displacement: u(X, 0) at every point, not zero",
         Counter::Unused(Unused::InitialDisplacement);
 
-    // Tractions.
-    "traction-sign": "tractions have the wrong sign",
-        "the line that adds tractions: P N with the outward normal N is added to the internal force",
-        fields(|p| p.scale_tractions(-1, 1));
-    "traction-halved": "tractions have half their size",
-        "the weights of the integral over the surface: the length of an edge, the share of each of its nodes",
-        fields(|p| p.scale_tractions(2, 1));
-    "traction-doubled": "tractions have twice their size",
-        "the weights of the integral over the surface: the length of an edge, half of it for each of its two nodes",
-        fields(|p| p.scale_tractions(1, 2));
-    "traction-per-current-area": "tractions are integrated over the current area",
-        "the integral over the surface: tractions are forces per reference area",
-        fields(|p| p.by_area(-1));
-    "traction-divided-by-area-ratio": "tractions are divided by the ratio of current and reference area",
-        "the integral over the surface: tractions are forces per reference area already",
-        fields(|p| p.by_area(1));
-    "traction-step-ahead": "tractions are those of t + dt, one time step ahead",
-        "the time in the call of tractions: that of the displacements, t_n",
-        time(Timed::Traction, -1.0);
-    "traction-step-behind": "tractions are those of t - dt, one time step behind",
-        "the time in the call of tractions: that of the displacements, t_n",
-        time(Timed::Traction, 1.0);
-    "traction-half-step-ahead": "tractions are those of t + dt/2, half a time step ahead",
-        "the time in the call of tractions: that of the displacements, t_n",
-        time(Timed::Traction, -0.5);
-    "traction-half-step-behind": "tractions are those of t - dt/2, half a time step behind",
-        "the time in the call of tractions: that of the displacements, t_n",
-        time(Timed::Traction, 0.5);
-    "traction-at-current-position": "tractions are evaluated at current positions",
-        "the call of tractions: it takes reference positions X",
-        Counter::Place(Placed::Traction);
-    "traction-unused": "tractions have no effect on the result",
-        "the surfaces whose condition is prescribed-traction: the traction P N is added to their nodal forces",
-        Counter::Unused(Unused::Traction);
-    "traction-frozen": "tractions are evaluated at the start alone",
-        "whether tractions are evaluated anew in each time step, with the time of that step",
-        Counter::Unused(Unused::TractionLater);
+    "initial-velocity-components-exchanged": "the first two components of the first velocity are exchanged",
+        "the order of components in the line that sets the first velocity",
+        fields(|p| p.exchange_velocity());
+
+    // The result.
+    "result-step-behind": "the result is that of t - dt, one time step behind the time that is told with it",
+        "the time that is written with the result: that of the displacements; see where the time is incremented, and how many steps there are",
+        time(Timed::Everything, 1.0);
+    "result-step-ahead": "the result is that of t + dt, one time step ahead of the time that is told with it",
+        "the time that is written with the result: that of the displacements; see where the time is incremented, and how many steps there are",
+        time(Timed::Everything, -1.0);
+    "result-half-step-behind": "the result is that of t - dt/2, half a time step behind the time that is told with it",
+        "the time that is written with the result: that of the displacements, not of the velocities between",
+        time(Timed::Everything, 0.5);
+    "result-half-step-ahead": "the result is that of t + dt/2, half a time step ahead of the time that is told with it",
+        "the time that is written with the result: that of the displacements, not of the velocities between",
+        time(Timed::Everything, -0.5);
 }
 
 fn two_thirds(graph: &mut Graph, mu: Expr) -> Expr {

@@ -1,6 +1,7 @@
 //! Fields at other times and places.
 
-use super::{Placed, Steps, Timed, Unused};
+use super::{Moved, Placed, Steps, Timed, Unused};
+use crate::fault::swap_first_two;
 use mmsmith_expr::{Expr, Function, Graph, Rational};
 use mmsmith_spec::Fields;
 use std::collections::BTreeMap;
@@ -42,7 +43,7 @@ pub(super) fn shift(fields: &mut Fields, of: Timed, by: f64, start: f64) {
     let t = graph.symbol("t");
     let by = number(graph, by);
     let by = match of {
-        Timed::Force | Timed::Inertia | Timed::Traction => by,
+        Timed::Force | Timed::Inertia | Timed::Traction | Timed::Everything => by,
         Timed::Boundary | Timed::BoundaryVelocity => {
             let later = later(graph, start);
             graph.mul(by, later)
@@ -63,6 +64,13 @@ pub(super) fn shift(fields: &mut Fields, of: Timed, by: f64, start: f64) {
             fields.surfaces.iter_mut().for_each(|surface| move_all(&mut surface.traction));
         }
         Timed::Boundary => move_all(&mut fields.u),
+        Timed::Everything => {
+            let Fields { u, v, a, b, J, H, F, P, surfaces, .. } = fields;
+            [u, v, a, b].into_iter().for_each(|vector| move_all(vector));
+            [H, F, P].into_iter().flatten().for_each(|row| move_all(row));
+            move_all(std::slice::from_mut(J));
+            surfaces.iter_mut().for_each(|surface| move_all(&mut surface.traction));
+        }
         Timed::BoundaryVelocity | Timed::InitialVelocity => move_all(&mut fields.v),
         Timed::Inertia => {
             let mut moved = fields.a.clone();
@@ -72,6 +80,35 @@ pub(super) fn shift(fields: &mut Fields, of: Timed, by: f64, start: f64) {
                 *b = graph.add(*b, difference);
             }
         }
+    }
+}
+
+/// Another motion after the start.
+pub(super) fn moves(fields: &mut Fields, moved: Moved, start: f64) {
+    let Fields { graph, u, v, .. } = fields;
+    let later = later(graph, start);
+    let mut others = match moved {
+        Moved::Velocity => u.clone(),
+        Moved::Exchanged => {
+            let mut exchanged = u.clone();
+            swap_first_two(&mut exchanged);
+            exchanged
+        }
+        Moved::Sign | Moved::Halved | Moved::Doubled => {
+            let factor = match moved {
+                Moved::Sign => Rational::from_integer((-1).into()),
+                Moved::Halved => Rational::from_integer(2.into()),
+                _ => Rational::new(1.into(), 2.into()),
+            };
+            let factor = graph.number(factor);
+            u.iter().map(|&u| graph.mul(factor, u)).collect()
+        }
+    };
+    let changed = if moved == Moved::Velocity { v } else { u };
+    for (own, other) in changed.iter_mut().zip(&mut others) {
+        let difference = graph.sub(*other, *own);
+        let change = graph.mul(later, difference);
+        *own = graph.add(*own, change);
     }
 }
 
@@ -173,7 +210,12 @@ pub(super) fn nudge(fields: &mut Fields, unused: Unused, start: f64) {
         Unused::Traction | Unused::TractionLater => {
             fields.surfaces.iter_mut().for_each(|surface| scale(&mut surface.traction));
         }
-        Unused::Boundary | Unused::InitialDisplacement => scale(&mut fields.u),
+        // A solver that is given velocities on its boundary does not ask for u there.
+        Unused::Boundary => {
+            scale(&mut fields.u);
+            scale(&mut fields.v);
+        }
+        Unused::InitialDisplacement => scale(&mut fields.u),
         Unused::InitialVelocity => {}
     }
 }

@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use mmsmith_codegen::{CAUSES, Cause, Origin};
+use mmsmith_codegen::{CAUSES, Cause, Origin, Unused};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::Quantity;
 use serde_json::{Value, json};
@@ -241,20 +241,29 @@ impl Told {
             solver,
             expected,
             cells: &options.cells,
-            is_of_first_order: self.order() > 0.5,
+            order: self.order(),
             not_tried: Mutex::default(),
         };
-        let tried = search.single(right)?;
-        for Tried { trial, errors } in tried {
+        // No solver is right that does without the body force: the other mistakes need not be tried.
+        let of_force =
+            |unused| matches!(unused, Unused::Force | Unused::ForceComponent | Unused::ForceLater);
+        let no_force = search.unused(right, of_force)?;
+        let tried = if no_force.is_empty() { search.single(right)? } else { vec![] };
+        for one in tried {
+            let is_named = search.explains(&one);
+            let Tried { trial, errors } = one;
             let order = Expected::order(&errors, self.field);
             self.tried.push((trial.cause.name, order));
-            if expected.is_met(&errors, 0.0) {
+            if is_named {
                 let shift = trial.fitted.map(|dt_over_h| dt_over_h * solver.h(options.cells[0]));
                 self.causes.push(Named { cause: trial.cause, errors: Some(errors), shift });
             }
         }
         if self.causes.is_empty() {
-            let unused = search.unused(right)?;
+            let unused = match no_force.is_empty() {
+                true => search.unused(right, |unused| !of_force(unused))?,
+                false => no_force,
+            };
             self.causes.extend(unused.into_iter().map(|cause| Named {
                 cause,
                 errors: None,
@@ -312,7 +321,7 @@ impl Told {
         for note in &self.notes {
             text += &format!("note: {note}\n");
         }
-        if !self.passed {
+        if !self.tried.is_empty() {
             text += &format!(
                 "{} mistakes were tried, {} were not\n",
                 self.tried.len(),

@@ -1,5 +1,6 @@
 //! Which mistake restores the order of a solver.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -15,9 +16,13 @@ use super::runs::{Errors, Run, Solver, Trial};
 const SECOND: usize = 8;
 const THIRD: usize = 3;
 /// So many mistakes are tried at a time: where one of them explains the errors, less likely ones are left out.
-const BATCH: usize = 32;
+const BATCH: usize = 24;
 /// A solver whose order is lower than expected by no more is run on a third grid before it is judged.
 const NEAR: f64 = 0.7;
+/// From this order on errors are rather those of a shift in time or place.
+const FIRST_ORDER: f64 = 0.5;
+/// Errors that fall with a lower order are not those of a mistake that vanishes with the cells.
+const VANISHING: f64 = 0.4;
 /// Errors of this share are alike.
 const ALIKE: f64 = 0.02;
 /// The shift that a fit begins with, in lengths of a cell over the wave speed.
@@ -79,8 +84,8 @@ pub(super) struct Search<'a> {
     pub(super) solver: &'a Solver<'a>,
     pub(super) expected: &'a Expected,
     pub(super) cells: &'a [usize],
-    /// Whether the errors fall with an order of about one, as those of a shift in time or place.
-    pub(super) is_of_first_order: bool,
+    /// The order with the right fields.
+    pub(super) order: f64,
     /// Why a mistake was not looked for.
     pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
 }
@@ -159,6 +164,30 @@ impl Search<'_> {
         })
     }
 
+    /// Whether the order is restored by a mistake that can be one of these errors: what vanishes with the cells, as a shift by a time step, leaves
+    /// no error that stays. There it cancels a part of another error on one grid and none on the next.
+    pub(super) fn explains(&self, tried: &Tried) -> bool {
+        let vanishes =
+            matches!(tried.trial.cause.counter, Counter::Time { .. } | Counter::Cell { .. });
+        self.expected.is_met(&tried.errors, 0.0) && !(vanishes && self.order < VANISHING)
+    }
+
+    fn by_size(&self, one: &Tried, other: &Tried) -> Ordering {
+        let [one, other] = [one, other].map(|tried| self.expected.size(tried.finest()));
+        one.total_cmp(&other)
+    }
+
+    /// Runs those next to the order on one more grid.
+    fn run_near(&self, tried: &mut [Tried]) -> Result<()> {
+        let last = self.cells[self.cells.len() - 1];
+        let mut near: Vec<&mut Tried> =
+            tried.iter_mut().filter(|one| self.expected.is_met(&one.errors, NEAR)).collect();
+        near.sort_by(|one, other| self.by_size(one, other));
+        near.into_par_iter()
+            .take(THIRD)
+            .try_for_each(|one| self.run_finer(std::slice::from_mut(one), 2 * last))
+    }
+
     /// The mistakes by what is left of the errors once they are countered, first those that restore the orders.
     pub(super) fn single(&self, right: &Run) -> Result<Vec<Tried>> {
         let coarse = self.cells[0];
@@ -166,11 +195,7 @@ impl Search<'_> {
         if !self.knows_steps() {
             trials.extend(self.fitted(right)?);
         }
-        let by_size = |one: &Tried, other: &Tried| {
-            let [one, other] = [one, other].map(|tried| self.expected.size(tried.finest()));
-            one.total_cmp(&other)
-        };
-        if self.is_of_first_order {
+        if self.order > FIRST_ORDER {
             trials.sort_by_key(|trial| matches!(trial.cause.counter, Counter::Fields(_)));
         }
         let whole = self.expected.size(&right.errors);
@@ -179,14 +204,16 @@ impl Search<'_> {
             let rest = trials.split_off(BATCH.min(trials.len()));
             let mut batch = self.run_all(trials, coarse)?;
             trials = rest;
-            batch.sort_by(by_size);
+            batch.sort_by(|one, other| self.by_size(one, other));
             // An error that is left whole is left by a mistake that is not made.
             let is_less = |one: &Tried| self.expected.size(one.finest()) < whole;
             let second = SECOND.min(batch.iter().take_while(|one| is_less(one)).count());
             for &cells in &self.cells[1..] {
                 self.run_finer(&mut batch[..second], cells)?;
             }
-            let is_found = batch.iter().any(|one| self.expected.is_met(&one.errors, 0.0));
+            // What restores the order on two grids may lose it on a third one.
+            self.run_near(&mut batch)?;
+            let is_found = batch.iter().any(|one| self.explains(one));
             tried.extend(batch);
             if is_found {
                 for trial in &trials {
@@ -198,19 +225,8 @@ impl Search<'_> {
                 break;
             }
         }
-        let is_near = |one: &Tried| self.expected.is_met(&one.errors, NEAR);
-        let last = self.cells[self.cells.len() - 1];
-        let mut near: Vec<usize> =
-            (0..tried.len()).filter(|&index| is_near(&tried[index])).collect();
-        near.sort_by(|&one, &other| by_size(&tried[one], &tried[other]));
-        for index in near.into_iter().take(THIRD) {
-            self.run_finer(&mut tried[index..=index], 2 * last)?;
-        }
-        tried.sort_by_key(|one| {
-            (!self.expected.is_met(&one.errors, 0.0), std::cmp::Reverse(one.errors.len()))
-        });
-        let restoring =
-            tried.iter().take_while(|one| self.expected.is_met(&one.errors, 0.0)).count();
+        tried.sort_by_key(|one| (!self.explains(one), std::cmp::Reverse(one.errors.len())));
+        let restoring = tried.iter().take_while(|one| self.explains(one)).count();
         tried[..restoring].sort_by(|one, other| {
             let finest = |tried: &Tried| tried.errors.keys().next_back().copied();
             let place = |tried: &Tried| {
@@ -235,6 +251,7 @@ impl Search<'_> {
             Timed::BoundaryVelocity,
             Timed::InitialVelocity,
             Timed::Traction,
+            Timed::Everything,
         ];
         let loaded = self.surfaces(Condition::PrescribedTraction);
         let of = |kind: Timed, steps: f64| {
@@ -282,39 +299,47 @@ impl Search<'_> {
         Ok((curvature > 0.0 && shift.abs() > SMALLEST_SHIFT * first).then_some(shift))
     }
 
-    /// The mistakes that leave a field without effect on the result.
-    pub(super) fn unused(&self, right: &Run) -> Result<Vec<&'static Cause>> {
+    /// The mistakes that leave a field without effect on the result, of those that are asked for.
+    pub(super) fn unused(
+        &self,
+        right: &Run,
+        asked: impl Fn(Unused) -> bool,
+    ) -> Result<Vec<&'static Cause>> {
         let [loaded, moved] = [Condition::PrescribedTraction, Condition::PrescribedMotion]
             .map(|condition| self.surfaces(condition));
-        let mut found: Vec<&'static Cause> = vec![];
-        for cause in CAUSES {
-            let Counter::Unused(unused) = cause.counter else { continue };
-            let can_be = match unused {
-                Unused::Traction | Unused::TractionLater => loaded,
-                Unused::Boundary => moved,
-                _ => true,
-            };
-            // What has no effect at all has none later either.
-            let is_told = found.iter().any(|known| {
-                matches!(
-                    (known.counter, unused),
-                    (Counter::Unused(Unused::Force), Unused::ForceComponent | Unused::ForceLater)
-                        | (Counter::Unused(Unused::Traction), Unused::TractionLater)
-                )
-            });
+        let can_be = |cause: &&'static Cause| match cause.counter {
+            Counter::Unused(unused) => {
+                asked(unused)
+                    && match unused {
+                        Unused::Traction | Unused::TractionLater => loaded,
+                        Unused::Boundary => moved,
+                        _ => true,
+                    }
+            }
+            _ => false,
+        };
+        let causes: Vec<&'static Cause> = CAUSES.iter().filter(can_be).collect();
+        let is_unused = |cause: &&'static Cause| -> Result<Option<&'static Cause>> {
             let guess = 0.1 * FIRST_SHIFT / self.solver.wave_speed();
             let trial = Trial { cause, fitted: (!self.knows_steps()).then_some(guess) };
-            if !can_be
-                || is_told
-                || !self.solver.has_time()
-                || !self.solver.shows(&trial, self.cells[0])
-            {
-                continue;
+            if !self.solver.has_time() || !self.solver.shows(&trial, self.cells[0]) {
+                return Ok(None);
             }
-            if self.solver.errors(Some(&trial), self.cells[0])?.is_like(right) {
-                found.push(cause);
-            }
-        }
-        Ok(found)
+            let run = self.solver.errors(Some(&trial), self.cells[0])?;
+            Ok(run.is_like(right).then_some(*cause))
+        };
+        let found: Result<Vec<Option<&'static Cause>>> = causes.par_iter().map(is_unused).collect();
+        let found: Vec<&'static Cause> = found?.into_iter().flatten().collect();
+        // What has no effect at all has none later either.
+        let whole = |whole: Unused| {
+            found.iter().any(|cause| matches!(cause.counter, Counter::Unused(own) if own == whole))
+        };
+        let [force, traction] = [Unused::Force, Unused::Traction].map(whole);
+        let is_told = |cause: &&'static Cause| match cause.counter {
+            Counter::Unused(Unused::ForceComponent | Unused::ForceLater) => !force,
+            Counter::Unused(Unused::TractionLater) => !traction,
+            _ => true,
+        };
+        Ok(found.iter().copied().filter(is_told).collect())
     }
 }
