@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{CAUSES, Cause, Origin, Unused};
 use mmsmith_solutions::AnySolution;
+use mmsmith_spec::Condition;
 use mmsmith_verify::Quantity;
 use serde_json::{Value, json};
 
@@ -244,11 +245,16 @@ impl Told {
             order: self.order(),
             not_tried: Mutex::default(),
         };
-        // No solver is right that does without the body force: the other mistakes need not be tried.
-        let of_force =
-            |unused| matches!(unused, Unused::Force | Unused::ForceComponent | Unused::ForceLater);
-        let no_force = search.unused(right, of_force)?;
-        let tried = if no_force.is_empty() { search.single(right)? } else { vec![] };
+        // No solver is right that does without the body force, or without the motion of all its surfaces: other mistakes need not be tried.
+        let is_moved =
+            solver.spec.boundaries.iter().all(|one| one.condition == Condition::PrescribedMotion);
+        let is_needed = |unused| match unused {
+            Unused::Force | Unused::ForceComponent | Unused::ForceLater => true,
+            Unused::Boundary => is_moved,
+            _ => false,
+        };
+        let ignored = search.unused(right, is_needed)?;
+        let tried = if ignored.is_empty() { search.single(right)? } else { vec![] };
         for one in tried {
             let is_named = search.explains(&one);
             let Tried { trial, errors } = one;
@@ -260,9 +266,9 @@ impl Told {
             }
         }
         if self.causes.is_empty() {
-            let unused = match no_force.is_empty() {
-                true => search.unused(right, |unused| !of_force(unused))?,
-                false => no_force,
+            let unused = match ignored.is_empty() {
+                true => search.unused(right, |unused| !is_needed(unused))?,
+                false => ignored,
             };
             self.causes.extend(unused.into_iter().map(|cause| Named {
                 cause,
