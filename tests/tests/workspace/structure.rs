@@ -28,6 +28,9 @@ fn files(folder: &Path, place: &Place, files: &mut BTreeMap<Place, syn::File>) {
             "mod" => place.clone(),
             _ => inner(),
         };
+        if path.extension().is_none_or(|extension| extension != "rs") {
+            continue;
+        }
         let text = std::fs::read_to_string(&path).unwrap();
         files.insert(module, syn::parse_file(&text).unwrap());
     }
