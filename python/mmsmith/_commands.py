@@ -565,7 +565,7 @@ def score(
     time_unit: float | None = None,
     axes: str | Iterable[str] | None = None,
     inside: bool = False,
-    velocity_lag: float | None = None,
+    velocity_lag: float | Iterable[float] | None = None,
     periods: float | None = None,
     cells: int | Iterable[int] | None = None,
     h: float | Iterable[float] | None = None,
@@ -600,7 +600,8 @@ def score(
         time_unit: Unit of times in the files, in that of the solution: 0.001 for milliseconds beside seconds. Default: 1.
         axes: Axes of the files that are the solution's, such as x,z. Default: x,y,z, as many as there are dimensions.
         inside: Leave out points outside the body, such as particles of walls.
-        velocity_lag: Time by which velocities lag behind their frame: half a time step in staggered schemes. Default: 0.
+        velocity_lag: Times by which velocities lag behind their frame, one for all recordings or one for each: half a time step in
+            staggered schemes. Default: 0.
         periods: Time in which frames are expected, in periods of the solution. Default: 1.
         cells: Cell counts along the solution's cell length, one for each recording.
         h: Mesh sizes, one for each recording. Default: estimated from the particles.

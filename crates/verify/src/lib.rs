@@ -86,9 +86,9 @@ pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
 pub use scene::{loaded_instead, needs_total_frame};
 pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
 pub use score::{
-    AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Input,
-    Integrated, IntegratedOrders, Judgement, LawRow, LawVerdict, Placing, Points, Quantity, Remark,
-    Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, Times, against,
+    AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Exchange, Input,
+    Integrated, IntegratedOrders, Judgement, Lag, LawRow, LawVerdict, Placing, Points, Quantity,
+    Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, Times, against,
     compare_recordings, score,
 };
 pub use stability::{

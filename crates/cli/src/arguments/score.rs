@@ -58,9 +58,10 @@ pub(crate) struct ScoreOptions {
     /// Leave out points outside the body, such as particles of walls
     #[arg(long)]
     pub(crate) inside: bool,
-    /// Time by which velocities lag behind their frame: half a time step in staggered schemes
-    #[arg(long, value_name = "DT", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
-    pub(crate) velocity_lag: f64,
+    /// Times by which velocities lag behind their frame, one for all recordings or one for each: half a time step in staggered
+    /// schemes
+    #[arg(long, value_name = "DT,...", default_value = "0", value_delimiter = ',', allow_negative_numbers = true, value_parser = finite_number)]
+    pub(crate) velocity_lag: Vec<f64>,
     /// Time in which frames are expected, in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,

@@ -62,6 +62,7 @@ fn reading(selection: &Selection, options: &ScoreOptions) -> Result<Reading> {
         periods: options.periods,
         provenance: Some(selection.provenance()),
         expected: options.expect.as_deref().map_or(Ok(BTreeMap::new()), expect::of_recordings)?,
+        exchange: None,
         tolerance: options.tolerance.unwrap_or(ORDER_TOLERANCE),
     })
 }

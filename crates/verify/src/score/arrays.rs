@@ -20,6 +20,8 @@ pub enum Role {
     Velocity,
     /// Deformation gradient `F[i][J]`, row by row.
     DeformationGradient,
+    /// Displacement gradient `H[i][J]`, row by row: `F` less one, where `F` is not there.
+    DisplacementGradient,
     /// First Piola-Kirchhoff stress `P[i][J]`, row by row.
     FirstPiolaKirchhoff,
     /// Cauchy stress, row by row, or its six components XX, YY, ZZ, XY, YZ, XZ; in the plane also XX, YY, XY.
@@ -38,10 +40,11 @@ pub enum Role {
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Displacement,
         Self::Velocity,
         Self::DeformationGradient,
+        Self::DisplacementGradient,
         Self::FirstPiolaKirchhoff,
         Self::Cauchy,
         Self::Kirchhoff,
@@ -92,6 +95,14 @@ impl Role {
             Self::DeformationGradient => {
                 &["deformation_gradient", "defgrad", "def_grad", "F", "mp_deformation_gradient"]
             }
+            Self::DisplacementGradient => &[
+                "displacement_gradient",
+                "H",
+                "grad_u",
+                "gradu",
+                "grad_displacement",
+                "gradient_of_displacement",
+            ],
             Self::FirstPiolaKirchhoff => &[
                 "first_piola_kirchhoff",
                 "first_piola_kirchhoff_stress",
@@ -154,13 +165,30 @@ impl Role {
                 "tag",
                 "pid",
                 "nid",
+                "gid",
+                "label",
+                "orig_id",
+                "original_id",
+                "material_point_id",
+                "particle_label",
+                "particle_number",
             ],
         }
     }
 
     /// The likeliest of some arrays to be it, which has as many components as it can have.
     pub(super) fn find<const D: usize>(self, arrays: &[ArrayHead]) -> Option<&ArrayHead> {
-        self.named(arrays).find(|array| self.admits::<D>(array.components))
+        let usual = self.named(arrays).find(|array| self.admits::<D>(array.components));
+        match (self, usual) {
+            // OpenFOAM calls the velocity U, and solids in it their displacement D.
+            (Self::Displacement, Some(array)) if array.name == "U" => {
+                vector_of::<D>(arrays, "D").or(usual)
+            }
+            (Self::Velocity, None) => {
+                vector_of::<D>(arrays, "D").and_then(|_| vector_of::<D>(arrays, "U"))
+            }
+            _ => usual,
+        }
     }
 
     /// The arrays that have a usual name, the likeliest first: those that have it letter by letter before others.
@@ -181,7 +209,7 @@ impl Role {
             Self::Displacement | Self::Velocity | Self::ReferencePosition => {
                 (D..=3).contains(&components)
             }
-            Self::DeformationGradient | Self::FirstPiolaKirchhoff => {
+            Self::DeformationGradient | Self::DisplacementGradient | Self::FirstPiolaKirchhoff => {
                 components == D * D || components == 9
             }
             Self::Cauchy | Self::Kirchhoff => {
@@ -197,8 +225,12 @@ impl Role {
             Self::Cauchy | Self::Kirchhoff if D == 3 => "6 or 9".into(),
             Self::Cauchy | Self::Kirchhoff if D == 2 => "3, 4, 6 or 9".into(),
             Self::Cauchy | Self::Kirchhoff => "1, 6 or 9".into(),
-            Self::DeformationGradient | Self::FirstPiolaKirchhoff if D == 3 => "9".into(),
-            Self::DeformationGradient | Self::FirstPiolaKirchhoff => format!("{} or 9", D * D),
+            Self::DeformationGradient | Self::DisplacementGradient | Self::FirstPiolaKirchhoff => {
+                match D {
+                    3 => "9".into(),
+                    _ => format!("{} or 9", D * D),
+                }
+            }
             _ if D == 3 => "3".into(),
             _ => format!("{D} to 3"),
         }
@@ -211,6 +243,12 @@ impl fmt::Display for Role {
     }
 }
 
+/// The vector of this very name.
+fn vector_of<'a, const D: usize>(arrays: &'a [ArrayHead], name: &str) -> Option<&'a ArrayHead> {
+    let is_vector = |array: &&ArrayHead| (D..=3).contains(&array.components) && D > 1;
+    arrays.iter().filter(is_vector).find(|array| array.name == name)
+}
+
 /// A name in small letters without signs between its words.
 fn plain(name: &str) -> String {
     let is_letter = |letter: &char| !['_', ' ', '-', '.'].contains(letter);
@@ -218,7 +256,11 @@ fn plain(name: &str) -> String {
 }
 
 /// The array for each role that a recording has, by its first frame.
-pub(super) struct Chosen(BTreeMap<Role, ArrayHead>);
+pub(super) struct Chosen {
+    heads: BTreeMap<Role, ArrayHead>,
+    /// Whether the array for `F` holds `F` less one.
+    pub(super) is_less_one: bool,
+}
 
 impl Chosen {
     /// Looks for arrays by the names in `map`, else by usual names.
@@ -286,12 +328,20 @@ impl Chosen {
                 remarks.note("few-digits", false, what);
             }
         }
+        let gradient = chosen.remove(&Role::DisplacementGradient);
+        let gradient = gradient.filter(|_| !chosen.contains_key(&Role::DeformationGradient));
+        let is_less_one = gradient.is_some();
+        if let Some(head) = gradient {
+            let what = format!("F is one plus the displacement gradient, array `{}`", head.name);
+            remarks.note("of-displacement-gradient", false, what);
+            chosen.insert(Role::DeformationGradient, head);
+        }
         remarks_on_absent::<D>(snapshot, &chosen, remarks);
-        Ok(Self(chosen))
+        Ok(Self { heads: chosen, is_less_one })
     }
 
     pub(super) fn head(&self, role: Role) -> Option<&ArrayHead> {
-        self.0.get(&role)
+        self.heads.get(&role)
     }
 
     pub(super) fn name(&self, role: Role) -> Option<&str> {

@@ -14,7 +14,8 @@ use crate::points;
 use super::arrays::{Chosen, Role, matrices, vectors};
 use super::error::ScoreError;
 use super::findings::Remarks;
-use super::options::ScoreOptions;
+use super::law;
+use super::options::{Exchange, ScoreOptions};
 use super::place::Place;
 use super::reference::{Scheme, Traced};
 use super::vectors::{
@@ -166,9 +167,13 @@ impl<const D: usize> FrameReader<'_, D> {
             None => None,
         };
         self.identify(snapshot, index, ids.as_deref());
-        let (X, u) = self.places(snapshot, index, ids.as_deref())?;
+        let (mut X, mut u) = self.places(snapshot, index, ids.as_deref())?;
+        let mut v = self.velocities(snapshot, time)?;
+        if let Some(exchange) = self.options.exchange {
+            exchange_columns(exchange, &mut X, &mut u, v.as_mut().map(|(v, _)| v));
+        }
         let data = FrameData {
-            v: self.velocities(snapshot, time)?,
+            v,
             tensors: [
                 self.tensor(Role::DeformationGradient, snapshot)?,
                 self.tensor(Role::FirstPiolaKirchhoff, snapshot)?,
@@ -454,8 +459,38 @@ impl<const D: usize> FrameReader<'_, D> {
     ) -> Result<Option<Vec<SMatrix<f64, D, D>>>, ScoreError> {
         let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
         count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
+        self.tell_no_zz(role, &flat, components);
         let dimensions = if [6, 9].contains(&components) { 3 } else { D };
-        Ok(Some(matrices(&flat, components, self.place.axes_of(dimensions))))
+        let mut all = matrices(&flat, components, self.place.axes_of(dimensions));
+        if role == Role::DeformationGradient && self.chosen.is_less_one {
+            all.iter_mut().for_each(|F| *F += SMatrix::identity());
+        }
+        Ok(Some(all))
+    }
+
+    /// Tells of stresses across the plane that are zero, which are not in plane strain.
+    fn tell_no_zz(&mut self, role: Role, flat: &[f64], components: usize) {
+        let zz = match components {
+            9 => 8,
+            6 => 2,
+            _ => return,
+        };
+        let is_stress = ![Role::DeformationGradient, Role::DisplacementGradient].contains(&role);
+        let is_first_plane = D == 2 && self.options.placing.axes.iter().all(|axis| *axis < 2);
+        let rows = || flat.chunks_exact(components);
+        let is_stressed = |row: &[f64]| row[0] != 0.0 && row[zz] == 0.0;
+        if is_stress
+            && is_first_plane
+            && rows().all(|row| row[zz] == 0.0)
+            && rows().any(is_stressed)
+            && law::has_lateral_stress(self.exact.law())
+        {
+            let what = format!(
+                "array `{}` has no zz component, which is not zero in plane strain: it is not compared; is plane stress computed?",
+                self.chosen.name(role).unwrap_or_default()
+            );
+            self.remarks.note("no-zz", false, what);
+        }
     }
 
     fn scalar(&mut self, role: Role, snapshot: &Snapshot) -> Result<Option<Vec<f64>>, ScoreError> {
@@ -495,8 +530,36 @@ impl<const D: usize> FrameReader<'_, D> {
     }
 }
 
+/// Takes columns one for the other.
+fn exchange_columns<const D: usize>(
+    exchange: Exchange,
+    X: &mut Vectors<D>,
+    u: &mut Vectors<D>,
+    v: Option<&mut Vectors<D>>,
+) {
+    let swap = |all: &mut Vectors<D>, i, j| all.iter_mut().for_each(|one| one.swap_rows(i, j));
+    match exchange {
+        Exchange::Displacement(i, j) => swap(u, i, j),
+        Exchange::Motion(i, j) => {
+            swap(u, i, j);
+            if let Some(v) = v {
+                swap(v, i, j);
+            }
+        }
+        Exchange::Component(i) => {
+            for (X, u) in X.iter_mut().zip(u) {
+                std::mem::swap(&mut X[i], &mut u[i]);
+            }
+        }
+        Exchange::Both => std::mem::swap(X, u),
+    }
+}
+
 /// How many places lie outside of the body, and the furthest of them, a length.
-fn outside<const D: usize>(domain: &Domain<f64, D>, X: &[SVector<f64, D>]) -> (usize, f64) {
+pub(super) fn outside<const D: usize>(
+    domain: &Domain<f64, D>,
+    X: &[SVector<f64, D>],
+) -> (usize, f64) {
     let size = match domain {
         Domain::Box { lower, upper } => (upper - lower).amax(),
         Domain::Annulus { outer, .. } => *outer,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use mmsmith_measure::norms::{Norm, PerNorm};
 use serde::Serialize;
 
+use super::integrated::Integrated;
 use super::options::ScoreOptions;
 use super::quantity::Quantity;
 use super::row::ScoreRow;
@@ -74,7 +75,7 @@ impl Judgement {
             })
             .collect();
         let of_u = shown(&Quantity::Displacement);
-        let (kind, message) = told(rows, &of_u, &flat);
+        let (kind, message) = told(rows, &of_u, &flat, series.between(options));
         let mut judged = Self {
             kind,
             passed: None,
@@ -142,7 +143,12 @@ impl Judgement {
 }
 
 /// The verdict, and the reason in words.
-fn told(rows: &[ScoreRow], of_u: &Shown, flat: &[(Quantity, f64)]) -> (Convergence, String) {
+fn told(
+    rows: &[ScoreRow],
+    of_u: &Shown,
+    flat: &[(Quantity, f64)],
+    between: Option<String>,
+) -> (Convergence, String) {
     let list = |fields: &[(Quantity, f64)]| {
         let each = fields.iter().map(|(field, order)| format!("{field} has order {order:.2}"));
         each.collect::<Vec<_>>().join(", ")
@@ -152,9 +158,24 @@ fn told(rows: &[ScoreRow], of_u: &Shown, flat: &[(Quantity, f64)]) -> (Convergen
             Convergence::DoesNotConverge,
             format!("does not converge: {} on the finest pair (L2)", list(flat)),
         ),
+        Shown::Order(order) if between.is_some() && flat.is_empty() => (
+            Convergence::DoesNotConverge,
+            format!(
+                "u converges with order {order:.2} at the nodes (L2, finest pair), but not between them: {}",
+                between.unwrap_or_default()
+            ),
+        ),
         Shown::Order(order) if flat.is_empty() => (
             Convergence::Converges,
             format!("converges with order {order:.2} (u, L2, finest pair)"),
+        ),
+        Shown::Order(order) if flat.iter().all(|(field, _)| is_stress(*field)) => (
+            Convergence::DoesNotConverge,
+            format!(
+                "u converges with order {order:.2}, and the motion with it; what is wrong is the stress that is written: {} (L2, \
+                 finest pair)",
+                list(flat)
+            ),
         ),
         Shown::Order(order) => (
             Convergence::DoesNotConverge,
@@ -183,6 +204,11 @@ fn told(rows: &[ScoreRow], of_u: &Shown, flat: &[(Quantity, f64)]) -> (Convergen
     }
 }
 
+/// Whether a field is one that a solver may write wrongly while its motion is right.
+fn is_stress(field: Quantity) -> bool {
+    matches!(field, Quantity::FirstPiolaKirchhoff | Quantity::Cauchy | Quantity::Kirchhoff)
+}
+
 /// The rows, as series of errors.
 struct Series<'a> {
     rows: &'a [ScoreRow],
@@ -209,6 +235,27 @@ impl Series<'_> {
             let errors = self.errors(field, norm);
             Verdict::above(&self.steps(), &errors, &floors, expected, options.tolerance)
         })
+    }
+
+    /// Which of the errors integrated over the elements of meshes do not fall, in words.
+    fn between(&self, options: &ScoreOptions) -> Option<String> {
+        let flat = |field: Quantity, of: fn(&Integrated) -> f64| {
+            let floor = |row: &ScoreRow| row.floors.get(&field).copied().unwrap_or(0.0);
+            let floors: Vec<f64> = self.rows.iter().map(floor).collect();
+            let error = |row: &ScoreRow| {
+                row.is_whole().then_some(row.integrated.as_ref().map_or(f64::NAN, of))
+            };
+            let errors: Vec<_> = self.rows.iter().map(error).collect();
+            let verdict = Verdict::above(&self.steps(), &errors, &floors, None, options.tolerance);
+            verdict.finest.filter(|order| *order < LEAST_ORDER)
+        };
+        let of_u = flat(Quantity::Displacement, |errors| errors.l2)
+            .map(|order| format!("integrated over the elements its error has order {order:.2}"));
+        let of_H = || {
+            let order = flat(Quantity::DeformationGradient, |errors| errors.h1)?;
+            Some(format!("the error of its gradient over the elements (h1) has order {order:.2}"))
+        };
+        of_u.or_else(of_H)
     }
 
     /// What the L2 errors of a field show.

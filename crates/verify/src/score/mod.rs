@@ -6,6 +6,7 @@
 
 mod against;
 mod arrays;
+mod balance;
 mod differences;
 mod elements;
 mod error;
@@ -14,6 +15,7 @@ mod found;
 mod frame;
 mod integrated;
 mod judgement;
+mod lag;
 mod law;
 mod options;
 mod place;
@@ -23,6 +25,7 @@ mod recording;
 mod reference;
 mod row;
 mod scales;
+mod shuffled;
 mod times;
 mod vectors;
 
@@ -33,8 +36,9 @@ pub use error::ScoreError;
 pub use findings::Remark;
 pub use integrated::{Integrated, IntegratedOrders};
 pub use judgement::{Convergence, Judgement};
+pub use lag::Lag;
 pub use law::{Deformation, LawRow, LawVerdict};
-pub use options::{Input, Placing, Points, Resolution, ScoreOptions, Times};
+pub use options::{Exchange, Input, Placing, Points, Resolution, ScoreOptions, Times};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
 
@@ -96,11 +100,20 @@ where
     let mut verdict = Judgement::of(&rows, options);
     if let Some(points) = decision.other {
         let other = score_in(exact, inputs, &ScoreOptions { points, ..options.clone() })?.verdict;
-        if (other.kind, other.passed) != (verdict.kind, verdict.passed) {
+        let is_apart = |(one, other): (f64, f64)| (one - other).abs() > options.tolerance;
+        if (other.kind, other.passed) != (verdict.kind, verdict.passed)
+            || other.order.zip(verdict.order).is_some_and(is_apart)
+        {
             verdict.doubt("it depends on whether points are reference or current positions; --points tells it");
         }
     }
     conclude(&mut rows, &verdict);
+    let of_v = verdict.fields.get(&Quantity::Velocity).and_then(|norms| norms.l2.finest);
+    if let Some(message) = lag::told(&rows, of_v) {
+        let remark =
+            Remark { kind: "velocity-lag", is_problem: false, count: 1, frames: 0, message };
+        rows[0].findings.push(remark);
+    }
     let of_meshes = rows.iter().map(|row| (row.h, row.integrated.filter(|_| row.is_whole())));
     let integrated_orders = IntegratedOrders::of(&of_meshes.collect::<Vec<_>>());
     Ok(Score { rows, orders, integrated_orders, verdict })

@@ -51,6 +51,8 @@ pub struct ScoreOptions {
     pub provenance: Option<Provenance>,
     /// Orders that are expected, field by field and norm by norm.
     pub expected: BTreeMap<Quantity, PerNorm<Option<f64>>>,
+    /// Columns that are read one for the other.
+    pub exchange: Option<Exchange>,
     /// How far from them the order on the finest pair may be.
     pub tolerance: f64,
 }
@@ -65,9 +67,23 @@ impl Default for ScoreOptions {
             periods: 1.0,
             provenance: None,
             expected: BTreeMap::new(),
+            exchange: None,
             tolerance: ORDER_TOLERANCE,
         }
     }
+}
+
+/// Columns that may have been written one for the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    /// Two components of the displacement.
+    Displacement(usize, usize),
+    /// The same of the displacement and of the velocity.
+    Motion(usize, usize),
+    /// One component of the reference position and of the displacement.
+    Component(usize),
+    /// The whole reference position and the displacement.
+    Both,
 }
 
 /// Where and in which units the files have the body.

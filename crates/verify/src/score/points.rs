@@ -8,6 +8,7 @@ use super::arrays::{Role, vectors};
 use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
 use super::found::Found;
+use super::frame::outside;
 use super::options::{Input, Points, ScoreOptions};
 use super::place::Place;
 use super::times::{Timed, open};
@@ -17,6 +18,8 @@ use super::vectors::are_same_places;
 const FAR_LARGER: f64 = 3.0;
 /// Errors that differ by a smaller share are taken as equal: the motion is too small to matter.
 const ALIKE: f64 = 1e-3;
+/// Share of the largest displacement by which points have to lie outside the body to tell something.
+const BEYOND: f64 = 0.1;
 /// Particles at which the two errors are measured.
 const MOST_MEASURED: usize = 20_000;
 
@@ -59,6 +62,8 @@ struct Measured {
     current: f64,
     /// Whether the frame has cells that are not single points.
     is_mesh: bool,
+    /// What the body tells: none of its points lies outside of it one way, and some do the other way.
+    by_body: Option<Points>,
 }
 
 impl Measured {
@@ -73,7 +78,7 @@ impl Measured {
         } else if self.reference > FAR_LARGER * self.current {
             Some(Points::Current)
         } else {
-            None
+            self.by_body
         }
     }
 
@@ -95,10 +100,17 @@ impl Measured {
         };
         if let Some(points) = self.decided() {
             let (taken, error, other, larger) = of(points);
-            let message = format!(
-                "the points are taken as {taken} positions: the error of u is {error:.2e}, against {larger:.2e} if they were \
-                 {other} positions (--points {other})"
-            );
+            let message = if error * FAR_LARGER < larger {
+                format!(
+                    "the points are taken as {taken} positions: the error of u is {error:.2e}, against {larger:.2e} if they were \
+                     {other} positions (--points {other})"
+                )
+            } else {
+                format!(
+                    "the points are taken as {taken} positions: as {other} positions some would lie outside the body \
+                     (--points {other})"
+                )
+            };
             return (points, Some(remark("points-decided", message)), None);
         }
         let points = self.usual();
@@ -197,11 +209,11 @@ fn evidence<const D: usize>(
     }
     let place = Place::new(&options.placing)?;
     let [first, .., last] = &found.timed[..] else {
-        return measured(exact, &found.first, name, found.timed[0].time, &place)
+        return measured(exact, &found, &found.first, name, found.timed[0].time, &place)
             .map(Evidence::Measured);
     };
     let frame = if last.time > first.time { last } else { first };
-    measured(exact, &open(&frame.file)?, name, frame.time, &place).map(Evidence::Measured)
+    measured(exact, &found, &open(&frame.file)?, name, frame.time, &place).map(Evidence::Measured)
 }
 
 /// Whether points stay where they are, to the bit, while displacements change; `None` where these do not.
@@ -229,6 +241,7 @@ type Reference<'a, const D: usize> =
 /// Measures both ways.
 fn measured<const D: usize>(
     exact: &dyn Solution<f64, D>,
+    found: &Found,
     snapshot: &Snapshot,
     displacement: &str,
     time: f64,
@@ -258,6 +271,20 @@ fn measured<const D: usize>(
         (sum / count).sqrt()
     };
     // Cells that cannot be decoded tell nothing.
-    let is_mesh = snapshot.mesh().is_ok_and(|mesh| mesh.is_some());
-    Ok(Measured { reference: rms(&|x, _| *x), current: rms(&|x, u| x - u), is_mesh })
+    let is_mesh = found.is_of_cells || snapshot.mesh().is_ok_and(|mesh| mesh.is_some());
+    let domain = exact.domain();
+    let beyond = |reference: Reference<'_, D>| {
+        let pairs = x.iter().zip(&u).step_by(stride);
+        let places: Vec<_> =
+            pairs.map(|(x, u)| reference(&place.position(*x), &(u * place.length))).collect();
+        outside(&domain, &places).1
+    };
+    // Less than this is rounding of positions.
+    let far = BEYOND * u.iter().map(|u| u.amax() * place.length).fold(0.0, f64::max);
+    let by_body = match (beyond(&|x, _| *x), beyond(&|x, u| x - u)) {
+        (0.0, current) if current > far => Some(Points::Reference),
+        (reference, 0.0) if reference > far => Some(Points::Current),
+        _ => None,
+    };
+    Ok(Measured { reference: rms(&|x, _| *x), current: rms(&|x, u| x - u), is_mesh, by_body })
 }

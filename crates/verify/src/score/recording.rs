@@ -11,11 +11,13 @@ use mmsmith_vtk::foreign::ArrayHead;
 use nalgebra::SVector;
 
 use super::arrays::{Chosen, DIGITS_OF_A_DOUBLE, Role};
+use super::balance::Balance;
 use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
 use super::found::Found;
 use super::frame::{FrameErrors, FrameReader, Identities};
 use super::integrated::{Integrated, Mesh};
+use super::lag::LagSums;
 use super::law::{self, Witnesses};
 use super::options::{Input, Resolution, ScoreOptions};
 use super::place::Place;
@@ -24,6 +26,7 @@ use super::quantity::Quantity;
 use super::reference::{Scheme, scheme};
 use super::row::{EXCEEDS_MOTION, ScoreRow, Source};
 use super::scales::{Grain, Scales};
+use super::shuffled::{self, is_shuffled};
 use super::times::{TIME_SLACK, any_velocity_time, open};
 use crate::precision::Precision;
 
@@ -87,6 +90,11 @@ impl<const D: usize> Opened<D> {
             Scheme::Recovered => (Source::PositionsMinusDisplacements, Source::Array),
             Scheme::Traced(_) => (Source::FirstFrame, Source::PositionsMinusReference),
         }
+    }
+
+    /// Whether particles are found again by their order.
+    fn is_by_order(&self) -> bool {
+        matches!(&self.scheme, Scheme::Traced(traced) if traced.places.is_none())
     }
 
     /// How finely the numbers of the files are written.
@@ -158,6 +166,10 @@ struct Totals {
     compared: [usize; 8],
     h: f64,
     shift: Option<Vec<f64>>,
+    lag: LagSums,
+    balance: Balance,
+    /// Whether particles without an identity have another order in some frame.
+    is_shuffled: bool,
 }
 
 impl Totals {
@@ -175,6 +187,7 @@ impl Totals {
             let snapshot = open(&frame.file)?;
             let data = reader.frame(&snapshot, frame.time, index)?;
             if index == 0 {
+                totals.balance.add_masses(&snapshot, &data, opened.found.is_of_cells)?;
                 mesh = Mesh::new(&snapshot, data.X.len(), opened.found.timed.len());
                 totals.shift = shift(exact, &data.X);
                 totals.h = match resolution {
@@ -189,6 +202,11 @@ impl Totals {
             totals.scales.add(exact, &data.X, frame.time);
             totals.add(&data.errors(exact, frame.time));
             witnesses.add(&data, frame.time);
+            totals.lag.add(exact, &data);
+            totals.balance.add(exact, &data);
+            if opened.is_by_order() && !totals.is_shuffled {
+                totals.is_shuffled = is_shuffled(exact, &data, frame.time);
+            }
             if let Some(mesh) = &mut mesh {
                 mesh.add(exact, index, &data, frame.time);
             }
@@ -322,9 +340,13 @@ where
     totals.tell_transposed(&mut remarks);
     opened.tell_provenance(options, &mut remarks);
     totals.tell_density(&mut remarks);
+    totals.balance.tell(exact, &mut remarks);
     opened.tell_single_frame(options.periods * exact.period(), &mut remarks);
     totals.tell_overflow(&mut remarks);
     totals.tell_excess(&mut remarks);
+    if totals.is_shuffled {
+        remarks.note("shuffled", true, shuffled::told(&opened.found)?);
+    }
     tell_several(&input.paths, &mut remarks);
     let chosen = &opened.found.chosen;
     let rounding =
@@ -358,6 +380,7 @@ where
         integrated: totals.integrated,
         law,
         shift: totals.shift,
+        lag: totals.lag.best(),
         floors: totals.scales.floors(exact, &opened.grain()),
         findings,
     })

@@ -47,7 +47,7 @@ pub(super) fn scheme<const D: usize>(
     is_inside_only: bool,
     remarks: &mut Remarks,
 ) -> Result<Scheme<D>, ScoreError> {
-    let Found { timed, first, chosen } = found;
+    let Found { timed, first, chosen, .. } = found;
     let displacement = chosen.name(Role::Displacement);
     if chosen.name(Role::ReferencePosition).is_some() {
         return Ok(Scheme::Given { displacement: displacement.is_some() });
@@ -81,7 +81,7 @@ fn stay(timed: &[Timed], first: &Snapshot) -> Result<bool, ScoreError> {
 fn trace<const D: usize>(
     exact: &dyn Solution<f64, D>,
     x: &[SVector<f64, D>],
-    Found { timed, first, chosen }: &Found,
+    Found { timed, first, chosen, .. }: &Found,
     is_inside_only: bool,
     remarks: &mut Remarks,
 ) -> Result<Scheme<D>, ScoreError> {

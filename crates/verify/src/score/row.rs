@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::findings::Remark;
 use super::integrated::Integrated;
+use super::lag::Lag;
 use super::law::LawRow;
 use super::quantity::Quantity;
 
@@ -82,6 +83,9 @@ pub struct ScoreRow {
     /// body whose middle is not known.
     #[serde(skip)]
     pub shift: Option<Vec<f64>>,
+    /// The time by which velocities seem to be behind their frames.
+    #[serde(skip)]
+    pub lag: Option<Lag>,
     /// Everything else that has to be known; problems first.
     #[serde(skip)]
     pub findings: Vec<Remark>,

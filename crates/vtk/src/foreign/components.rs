@@ -86,9 +86,17 @@ fn split(name: &str) -> Option<(&str, Component)> {
         let index = index.parse().ok().map(Component::Index);
         return index.or_else(|| component(&name[base.len() + 1..])).map(|c| (placed(base), c));
     }
-    if let Some((base, ending)) = name.rsplit_once('_').filter(|(base, _)| !base.is_empty()) {
+    if let Some((base, ending)) = bracketed(name) {
         let index = || ending.parse().ok().filter(|index| *index <= 9).map(Component::Index);
         return component(ending).or_else(index).map(|component| (placed(base), component));
+    }
+    let signs = ['_', ' ', '-', '.'];
+    if let Some((base, ending)) = name.rsplit_once(signs).filter(|(base, _)| !base.is_empty()) {
+        let index = || ending.parse().ok().filter(|index| *index <= 9).map(Component::Index);
+        return component(ending).or_else(index).map(|component| (placed(base), component));
+    }
+    if let Some(parts) = capital(name) {
+        return Some(parts);
     }
     for base in VECTORS {
         if let [c] = name.strip_prefix(base).unwrap_or_default().as_bytes()
@@ -101,6 +109,23 @@ fn split(name: &str) -> Option<(&str, Component)> {
         let ending = name.strip_prefix(base).filter(|ending| ending.len() == 2)?;
         component(ending).map(|component| (base, component))
     })
+}
+
+/// A component in brackets, as in `displacement[0]` and `stress(xy)`.
+fn bracketed(name: &str) -> Option<(&str, &str)> {
+    let (base, ending) = [('[', ']'), ('(', ')')]
+        .iter()
+        .find_map(|(open, close)| name.strip_suffix(*close)?.rsplit_once(*open))?;
+    let base = base.trim_end();
+    (!base.is_empty()).then_some((base, ending))
+}
+
+/// A component in capitals behind a small letter, as in `DispX` and `StressXY`.
+fn capital(name: &str) -> Option<(&str, Component)> {
+    let base = name.trim_end_matches(['X', 'Y', 'Z']);
+    let is_word = base.len() > 2 && base.ends_with(|letter: char| letter.is_ascii_lowercase());
+    let component = component(name.strip_prefix(base).filter(|_| is_word)?)?;
+    Some((placed(base), component))
 }
 
 /// The name of the array, which is that of the points where it says so.
@@ -303,6 +328,12 @@ mod tests {
             ("tau_xx tau_yy tau_xy", "tau(0 1 2)"),
             ("node_1 node_3", "node_1(0) node_3(1)"),
             ("S12 mass", "S12(0) mass(1)"),
+            ("DispX DispY VelX VelY", "Disp(0 1) Vel(2 3)"),
+            ("StressXX StressYY StressXY", "Stress(0 1 2)"),
+            ("posX posY", "Points(0 1)"),
+            ("displacement[0] displacement[1]", "displacement(0 1)"),
+            ("sigma(xx) sigma(yy) sigma(xy)", "sigma(0 1 2)"),
+            ("Index MaX", "Index(0) MaX(1)"),
         ] {
             assert_eq!(told(names), expected, "{names}");
         }

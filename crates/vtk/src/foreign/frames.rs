@@ -125,7 +125,10 @@ fn folder(path: &Path) -> Result<Vec<FrameFile>, ReadError> {
     }
     let frames: Vec<_> = files.iter().filter(|file| is_frame(file)).collect();
     if frames.is_empty() {
-        let foreign = files.into_iter().find(|file| !super::converted(file).is_empty());
+        // XDMF has its numbers in an HDF5 file beside it.
+        let is_convertible = |file: &PathBuf| !super::converted(file).is_empty();
+        let foreign =
+            files.into_iter().filter(is_convertible).min_by_key(|file| extension(file) == "h5");
         return Err(ReadError::NoFrames { path: path.to_owned(), foreign });
     }
     // Pieces stand beside the file that lists them.

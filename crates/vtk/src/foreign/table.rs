@@ -47,6 +47,9 @@ impl Table {
         }
         let time = header.iter().position(|name| TIMES.contains(&name));
         let rows = filled.columns.first().map_or(0, Vec::len);
+        if let Some(time) = time.filter(|time| is_mixed(&filled.columns[*time])) {
+            filled.sort(time);
+        }
         let frames = frames(time.map(|time| &filled.columns[time][..]), rows)?;
         filled.table(frames)
     }
@@ -113,6 +116,15 @@ impl Filled {
         }
         let (columns, digits) = (vec![vec![]; names.len()], vec![Digits::default(); names.len()]);
         Ok(Self { names, columns, digits })
+    }
+
+    /// Puts rows in the order of a column, and leaves those of one value in theirs.
+    fn sort(&mut self, by: usize) {
+        let mut order: Vec<usize> = (0..self.columns[by].len()).collect();
+        order.sort_by(|one, other| self.columns[by][*one].total_cmp(&self.columns[by][*other]));
+        for column in &mut self.columns {
+            *column = order.iter().map(|row| column[*row]).collect();
+        }
     }
 
     /// The names of the columns.
@@ -304,6 +316,15 @@ fn is_whole(mantissa: &str, value: f64) -> bool {
     !mantissa.ends_with('0') && (value * FINEST).fract() == 0.0
 }
 
+/// Whether rows of all times are mixed, as where each particle has its rows together, or none have an order. Where they stand in long
+/// pieces, and a time has two, two recordings may be in one file.
+fn is_mixed(times: &[f64]) -> bool {
+    const SHORT: usize = 4;
+    let pieces = times.chunk_by(|one, other| one.to_bits() == other.to_bits()).count();
+    let different: HashSet<u64> = times.iter().map(|time| time.to_bits()).collect();
+    pieces > different.len() && SHORT * pieces > times.len()
+}
+
 /// Successive rows of one time are a frame.
 fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
     let Some(times) = times else { return Ok(vec![Rows { time: None, range: 0..rows }]) };
@@ -319,7 +340,7 @@ fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
             }
             _ => {
                 return Err(format!(
-                    "rows of time {time:?} do not stand together: sort the rows by time"
+                    "rows of time {time:?} do not stand together: sort the rows by time, unless two recordings are in the file"
                 ));
             }
         }
@@ -404,13 +425,24 @@ mod tests {
     }
 
     #[test]
+    fn rows_of_mixed_times_are_put_in_their_order() {
+        let table = Table::read(b"t,id,x,y\n1,0,5,0\n0,0,4,0\n1,1,7,0\n0,1,6,0\n").unwrap();
+        let times: Vec<_> = table.frames.iter().map(|rows| rows.time).collect();
+        assert_eq!(times, [Some(0.0), Some(1.0)]);
+        assert_eq!(table.floats(POINTS, 2..4), Some(vec![5.0, 0.0, 7.0, 0.0]));
+        assert_eq!(table.integers("id", 0..2), Some(Ok(vec![0, 1])));
+    }
+
+    #[test]
     fn what_is_wrong_is_told() {
+        let piece = |time: &str| format!("{time},1\n").repeat(9);
+        let long_pieces = format!("t,x\n{}{}{}", piece("0"), piece("1"), piece("0"));
         for (text, expected) in [
             ("x,y\n1,z\n", "line 2, column `y`: \"z\""),
             ("x,y\n1\n", "fields"),
             ("x,z\n1,2\n", "no complete vector or tensor `Points`"),
             ("F11,F12,F21\n1,2,3\n", "no complete vector or tensor `F`"),
-            ("t,x\n0,1\n1,1\n0,2\n", "sort the rows by time"),
+            (&long_pieces, "sort the rows by time, unless two recordings"),
             ("x,x\n0,1\n", "`x` stands twice"),
             ("t,x,t\n0,1,0\n", "`t` stands twice"),
             ("x,y\n0,5,1,5\n", "decimal commas? Write decimal points (0.5)"),

@@ -2,8 +2,8 @@
 
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Input, Norm, Placing, Points, Quantity, Remark, Score, ScoreOptions as Reading, ScoreRow,
-    score as measure,
+    Exchange, Input, Norm, Placing, Points, Quantity, Remark, Score, ScoreOptions as Reading,
+    ScoreRow, score as measure,
 };
 
 use crate::library::Selection;
@@ -19,6 +19,10 @@ const SUPPORTED: f64 = 0.5;
 const MOST_LEFT: f64 = 0.2;
 /// Below this order the grid is not what the error is from.
 const NO_ORDER: f64 = 0.5;
+/// By how many times an error may be larger than the least one where both explain as much.
+const AS_GOOD: f64 = 1.1;
+/// Steps by which the place of a body is found.
+const SHIFTS: usize = 4;
 /// More numbers than are read anew for every trial.
 const MOST_TRIED: usize = 50_000;
 /// Octaves up and down from the value of a parameter in which another one is looked for.
@@ -65,7 +69,14 @@ pub(super) fn suggestion(
     if tried.is_empty() {
         tried = explaining(case.places_at_density_one(set));
     }
-    let (error, found) = tried.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let (least, words) = tried
+        .iter()
+        .min_by(|one, other| one.0.total_cmp(&other.0))
+        .map(|(e, one)| (*e, one.words.clone()))?;
+    // Of places that are as good, the one with the fewest digits, which comes first.
+    let is_as_good =
+        |(error, one): &(f64, Hypothesis)| one.words == words && *error <= AS_GOOD * least;
+    let (error, found) = tried.into_iter().find(is_as_good)?;
     let message = format!(
         "{} explains the error: {} % of u with {}, in place of {} %",
         found.words,
@@ -73,7 +84,7 @@ pub(super) fn suggestion(
         found.option,
         number::rounded(100.0 * relative(row), 2)
     );
-    let is_place = found.reading.placing != how.placing;
+    let is_place = found.reading.placing != how.placing || found.reading.exchange.is_some();
     let kind = if is_place { "other-place" } else { "other-parameter" };
     Some((index, Remark { kind, is_problem: false, count: 1, frames: 0, message }))
 }
@@ -189,7 +200,8 @@ impl Case<'_> {
 
     /// Other places and units.
     fn places(&self) -> Vec<Hypothesis> {
-        let mut all = self.shifts();
+        let mut all = self.shifts(self.how, "");
+        all.extend(self.exchanges());
         for (unit, words) in [
             (0.001, "a unit of length of a thousandth"),
             (0.01, "a unit of length of a hundredth"),
@@ -198,6 +210,16 @@ impl Case<'_> {
             all.push(self.place(words, format!("--length-unit {unit}"), |placing| {
                 placing.length_unit = unit
             }));
+            let scaled = self.reading(|placing| placing.length_unit = unit);
+            all.extend(self.shifts(&scaled, &format!("--length-unit {unit} ")));
+            for time_unit in [0.001, 1e-6] {
+                let option =
+                    format!("--length-unit {unit} --time-unit {}", number::exact(time_unit));
+                all.push(self.place("units of length and time", option, |placing| {
+                    placing.length_unit = unit;
+                    placing.time_unit = time_unit;
+                }));
+            }
         }
         let period = match self.exact {
             AnySolution::One(exact) => exact.period(),
@@ -228,34 +250,73 @@ impl Case<'_> {
         all
     }
 
-    /// Shifts of the body: by its own middle, in as few digits as come near it. The middle is that of reference positions, whichever the
-    /// points are.
-    fn shifts(&self) -> Vec<Hypothesis> {
-        let of = |points| {
-            let reading = Reading { points, ..self.how.clone() };
-            measure(self.exact, self.input, &reading).ok()?.rows.pop()?.shift
+    /// Columns that were written one for the other.
+    fn exchanges(&self) -> Vec<Hypothesis> {
+        const AXES: [&str; 3] = ["x", "y", "z"];
+        let dimension = self.selection.dimension();
+        let one = |exchange, columns: String| Hypothesis {
+            option: format!("the columns {columns} written the other way round"),
+            words: "an exchange of columns".into(),
+            reading: Reading { exchange: Some(exchange), ..self.how.clone() },
+            parameter: None,
         };
-        let found = [of(Points::Reference), of(Points::Current)].into_iter().flatten();
         let mut all = vec![];
-        for shift in found {
-            self.add_shifts(&shift, &mut all);
+        for j in 0..dimension {
+            for i in 0..j {
+                let [a, b] = [AXES[i], AXES[j]];
+                all.push(one(Exchange::Displacement(i, j), format!("u{a} and u{b}")));
+                let both = format!("u{a} and u{b}, v{a} and v{b}");
+                all.push(one(Exchange::Motion(i, j), both));
+            }
+        }
+        for (i, a) in AXES[..dimension].iter().enumerate() {
+            all.push(one(Exchange::Component(i), format!("{} and u{a}", a.to_uppercase())));
+        }
+        if dimension > 1 {
+            all.push(one(Exchange::Both, "of reference positions and of displacements".into()));
         }
         all
     }
 
-    fn add_shifts(&self, shift: &[f64], all: &mut Vec<Hypothesis>) {
+    /// Shifts of the body: by its own middle, in as few digits as come near it. The middle is that of reference positions, whichever the
+    /// points are.
+    fn shifts(&self, how: &Reading, before: &str) -> Vec<Hypothesis> {
+        let of = |points| {
+            let mut reading = Reading { points, ..how.clone() };
+            let mut total: Option<Vec<f64>> = None;
+            // Positions that are traced back from a wrong place tell its shift only nearly.
+            for _ in 0..SHIFTS {
+                let shift = measure(self.exact, self.input, &reading).ok()?.rows.pop()?.shift?;
+                let before = total.take().unwrap_or_else(|| vec![0.0; shift.len()]);
+                let sum: Vec<f64> =
+                    before.iter().zip(&shift).map(|(one, other)| one + other).collect();
+                reading.placing.origin.clone_from(&sum);
+                total = Some(sum);
+            }
+            total
+        };
+        let found = [of(Points::Reference), of(Points::Current)].into_iter().flatten();
+        let mut all = vec![];
+        for shift in found {
+            self.add_shifts(how, before, &shift, &mut all);
+        }
+        all
+    }
+
+    fn add_shifts(&self, how: &Reading, before: &str, shift: &[f64], all: &mut Vec<Hypothesis>) {
         let to = |digits: i32| -> Vec<f64> {
             let scale = 10.0_f64.powi(digits);
             shift.iter().map(|value| (value * scale).round() / scale).collect()
         };
         for origin in [to(1), to(2), to(3), shift.to_vec()] {
             let told: Vec<_> = origin.iter().map(|value| number::exact(*value)).collect();
-            let option = format!("--origin {}", told.join(","));
+            let option = format!("{before}--origin {}", told.join(","));
             let is_new = all.iter().all(|other: &Hypothesis| other.option != option);
             if origin.iter().any(|value| *value != 0.0) && is_new {
-                all.push(self.place("a body that stands elsewhere", option, |placing| {
-                    placing.origin = origin;
-                }));
+                let mut reading = how.clone();
+                reading.placing.origin = origin;
+                let words = "a body that stands elsewhere".into();
+                all.push(Hypothesis { option, words, reading, parameter: None });
             }
         }
     }

@@ -30,7 +30,7 @@ pub(super) fn settings(selection: &Selection, options: &ScoreOptions) -> Value {
             "time_unit": options.time_unit,
             "axes": options.axes.iter().map(|axis| ["x", "y", "z"][*axis]).collect::<Vec<_>>(),
             "inside": options.inside,
-            "velocity_lag": options.velocity_lag,
+            "velocity_lag": lag(&options.velocity_lag),
             "periods": options.periods,
         },
     });
@@ -62,6 +62,14 @@ pub(super) fn findings<'a>(rows: impl Iterator<Item = (&'a String, &'a [Remark])
         }
     }
     all.into()
+}
+
+/// One number for all recordings, or a list.
+fn lag(lags: &[f64]) -> Value {
+    match lags {
+        [one] => json!(one),
+        _ => json!(lags),
+    }
 }
 
 pub(super) fn document(selection: &Selection, options: &ScoreOptions, score: &Score) -> Value {

@@ -17,9 +17,10 @@ pub(super) fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
                 if !options.each
                     && values != options.files.len()
                     && is_frame(file)
+                    // Those before the last one have been found to be like it.
                     && frames
-                        .iter()
-                        .all(|frame| is_frame(frame) && frame.parent() == file.parent()) =>
+                        .last()
+                        .is_some_and(|frame| is_frame(frame) && frame.parent() == file.parent()) =>
             {
                 frames.push(file.clone());
             }
@@ -36,10 +37,14 @@ pub(super) fn inputs(options: &ScoreOptions) -> Result<Vec<Input>> {
         (None, Some(h)) => Resolution::Length(*h),
         (None, None) => Resolution::Estimated,
     };
+    let lags = options.velocity_lag.len();
+    if lags > 1 && lags != recordings.len() {
+        bail!("--velocity-lag has {lags} value(s) for {}", listed(&recordings));
+    }
     let input = |(index, paths)| Input {
         paths,
         resolution: resolution(index),
-        velocity_lag: options.velocity_lag,
+        velocity_lag: *options.velocity_lag.get(index).unwrap_or(&options.velocity_lag[0]),
     };
     Ok(recordings.into_iter().enumerate().map(input).collect())
 }

@@ -12,7 +12,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use mmsmith_runtime::Solution;
+use mmsmith_runtime::{Law, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
@@ -70,6 +70,11 @@ pub enum LawVerdict {
     Another,
     /// The field is not the right one, and none that is known.
     Unexplained,
+}
+
+/// Whether a body that is stretched in a plane has a stress across it.
+pub(super) fn has_lateral_stress(declared: Law<f64>) -> bool {
+    Known::<2>::new(declared).and_then(|known| known.lame).is_some_and(|lame| lame.lambda != 0.0)
 }
 
 /// What a file has at one particle.
