@@ -585,8 +585,8 @@ def score(
         solution: What `load` gave, a name, or the path of a specification.
         files: The recordings, one for each resolution: lists, folders, or files.
         each: Each file is a recording of its own.
-        map: Role of an array that has no usual name. Roles: displacement, velocity, deformation_gradient, first_piola_kirchhoff, cauchy,
-            kirchhoff, J, density, reference_position, id.
+        map: Role of an array that has no usual name. Roles: displacement, velocity, deformation_gradient, displacement_gradient,
+            first_piola_kirchhoff, cauchy, kirchhoff, J, density, reference_position, id.
         points: Meaning of the points in the files. Default: auto.
             `auto`: Reference positions if they stay while displacements change, else current ones.
             `current`: Current positions.

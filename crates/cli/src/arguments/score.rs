@@ -24,7 +24,7 @@ pub(crate) struct ScoreOptions {
     /// Each file is a recording of its own
     #[arg(long)]
     pub(crate) each: bool,
-    /// Role of an array that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient,
+    /// Role of an array that has no usual name; repeatable. Roles: displacement, velocity, deformation_gradient, displacement_gradient,
     /// first_piola_kirchhoff, cauchy, kirchhoff, J, density, reference_position, id
     #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
     pub(crate) map: Vec<(verify::Role, String)>,

@@ -14,7 +14,6 @@ use crate::points;
 use super::arrays::{Chosen, Role, matrices, vectors};
 use super::error::ScoreError;
 use super::findings::Remarks;
-use super::law;
 use super::options::{Exchange, ScoreOptions};
 use super::place::Place;
 use super::reference::{Scheme, Traced};
@@ -151,6 +150,8 @@ pub(super) struct FrameReader<'a, const D: usize> {
     pub(super) options: &'a ScoreOptions,
     pub(super) has_velocity_times: bool,
     pub(super) velocity_lag: f64,
+    /// Whether a body that is stretched in a plane has a stress across it.
+    pub(super) has_lateral_stress: bool,
     pub(super) remarks: &'a mut Remarks,
     pub(super) first: Identities,
 }
@@ -483,7 +484,7 @@ impl<const D: usize> FrameReader<'_, D> {
             && is_first_plane
             && rows().all(|row| row[zz] == 0.0)
             && rows().any(is_stressed)
-            && law::has_lateral_stress(self.exact.law())
+            && self.has_lateral_stress
         {
             let what = format!(
                 "array `{}` has no zz component, which is not zero in plane strain: it is not compared; is plane stress computed?",

@@ -26,6 +26,7 @@ mod reference;
 mod row;
 mod scales;
 mod shuffled;
+mod staggered;
 mod times;
 mod vectors;
 
@@ -109,7 +110,7 @@ where
     }
     conclude(&mut rows, &verdict);
     let of_v = verdict.fields.get(&Quantity::Velocity).and_then(|norms| norms.l2.finest);
-    if let Some(message) = lag::told(&rows, of_v) {
+    if let Some(message) = staggered::told(&rows, of_v) {
         let remark =
             Remark { kind: "velocity-lag", is_problem: false, count: 1, frames: 0, message };
         rows[0].findings.push(remark);

@@ -74,6 +74,7 @@ impl<const D: usize> Opened<D> {
             options,
             has_velocity_times: self.has_velocity_times,
             velocity_lag: self.velocity_lag,
+            has_lateral_stress: law::has_lateral_stress(exact.law()),
             remarks,
             first: Identities::default(),
         }
