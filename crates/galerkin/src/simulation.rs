@@ -101,6 +101,10 @@ impl<const D: usize> TotalLagrangian<D> {
         time_step: f64,
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+        let law = law.into();
+        if matches!(law, Law::WithMemory(_)) {
+            return Err(SetupError::WithMemory);
+        }
         check(&grid, &scheme, density, time_step)?;
         reserve(&grid, scheme.degree)?;
         let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
@@ -155,7 +159,7 @@ impl<const D: usize> TotalLagrangian<D> {
             b: vec![SVector::zeros(); particles.len()],
             grid,
             scheme,
-            law: law.into(),
+            law,
             time_step,
             operators: Operators { bases, mass, fits },
             particles,
@@ -468,6 +472,8 @@ impl<const D: usize> TotalLagrangian<D> {
                 }
             }
             Law::Own(law) => self.stress(OwnRows(law), force),
+            // Refused at the start.
+            Law::WithMemory(_) => true,
         };
         if bad {
             return Err(self.describe());
@@ -843,6 +849,7 @@ fn particles<const D: usize>(grid: &Grid<D>, lines: &[Line; D], density: f64) ->
         half_size: SVector::from_fn(|k, _| grid.axes[k].spacing() / (2.0 * grid.per_cell as f64)),
         X,
         volume,
+        ..Particles::default()
     }
 }
 

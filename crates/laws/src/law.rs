@@ -7,6 +7,7 @@ use mmsmith_lanes::tensor::{product, real};
 use mmsmith_vocabulary::{Material, Moduli, Term};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
+use super::memory::{AtRest, InternalVariable, LawWithMemory};
 use super::{BLOCK, SIDE_BY_SIDE, Stressed, jacobian};
 
 /// The stress of a law that the caller brings, for particles in blocks.
@@ -39,6 +40,8 @@ pub enum Law<T, const D: usize> {
     Library(Material<T>),
     /// A law that the caller brings.
     Own(Arc<dyn ConstitutiveLaw<T, D>>),
+    /// A law with internal variables. Functions of F alone tell its response to a sudden change from rest.
+    WithMemory(Arc<dyn LawWithMemory<T, D>>),
 }
 
 impl<T, const D: usize> From<Material<T>> for Law<T, D> {
@@ -52,16 +55,39 @@ impl<T, const D: usize> Law<T, D> {
     pub fn from_constitutive(law: impl ConstitutiveLaw<T, D> + 'static) -> Self {
         Self::Own(Arc::new(law))
     }
+
+    /// A law with internal variables.
+    pub fn with_memory(law: impl LawWithMemory<T, D> + 'static) -> Self {
+        Self::WithMemory(Arc::new(law))
+    }
+
+    /// The internal variables of a particle; none for elastic laws.
+    #[must_use]
+    pub fn variables(&self) -> Vec<InternalVariable> {
+        match self {
+            Self::WithMemory(law) => law.variables(),
+            Self::Library(_) | Self::Own(_) => Vec::new(),
+        }
+    }
 }
 
 /// Every function takes the deformation gradient F and returns `None` where it is not a deformation: J <= 0, or an entry that is
 /// not finite.
 impl<T: Stressed<D>, const D: usize> Law<T, D> {
+    /// `work` with a law that is not one of the library.
+    fn of_caller<R>(&self, work: impl FnOnce(&dyn ConstitutiveLaw<T, D>) -> R) -> Option<R> {
+        match self {
+            Self::Library(_) => None,
+            Self::Own(law) => Some(work(law.as_ref())),
+            Self::WithMemory(law) => Some(work(&AtRest(law.as_ref()))),
+        }
+    }
+
     /// Kirchhoff stress `tau = J sigma = P F^T`.
     pub fn kirchhoff(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
         match self {
             Self::Library(material) => T::kirchhoff(material, F),
-            Self::Own(_) => Some(product(&self.first_piola_kirchhoff(F)?, &F.transpose())),
+            _ => Some(product(&self.first_piola_kirchhoff(F)?, &F.transpose())),
         }
     }
 
@@ -69,13 +95,13 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     pub fn first_piola_kirchhoff(&self, F: &SMatrix<T, D, D>) -> Option<SMatrix<T, D, D>> {
         match self {
             Self::Library(material) => T::first_piola_kirchhoff(material, F),
-            Self::Own(law) => {
+            _ => self.of_caller(|law| {
                 jacobian(F)?;
                 let block = array::from_fn(|i| array::from_fn(|j| [F[(i, j)]; BLOCK]));
                 let mut P = [[[T::zero(); BLOCK]; D]; D];
                 law.first_piola_kirchhoff(&block, &mut P);
                 Some(SMatrix::from_fn(|i, j| P[i][j][0]))
-            }
+            })?,
         }
     }
 
@@ -89,21 +115,23 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     ) {
         match self {
             Self::Library(material) => T::first_piola_kirchhoff_side_by_side(material, F, P),
-            Self::Own(law) => {
-                let mut block = BlockOfStresses::at_rest();
-                for n in 0..SIDE_BY_SIDE {
-                    block.set(n, &SMatrix::from_fn(|i, j| F[i][j][n]));
-                }
-                block.evaluate(law.as_ref());
-                for n in 0..SIDE_BY_SIDE {
-                    let stress = block.stress(n);
-                    for i in 0..D {
-                        for j in 0..D {
-                            P[i][j][n] = stress[(i, j)];
+            _ => self
+                .of_caller(|law| {
+                    let mut block = BlockOfStresses::at_rest();
+                    for n in 0..SIDE_BY_SIDE {
+                        block.set(n, &SMatrix::from_fn(|i, j| F[i][j][n]));
+                    }
+                    block.evaluate(law);
+                    for n in 0..SIDE_BY_SIDE {
+                        let stress = block.stress(n);
+                        for i in 0..D {
+                            for j in 0..D {
+                                P[i][j][n] = stress[(i, j)];
+                            }
                         }
                     }
-                }
-            }
+                })
+                .unwrap_or_default(),
         }
     }
 
@@ -132,12 +160,12 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
         jacobian(F)?;
         match self {
             Self::Library(material) => Some(T::kirchhoff_in_space(material, F)),
-            Self::Own(law) => {
+            _ => self.of_caller(|law| {
                 let across = law.kirchhoff_across(F).unwrap_or_else(T::zero);
                 let mut in_space = Matrix3::from_diagonal_element(across);
                 in_space.fixed_view_mut::<D, D>(0, 0).copy_from(&self.kirchhoff(F)?);
                 Some(in_space)
-            }
+            })?,
         }
     }
 
@@ -153,10 +181,10 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     pub fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         match self {
             Self::Library(material) => T::strain_energy(material, F),
-            Self::Own(law) => {
+            _ => self.of_caller(|law| {
                 jacobian(F)?;
                 law.strain_energy(F)
-            }
+            })?,
         }
     }
 
@@ -185,7 +213,7 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     pub fn lame_constants(&self) -> Option<(T, T)> {
         match self {
             Self::Library(material) => material.moduli().map(values),
-            Self::Own(_) => None,
+            Self::Own(_) | Self::WithMemory(_) => None,
         }
     }
 

@@ -15,6 +15,7 @@ mod holzapfel_gasser_ogden;
 mod isochoric;
 mod law;
 mod linear_elastic;
+mod memory;
 mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
@@ -33,6 +34,9 @@ use nalgebra::{Matrix3, RealField, SMatrix};
 #[doc(hidden)]
 pub use law::BlockOfStresses;
 pub use law::{ConstitutiveLaw, Law, LawCheck};
+#[doc(hidden)]
+pub use memory::BlockWithMemory;
+pub use memory::{Increment, InternalVariable, LawWithMemory};
 pub use mmsmith_vocabulary::{Material, Volumetric};
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};

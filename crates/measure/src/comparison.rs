@@ -534,6 +534,7 @@ mod tests {
                 volume: vec![1.0; count],
                 half_size: [0.1; 2].into(),
                 X,
+                ..Particles::default()
             };
             let u: Vec<_> = particles.X.iter().map(|X| exact.displacement(X, 0.0)).collect();
             particles.x.iter_mut().zip(&u).for_each(|(x, u)| *x += u);

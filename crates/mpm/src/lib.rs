@@ -54,7 +54,7 @@
 //!
 //! ```
 //! use mmsmith_mpm::{
-//!     BLOCK, ConstitutiveLaw, Grid, Integrator, Law, Particles, Settings, Shape, Simulation, Transfer,
+//!     BLOCK, ConstitutiveLaw, Increment, InternalVariable, Grid, Integrator, Law, Particles, Settings, Shape, Simulation, Transfer,
 //! };
 //! use nalgebra::{Matrix1, Vector1, vector};
 //! use std::f64::consts::PI;
@@ -166,7 +166,8 @@ pub use mmsmith_lanes::simd::Registers;
 #[doc(hidden)]
 pub use mmsmith_laws::fault;
 pub use mmsmith_laws::{
-    BLOCK, ConstitutiveLaw, Law, LawCheck, Material, SIDE_BY_SIDE, Stressed, Volumetric,
+    BLOCK, ConstitutiveLaw, Increment, InternalVariable, Law, LawCheck, LawWithMemory, Material,
+    SIDE_BY_SIDE, Stressed, Volumetric,
 };
 #[doc(hidden)]
 pub use parallel::chunks::{each, each_chunk};

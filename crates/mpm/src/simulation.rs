@@ -15,11 +15,12 @@ use crate::error::{SetupError, StepError};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::grid::{Grid, Layout};
-use crate::kernel::block::{BlockLaw, OwnBlocks};
+use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
 use crate::particles::body::Body;
+use crate::particles::columns::Shares;
 use crate::particles::mesh::{Interpolation, Mesh};
 use crate::processes::decomposition::{Arrangement, Part, Share, admit};
 use crate::scheme::{Settings, Shape, Taken};
@@ -289,6 +290,7 @@ fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn BlockLaw<T, D
     let material = match law {
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
+        Law::WithMemory(law) => return Box::new(MemoryBlocks::new(law.clone())),
     };
     // One law has kernels of its own; those of `AnyLaw` serve every law.
     if let Material::NeoHookean { lambda, mu } = material {
@@ -326,7 +328,7 @@ fn check<T: Lanes, const D: usize>(
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
     let Body { particles, half_edges, mesh } = body;
-    let Particles { X, x, v, F, mass, volume, half_size } = particles;
+    let Particles { X, x, v, F, mass, volume, half_size, affine: _, internal: _ } = particles;
     let expected = X.len();
     let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
     for (array, found) in [
@@ -416,7 +418,16 @@ fn allocate<T: Lanes, const D: usize>(
     if shape == Shape::Cpdi && body.half_edges.is_empty() {
         body.half_edges = vec![SMatrix::from_diagonal(&body.particles.half_size); count];
     }
-    let (support, particles) = Support::new(shape, body, grid.spacing);
+    let (support, mut particles) = Support::new(shape, body, grid.spacing);
+    let affine = if transfer.is_affine() { count } else { 0 };
+    particles.affine = vec![SMatrix::zeros(); affine];
+    let at_rest = law.at_rest();
+    let (found, expected) = (particles.internal.len(), count * at_rest.len());
+    if found == 0 {
+        particles.internal = at_rest.repeat(count);
+    } else if found != expected {
+        return Err(SetupError::LengthMismatch { array: "internal", found, expected });
+    }
     let fused = is_fused(integrator, transfer);
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
@@ -472,6 +483,7 @@ fn allocate<T: Lanes, const D: usize>(
         constants: Constants::new(grid, &layout, &bins, settings.time_step, least_mass),
         nodes: now,
         F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
+        internal_early: if early { particles.internal.clone() } else { Vec::new() },
         reprojected,
         next,
         is_ahead: false,
@@ -484,7 +496,13 @@ fn allocate<T: Lanes, const D: usize>(
             integrator.reprojects(),
         ),
         of_time: Vec::new(),
-        affine: Vec::new(),
+        shares: Shares {
+            x: 1,
+            v: 1,
+            F: 1,
+            affine: transfer.is_affine().into(),
+            internal: law.at_rest().len(),
+        },
         particles,
         support,
         law,

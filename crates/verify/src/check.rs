@@ -474,7 +474,7 @@ where
                 // Energies of the library are formed from H; text may take a difference of large terms.
                 let terms = match law {
                     Law::Library(_) => own.H.amax(),
-                    Law::Own(_) => 1.0 + own.H.amax(),
+                    Law::Own(_) | Law::WithMemory(_) => 1.0 + own.H.amax(),
                 };
                 let difference = (energy - expected).abs();
                 W.add(at, difference, rounding * terms, strain * own.H.amax());

@@ -141,7 +141,7 @@ impl<const D: usize> Totals<D> {
     where
         f64: Precision<D>,
     {
-        let Particles { X, x, v, F, mass, volume, half_size } = particles;
+        let Particles { X, x, v, F, mass, volume, half_size, .. } = particles;
         let here = Particles {
             X: homes.bring(X),
             x: homes.bring(x),
@@ -150,6 +150,7 @@ impl<const D: usize> Totals<D> {
             mass: homes.bring(mass),
             volume: homes.bring(volume),
             half_size: *half_size,
+            ..Particles::default()
         };
         let groups = Self::of_groups(&here, law, exact, time, velocity_time);
         let own: Vec<f64> = groups.iter().flat_map(Self::numbers).collect();

@@ -14,9 +14,9 @@ use nalgebra::RealField;
 use crate::grid::Layout;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
+use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks};
 use crate::parallel::coloring::Shared;
-use crate::parallel::disjoint::Arrays;
+use crate::parallel::disjoint::Partition;
 use crate::scheme::{Taken, Transfer};
 
 /// How the grid is updated after P2G.
@@ -246,16 +246,16 @@ where
     }
 
     /// Calls `add` for every bin, as [`Bins::for_each_mut`], and updates the nodes.
-    pub(crate) fn g2p2g<A: Send, B: Send, C: Send, E: Send>(
+    pub(crate) fn g2p2g<'b, P: Sync>(
         &self,
-        bins: &mut Bins,
+        bins: &'b mut Bins,
         nodes: &mut [Node<T, D>],
-        arrays: Arrays<'_, A, B, C, E>,
-        add: &UpdateAndAdd<'_, Node<T, D>, A, B, C, E>,
+        divide: impl FnOnce(&'b mut Partition) -> P,
+        add: &(dyn Fn(&mut [Node<T, D>], usize, u32, &P, usize) + Sync),
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
-            bins.for_each_mut(self.layout, nodes, hooks, arrays, add)
+            bins.for_each_mut(self.layout, nodes, hooks, divide, add);
         });
     }
 

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
-use mmsmith_lanes::tensor::product;
-use mmsmith_laws::{BlockOfStresses, ConstitutiveLaw, LibraryLaw};
+use mmsmith_lanes::tensor::{product, real};
+use mmsmith_laws::{
+    BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory, LibraryLaw,
+};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
@@ -19,14 +21,31 @@ use crate::kernel::shared::FromCorners;
 
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
-    /// Sets the stress fluxes of particles with deformation gradients `F`, for the reference volumes in
+    /// Sets the stress fluxes of particles with deformation gradients `F` and these internal variables, for the reference volumes in
     /// `contributions.volume`.
     fn stress(
         &self,
         c: &Constants<T, D>,
         F: &[SMatrix<T, D, D>; BLOCK],
+        internal: &[T],
         contributions: &mut Contributions<T, D, BLOCK>,
     );
+
+    /// The internal variables of a particle at rest; none for elastic laws.
+    fn at_rest(&self) -> &[T] {
+        &[]
+    }
+
+    /// Advances the internal variables of no more than a block of particles, whose deformation gradient goes from `start` to `end` in a
+    /// time.
+    fn evolve(
+        &self,
+        _time: T,
+        _start: &[SMatrix<T, D, D>],
+        _end: &[SMatrix<T, D, D>],
+        _internal: &mut [T],
+    ) {
+    }
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
@@ -34,6 +53,7 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
         &self,
         c: &Constants<T, D>,
         F: &[SMatrix<T, D, D>; BLOCK],
+        _: &[T],
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
         dispatch(Stress { F, c, law: *self, contributions });
@@ -153,6 +173,7 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
         &self,
         c: &Constants<T, D>,
         F: &[SMatrix<T, D, D>; BLOCK],
+        _: &[T],
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
         let mut block = BlockOfStresses::at_rest();
@@ -165,6 +186,54 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
             let tau = c.planted.stress_in_forces(tau, F);
             contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
         }
+    }
+}
+
+/// A law with memory, for blocks of particles.
+pub(crate) struct MemoryBlocks<T, const D: usize> {
+    law: Arc<dyn LawWithMemory<T, D>>,
+    variables: Vec<InternalVariable>,
+    at_rest: Vec<T>,
+}
+
+impl<T: Lanes, const D: usize> MemoryBlocks<T, D> {
+    pub(crate) fn new(law: Arc<dyn LawWithMemory<T, D>>) -> Self {
+        let variables = law.variables();
+        let at_rest = variables.iter().map(|variable| real(variable.at_rest)).collect();
+        Self { law, variables, at_rest }
+    }
+}
+
+impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
+    fn stress(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        internal: &[T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        let mut block = BlockWithMemory::at_rest(&self.variables);
+        let stress = block.stresses(self.law.as_ref(), F, internal);
+        for (n, F) in F.iter().enumerate() {
+            let tau = product(&stress(n), &F.transpose());
+            let tau = c.planted.stress_in_forces(tau, F);
+            contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
+        }
+    }
+
+    fn at_rest(&self) -> &[T] {
+        &self.at_rest
+    }
+
+    fn evolve(
+        &self,
+        time: T,
+        start: &[SMatrix<T, D, D>],
+        end: &[SMatrix<T, D, D>],
+        internal: &mut [T],
+    ) {
+        let mut block = BlockWithMemory::at_rest(&self.variables);
+        block.evolve(self.law.as_ref(), start, end, time, internal);
     }
 }
 
@@ -245,7 +314,7 @@ pub(super) mod tests {
                 });
                 let mut contributions = Contributions::<f64, D, BLOCK>::zero();
                 contributions.volume = array::from_fn(|k| 1.0 + 0.5 * noise(k));
-                law.stress(&c, &F, &mut contributions);
+                law.stress(&c, &F, &[], &mut contributions);
                 for k in 0..BLOCK {
                     let expected =
                         -law.kirchhoff(&F[k]) * (contributions.volume[k] * c.inverse_spacing);

@@ -24,17 +24,17 @@ pub(crate) fn successive(first: usize) -> [u32; BLOCK] {
 pub(crate) struct Copies<T, const D: usize> {
     /// Positions.
     pub(crate) x: [SVector<T, D>; BLOCK],
-    /// Velocities.
-    pub(crate) v: [SVector<T, D>; BLOCK],
     /// Deformation gradients.
     pub(crate) F: [SMatrix<T, D, D>; BLOCK],
+    /// Internal variables, those of a particle one after the other.
+    pub(crate) internal: Vec<T>,
 }
 
 impl<T: Lanes, const D: usize> Copies<T, D> {
     pub(crate) fn new() -> Self {
         // The identity has a stress in every law.
         let zero = [SVector::zeros(); BLOCK];
-        Self { x: zero, v: zero, F: [SMatrix::identity(); BLOCK] }
+        Self { x: zero, F: [SMatrix::identity(); BLOCK], internal: Vec::new() }
     }
 
     pub(crate) fn kinematics(&self) -> Kinematics<'_, T, D> {
@@ -53,6 +53,15 @@ impl<T: Lanes, const D: usize> Copies<T, D> {
     pub(crate) fn pick_F(&mut self, ids: &[u32], F: &[SMatrix<T, D, D>]) {
         for (own, &p) in self.F.iter_mut().zip(ids) {
             *own = F[p as usize];
+        }
+    }
+
+    /// Takes the internal variables of the particles `ids`, so many of each.
+    pub(crate) fn pick_internal(&mut self, ids: &[u32], internal: &[T], variables: usize) {
+        self.internal.clear();
+        if variables > 0 {
+            let of = |&p: &u32| &internal[p as usize * variables..][..variables];
+            self.internal.extend(ids.iter().flat_map(of));
         }
     }
 

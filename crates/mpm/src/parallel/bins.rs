@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
 use crate::parallel::chunks::on_all_threads;
 use crate::parallel::coloring::{ColoredBands, Held, Schedule, Shared, count};
-use crate::parallel::disjoint::{Arrays, PartElements, Partition};
+use crate::parallel::disjoint::Partition;
 
 /// Rows in a bin, in two and three dimensions.
 const BIN_HEIGHT: usize = 8;
@@ -112,11 +112,6 @@ pub(crate) struct Bins {
 /// Adds the particles of one bin to the nodes: `add(band, first, ids)`, with the band of the node array, the index of its first
 /// node, and the particles in order.
 pub(crate) type AddToBand<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
-
-/// As [`AddToBand`] for kernels that change particles: `add(band, first, bin, elements)`, with the bin's number and its
-/// particles' elements of four arrays.
-pub(crate) type UpdateAndAdd<'a, N, A, B, C, E> =
-    dyn Fn(&mut [N], usize, u32, PartElements<'_, A, B, C, E>) + Sync + 'a;
 
 /// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
 #[derive(Clone, Copy)]
@@ -276,33 +271,22 @@ impl Bins {
         });
     }
 
-    /// As [`for_each`](Self::for_each) for kernels that change the bin's elements of four arrays. Does nothing where the
-    /// particles have not been sorted.
-    pub(crate) fn for_each_mut<N, A, B, C, E, const D: usize>(
-        &mut self,
+    /// As [`for_each`](Self::for_each) for kernels that change the bin's particles: `divide(partition)` divides them among bins, and
+    /// `add(band, first, bin, divided, part)` finds those of the bin there.
+    pub(crate) fn for_each_mut<'a, N: Send, P: Sync, const D: usize>(
+        &'a mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
         hooks: NodeHooks<'_, N>,
-        arrays: Arrays<'_, A, B, C, E>,
-        add: &UpdateAndAdd<'_, N, A, B, C, E>,
-    ) where
-        N: Send,
-        A: Send,
-        B: Send,
-        C: Send,
-        E: Send,
-    {
+        divide: impl FnOnce(&'a mut Partition) -> P,
+        add: &(dyn Fn(&mut [N], usize, u32, &P, usize) + Sync),
+    ) {
         let Self { rows, held, order, schedule, .. } = self;
         let start = held.bands.start;
-        let Some(elements) = order.elements(arrays) else {
-            debug_assert!(false, "particles that are not sorted");
-            return;
-        };
+        let divided = divide(order);
         let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
         for_each_band(*rows, bands, hooks, &|band, first, bin| {
-            if let Some(elements) = elements.take(bin - start) {
-                add(band, first, bin as u32, elements);
-            }
+            add(band, first, bin as u32, &divided, bin - start);
         });
     }
 }
@@ -494,15 +478,12 @@ mod tests {
                 assert_eq!(sum, if lowest { 101 } else { 102 }, "{node}");
             }
             let mut seen = vec![0; layout.nodes];
-            let [mut a, mut b, mut c, mut e] = [[0_u8; 0]; 4];
-            let empty = (&mut a[..], &mut b[..], &mut c[..], &mut e[..]);
-            let add =
-                |band: &mut [i32], first: usize, bin: u32, _: PartElements<'_, u8, u8, u8, u8>| {
-                    assert_eq!(first, bin as usize * height * row);
-                    assert!((bin as usize) < count);
-                    band.iter_mut().for_each(|node| *node += 1);
-                };
-            bins.for_each_mut(&layout, &mut seen, hooks, empty, &add);
+            let add = |band: &mut [i32], first: usize, bin: u32, (): &(), _: usize| {
+                assert_eq!(first, bin as usize * height * row);
+                assert!((bin as usize) < count);
+                band.iter_mut().for_each(|node| *node += 1);
+            };
+            bins.for_each_mut(&layout, &mut seen, hooks, |_| (), &add);
             assert_eq!(seen, nodes);
         }
         check([1100]);

@@ -25,39 +25,6 @@ pub fn each<A: Send>(pieces: Vec<A>, work: &(dyn Fn(A) + Sync)) {
     pieces.into_par_iter().with_max_len(1).for_each(work);
 }
 
-/// A chunk of each of four arrays.
-pub(crate) struct ChunkOfFour<'a, A, B, C, E> {
-    pub(crate) number: usize,
-    pub(crate) a: &'a mut [A],
-    pub(crate) b: &'a mut [B],
-    pub(crate) c: &'a mut [C],
-    /// Empty where the whole array is.
-    pub(crate) e: &'a mut [E],
-}
-
-/// The body of a loop over chunks of four arrays.
-type OfFour<'a, A, B, C, E> = dyn Fn(ChunkOfFour<'_, A, B, C, E>) + Sync + 'a;
-
-/// As [`each_chunk`] for four arrays of one length, chunk by chunk together; the last one may be empty.
-pub(crate) fn each_chunk_of_four<A: Send, B: Send, C: Send, E: Send>(
-    (a, b, c, e): (&mut [A], &mut [B], &mut [C], &mut [E]),
-    size: usize,
-    work: &OfFour<'_, A, B, C, E>,
-) {
-    let mut of_e = e.chunks_mut(size);
-    let chunks = a.chunks_mut(size).zip(b.chunks_mut(size)).zip(c.chunks_mut(size)).enumerate();
-    let chunks: Vec<_> = chunks
-        .map(|(number, ((a, b), c))| ChunkOfFour {
-            number,
-            a,
-            b,
-            c,
-            e: of_e.next().unwrap_or_default(),
-        })
-        .collect();
-    each(chunks, &|chunk| work(chunk));
-}
-
 /// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.
 pub(crate) fn on_all_threads(work: &(dyn Fn((usize, usize)) + Sync)) {
     let threads = rayon::current_num_threads();

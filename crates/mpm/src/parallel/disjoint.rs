@@ -1,12 +1,13 @@
-//! Disjoint mutable access by index sets: each part of a partition changes its own elements on a thread of its own.
+//! Disjoint mutable access by index sets: each part of a partition changes its own elements of a column on a thread of its own.
 //!
-//! The elements of a part lie scattered over their arrays, so borrowing alone cannot tell that parts do not overlap. The
-//! safety argument is in this file: a [`Partition`] grants access after it has checked that no index occurs twice, and
-//! hands out each part once.
+//! The elements of a part lie scattered over the column, so borrowing alone cannot tell that parts do not overlap. The
+//! safety argument is in this file: a [`Partition`] grants access after it has checked that no index occurs twice, and each
+//! column hands out each part once.
 
 #![allow(unsafe_code, reason = "scattered elements of one array, changed by several threads")]
 
 use std::marker::PhantomData;
+use std::slice;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The indices 0 to n - 1, each in one of several parts, in an order that matters.
@@ -20,8 +21,6 @@ pub(crate) struct Partition {
     checked: bool,
     /// Buffer of the check: one bit for each index that was met.
     seen: Vec<u64>,
-    /// For each part whether it was handed out.
-    taken: Vec<AtomicBool>,
 }
 
 impl Partition {
@@ -32,7 +31,6 @@ impl Partition {
             starts: vec![0; parts + 1],
             checked: false,
             seen: vec![0; count.div_ceil(64)],
-            taken: (0..parts).map(|_| AtomicBool::new(false)).collect(),
         }
     }
 
@@ -73,119 +71,147 @@ impl Partition {
         ascending && whole && !twice
     }
 
-    /// Mutable access to four arrays, part by part; `None` where an index is in no part or in two, or where the arrays have
-    /// another length than the partition. The fourth one may be empty.
-    pub(crate) fn elements<'a, A, B, C, E>(
-        &'a mut self,
-        (a, b, c, e): Arrays<'a, A, B, C, E>,
-    ) -> Option<DisjointElements<'a, A, B, C, E>> {
-        let count = self.order.len();
-        let lengths = [a.len(), b.len(), c.len()];
-        let fits = lengths == [count; 3] && (e.is_empty() || e.len() == count);
-        if !self.is_whole() || !fits {
-            return None;
-        }
-        self.taken.iter_mut().for_each(|taken| *taken.get_mut() = false);
-        let fourth = (!e.is_empty()).then_some(e.as_mut_ptr());
-        let firsts = (a.as_mut_ptr(), b.as_mut_ptr(), c.as_mut_ptr(), fourth);
-        Some(DisjointElements { partition: self, firsts, borrowed: PhantomData })
+    /// The partition as columns are divided by it; `None` where an index is in no part or in two.
+    pub(crate) fn whole(&mut self) -> Option<WholePartition<'_>> {
+        self.is_whole().then_some(WholePartition(self))
     }
 }
 
-/// Four arrays of one length; the last one may be empty.
-pub(crate) type Arrays<'a, A, B, C, E> = (&'a mut [A], &'a mut [B], &'a mut [C], &'a mut [E]);
+/// A partition that has every index once, and stays as it is.
+#[derive(Clone, Copy)]
+pub(crate) struct WholePartition<'a>(&'a Partition);
 
-/// Where they begin.
-type Firsts<A, B, C, E> = (*mut A, *mut B, *mut C, Option<*mut E>);
+impl<'a> WholePartition<'a> {
+    /// The partition.
+    pub(crate) fn partition(self) -> &'a Partition {
+        self.0
+    }
 
-/// The arrays, borrowed until all parts are done.
-type Borrowed<'a, A, B, C, E> = PhantomData<Arrays<'a, A, B, C, E>>;
+    /// Mutable access to a column, part by part. Each index has as many successive elements as the others, its share, which may be none;
+    /// `None` where the length is no multiple of the number of indices.
+    pub(crate) fn column<E>(self, elements: &'a mut [E]) -> Option<DisjointColumn<'a, E>> {
+        let count = self.0.order.len();
+        let share = elements.len().checked_div(count).unwrap_or(0);
+        if share * count != elements.len() {
+            return None;
+        }
+        let taken = (1..self.0.starts.len()).map(|_| AtomicBool::new(false)).collect();
+        let first = elements.as_mut_ptr();
+        Some(DisjointColumn { partition: self.0, share, first, taken, borrowed: PhantomData })
+    }
+}
 
-/// Four arrays whose elements belong to the parts of a partition.
-pub(crate) struct DisjointElements<'a, A, B, C, E> {
+/// A column whose elements belong to the parts of a partition.
+pub(crate) struct DisjointColumn<'a, E> {
     partition: &'a Partition,
-    firsts: Firsts<A, B, C, E>,
-    borrowed: Borrowed<'a, A, B, C, E>,
+    /// How many elements each index has.
+    share: usize,
+    first: *mut E,
+    /// For each part whether it was handed out.
+    taken: Box<[AtomicBool]>,
+    borrowed: PhantomData<&'a mut [E]>,
 }
 
 // SAFETY: threads reach parts through a shared reference, and each part is taken by one of them; parts give exclusive
 // references to elements, for which `Send` is the requirement.
-unsafe impl<A: Send, B: Send, C: Send, E: Send> Sync for DisjointElements<'_, A, B, C, E> {}
+unsafe impl<E: Send> Sync for DisjointColumn<'_, E> {}
 
-impl<'a, A, B, C, E> DisjointElements<'a, A, B, C, E> {
+impl<E> DisjointColumn<'_, E> {
     /// The elements of a part: once, then `None`, as for a part that does not exist.
-    pub(crate) fn take(&self, part: usize) -> Option<PartElements<'_, A, B, C, E>> {
+    pub(crate) fn take(&self, part: usize) -> Option<PartColumn<'_, E>> {
         let indices = self.partition.part(part)?;
-        let first = !self.partition.taken.get(part)?.swap(true, Ordering::Relaxed);
-        first.then_some(PartElements { indices, firsts: self.firsts, borrowed: PhantomData })
+        let is_first = !self.taken.get(part)?.swap(true, Ordering::Relaxed);
+        let &Self { share, first, .. } = self;
+        is_first.then_some(PartColumn { indices, share, first, borrowed: PhantomData })
     }
 }
 
-/// The elements of one part in four arrays.
-pub(crate) struct PartElements<'a, A, B, C, E> {
+/// The elements of a column that belong to one part.
+pub(crate) struct PartColumn<'a, E> {
     indices: &'a [u32],
-    firsts: Firsts<A, B, C, E>,
-    borrowed: Borrowed<'a, A, B, C, E>,
+    share: usize,
+    first: *mut E,
+    borrowed: PhantomData<&'a mut [E]>,
 }
 
-/// An element of each array, or several that lie side by side; none of an array that is empty.
-pub(crate) type Elements<'a, A, B, C, E> = (&'a mut A, &'a mut B, &'a mut C, Option<&'a mut E>);
+/// Successive indices, one after the other in a part.
+#[derive(Clone, Copy)]
+pub(crate) struct Run<'a> {
+    /// All indices of the part.
+    indices: &'a [u32],
+    first: u32,
+    count: usize,
+}
 
-/// As [`Elements`], `N` of each array.
-pub(crate) type Contiguous<'a, A, B, C, E, const N: usize> =
-    Elements<'a, [A; N], [B; N], [C; N], [E; N]>;
-
-impl<'a, A, B, C, E> PartElements<'a, A, B, C, E> {
-    /// The indices of its elements.
-    pub(crate) fn indices(&self) -> &'a [u32] {
-        self.indices
-    }
-
-    /// The `N` elements from `place` on in all arrays, if their indices are contiguous.
+impl<'a> Run<'a> {
+    /// The `count` indices of a part from `place` on, if each is the one before it and one.
     #[inline(always)]
-    pub(crate) fn contiguous<const N: usize>(
-        &mut self,
-        place: usize,
-    ) -> Option<Contiguous<'_, A, B, C, E, N>> {
-        let indices = self.indices.get(place..)?.first_chunk::<N>()?;
-        let first = *indices.first()?;
+    pub(crate) fn find(indices: &'a [u32], place: usize, count: usize) -> Option<Self> {
+        let run = indices.get(place..place.checked_add(count)?)?;
+        let first = *run.first()?;
         let mut apart = 0;
-        for (i, index) in indices.iter().enumerate() {
+        for (i, index) in run.iter().enumerate() {
             apart |= index ^ first.wrapping_add(i as u32);
         }
-        if apart != 0 {
-            return None;
+        (apart == 0).then_some(Self { indices, first, count })
+    }
+}
+
+impl<E> PartColumn<'_, E> {
+    /// The elements of a run, which lie side by side: none where the run is one of another part.
+    #[inline(always)]
+    pub(crate) fn run(&mut self, run: Run<'_>) -> &mut [E] {
+        if !std::ptr::eq(self.indices, run.indices) {
+            return &mut [];
         }
-        let (a, b, c, e) = self.firsts;
-        let first = first as usize;
-        // SAFETY: the elements are those of `N` indices of this part, for each of which the argument in `get` holds, and
+        let Run { first, count, .. } = run;
+        // SAFETY: the elements are those of `count` indices of this part, for each of which the argument in `get` holds, and
         // lie one after the other.
         unsafe {
-            Some((
-                &mut *a.add(first).cast::<[A; N]>(),
-                &mut *b.add(first).cast::<[B; N]>(),
-                &mut *c.add(first).cast::<[C; N]>(),
-                e.map(|e| &mut *e.add(first).cast::<[E; N]>()),
-            ))
+            let first = self.first.add(first as usize * self.share);
+            slice::from_raw_parts_mut(first, count * self.share)
         }
     }
 
-    /// Element `place` of the part in all arrays.
+    /// The elements of the index at a place of the part.
     ///
     /// # Panics
     ///
-    /// Panics where the part has no such element.
+    /// Panics where the part has no such place.
     #[inline(always)]
-    pub(crate) fn get(&mut self, place: usize) -> Elements<'_, A, B, C, E> {
+    pub(crate) fn get(&mut self, place: usize) -> &mut [E] {
         let index = self.indices[place] as usize;
-        let (a, b, c, e) = self.firsts;
-        // SAFETY: `Partition::elements` saw that every index is below the length of all arrays that have a first element here,
-        // which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so that nothing of
-        // this changes. `take` hands a part out once, so that this value alone reaches its elements, and `&mut self` lets
-        // one of them at a time be reached.
-        unsafe {
-            let e = e.map(|e| &mut *e.add(index));
-            (&mut *a.add(index), &mut *b.add(index), &mut *c.add(index), e)
+        // SAFETY: `Partition::whole` saw that every index is below the number of indices, of each of which the column has
+        // `share` elements, which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so
+        // that nothing of this changes. `take` hands a part out once, so that this value alone reaches its elements, and
+        // `&mut self` lets those of one of them at a time be reached.
+        unsafe { slice::from_raw_parts_mut(self.first.add(index * self.share), self.share) }
+    }
+}
+
+impl<E: Copy> PartColumn<'_, E> {
+    /// Copies the elements of so many indices from a place on, and gives how many they are.
+    #[inline(always)]
+    pub(crate) fn gather(&mut self, place: usize, count: usize, copies: &mut [E]) -> usize {
+        let share = self.share;
+        for k in 0..count {
+            match (share, copies.get_mut(k)) {
+                (1, Some(copy)) => *copy = self.get(place + k)[0],
+                _ => copies[k * share..(k + 1) * share].copy_from_slice(self.get(place + k)),
+            }
+        }
+        count * share
+    }
+
+    /// Copies back what [`gather`](Self::gather) copied, changed.
+    #[inline(always)]
+    pub(crate) fn scatter(&mut self, place: usize, count: usize, copies: &[E]) {
+        let share = self.share;
+        for k in 0..count {
+            match (share, copies.get(k)) {
+                (1, Some(copy)) => self.get(place + k)[0] = *copy,
+                _ => self.get(place + k).copy_from_slice(&copies[k * share..(k + 1) * share]),
+            }
         }
     }
 }
@@ -206,62 +232,66 @@ mod tests {
     #[test]
     fn parts_change_their_own_elements_side_by_side() {
         let mut partition = partition(&[4, 0, 2, 5, 1, 3], &[0, 2, 2, 6]);
-        let (mut a, mut b, mut c) = (vec![0_u32; 6], vec![0.0_f64; 6], vec![String::new(); 6]);
-        let mut e = [false; 6];
+        let (mut one, mut two, mut none) = (vec![0_u32; 6], vec![String::new(); 12], [0_u8; 0]);
         for round in 1..=2 {
-            // The fourth array is there in the second round only.
-            let of_round = if round == 1 { &mut [][..] } else { &mut e[..] };
-            let elements = partition.elements((&mut a, &mut b, &mut c, of_round)).unwrap();
+            let whole = partition.whole().unwrap();
+            let of_one = whole.column(&mut one).unwrap();
+            let of_two = whole.column(&mut two).unwrap();
+            let of_none = whole.column(&mut none).unwrap();
             std::thread::scope(|scope| {
                 for number in 0..3 {
-                    let elements = &elements;
+                    let (of_one, of_two, of_none) = (&of_one, &of_two, &of_none);
                     scope.spawn(move || {
-                        let mut part = elements.take(number).unwrap();
-                        for place in 0..part.indices().len() {
-                            let index = part.indices()[place];
-                            let (a, b, c, e) = part.get(place);
-                            assert_eq!(e.is_some(), round == 2);
-                            e.into_iter().for_each(|e| *e = !*e);
-                            *a += 10 * number as u32 + index;
-                            *b += f64::from(index);
-                            c.push_str(&index.to_string());
+                        let mut one = of_one.take(number).unwrap();
+                        let mut two = of_two.take(number).unwrap();
+                        assert!(of_none.take(number).unwrap().indices.iter().len() != 1);
+                        for place in 0..one.indices.len() {
+                            let index = one.indices[place];
+                            one.get(place)[0] += 10 * number as u32 + index;
+                            let [a, b] = two.get(place) else { panic!("two each") };
+                            a.push_str(&index.to_string());
+                            b.push('b');
                         }
                     });
                 }
             });
-            assert!(elements.take(0).is_none(), "a part is handed out once");
-            assert!(elements.take(3).is_none());
-            assert_eq!(a, [0, 21, 22, 23, 4, 25].map(|value| value * round));
+            assert!(of_one.take(0).is_none(), "a part is handed out once");
+            assert!(of_one.take(3).is_none());
+            assert_eq!(one, [0, 21, 22, 23, 4, 25].map(|value| value * round));
         }
-        assert_eq!(c[3], "33");
-        assert_eq!(e, [true; 6]);
+        assert_eq!((&*two[6], &*two[7]), ("33", "bb"));
     }
 
     /// Run under Miri too.
     #[test]
     fn contiguous_indices_lie_side_by_side() {
-        let mut partition = partition(&[3, 4, 5, 0, 1, 2, 6], &[0, 4, 7]);
-        let (mut a, mut b, mut c) = ([0; 7], [0.0; 7], [false; 7]);
-        let mut e = [0_u8; 7];
-        let elements = partition.elements((&mut a, &mut b, &mut c, &mut e)).unwrap();
-        let (mut first, mut second) = (elements.take(0).unwrap(), elements.take(1).unwrap());
-        let (x, y, z, w) = first.contiguous::<3>(0).unwrap();
-        (*x, *y, *z) = ([1, 2, 3], [0.5, 1.5, 2.5], [true; 3]);
-        *w.unwrap() = [7, 8, 9];
-        let (x, ..) = second.contiguous::<2>(0).unwrap();
-        *x = [4, 5];
+        let order = [3, 4, 5, 0, 1, 2, 6];
+        let mut partition = partition(&order, &[0, 4, 7]);
+        let (mut one, mut two) = ([0; 7], [0.0; 14]);
+        let whole = partition.whole().unwrap();
+        let (of_one, of_two) = (whole.column(&mut one).unwrap(), whole.column(&mut two).unwrap());
+        let (mut first, mut second) = (of_one.take(0).unwrap(), of_one.take(1).unwrap());
+        let run = Run::find(first.indices, 0, 3).unwrap();
+        first.run(run).copy_from_slice(&[1, 2, 3]);
+        of_two.take(0).unwrap().run(run).copy_from_slice(&[0.5, 1.0, 1.5, 2.0, 2.5, 3.0]);
+        assert!(second.run(run).is_empty(), "a run of another part");
+        let run = Run::find(second.indices, 0, 2).unwrap();
+        second.run(run).copy_from_slice(&[4, 5]);
         // 5 and 0, 2 and 6 are apart; the last run would leave the part.
-        assert!(first.contiguous::<2>(2).is_none() && second.contiguous::<2>(1).is_none());
-        assert!(first.contiguous::<2>(3).is_none() && first.contiguous::<1>(4).is_none());
-        assert_eq!(a, [0, 4, 5, 1, 2, 3, 0]);
-        assert_eq!(b[3..6], [0.5, 1.5, 2.5]);
-        assert_eq!(c, [false, false, false, true, true, true, false]);
-        assert_eq!(e, [0, 0, 0, 7, 8, 9, 0]);
+        assert!(Run::find(first.indices, 2, 2).is_none());
+        assert!(Run::find(second.indices, 1, 2).is_none());
+        assert!(Run::find(first.indices, 3, 2).is_none());
+        assert!(Run::find(first.indices, 4, 1).is_none());
+        let mut copies = [0; 2];
+        assert_eq!(second.gather(1, 2, &mut copies), 2);
+        assert_eq!(copies, [5, 0]);
+        second.scatter(1, 2, &[7, 8]);
+        assert_eq!(one, [0, 4, 7, 1, 2, 3, 8]);
+        assert_eq!(two[6..12], [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]);
     }
 
     #[test]
     fn an_invalid_partition_gives_no_access() {
-        let (mut a, mut b, mut c, mut e) = ([0; 3], [0; 3], [0; 3], [0; 3]);
         for (order, starts) in [
             (&[0, 1, 1], &[0, 2, 3][..]),
             (&[0, 1, 3], &[0, 2, 3]),
@@ -271,13 +301,12 @@ mod tests {
             (&[0, 1, 2], &[0, 3, 2, 3]),
         ] {
             let mut partition = partition(order, starts);
-            let elements = partition.elements((&mut a, &mut b, &mut c, &mut e));
-            assert!(elements.is_none(), "{order:?} {starts:?}");
+            assert!(partition.whole().is_none(), "{order:?} {starts:?}");
         }
         let mut partition = partition(&[2, 0, 1], &[0, 1, 3]);
-        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e)).is_some());
-        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e[..0])).is_some());
-        assert!(partition.elements((&mut a[..2], &mut b, &mut c, &mut e)).is_none());
-        assert!(partition.elements((&mut a, &mut b, &mut c, &mut e[..2])).is_none());
+        let whole = partition.whole().unwrap();
+        assert!(whole.column(&mut [0; 3]).is_some() && whole.column(&mut [0; 6]).is_some());
+        assert!(whole.column(&mut [0; 0]).is_some() && whole.column(&mut [0; 2]).is_none());
+        assert!(whole.column(&mut [0; 4]).is_none());
     }
 }

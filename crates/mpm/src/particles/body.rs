@@ -148,6 +148,7 @@ pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
         mass: volume.iter().map(|&area| area * density).collect(),
         volume,
         half_size: SVector::repeat(half * width),
+        ..Particles::default()
     };
     Ok(Body { particles, half_edges, mesh: Some(Mesh::cells(of_corners, corners)) })
 }

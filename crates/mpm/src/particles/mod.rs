@@ -2,44 +2,17 @@
 
 pub(crate) mod body;
 pub(crate) mod clip;
+pub(crate) mod columns;
 pub(crate) mod mesh;
 
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
+pub use columns::Particles;
+
 use crate::grid::Grid;
 
-/// State of the particles as a structure of arrays; the index is the particle's id and never changes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Particles<T, const D: usize> {
-    /// Reference positions, lengths.
-    pub X: Vec<SVector<T, D>>,
-    /// Current positions, lengths.
-    pub x: Vec<SVector<T, D>>,
-    /// Velocities.
-    pub v: Vec<SVector<T, D>>,
-    /// Deformation gradients `F[i][J] = dx_i/dX_J`.
-    pub F: Vec<SMatrix<T, D, D>>,
-    /// Masses.
-    pub mass: Vec<T>,
-    /// Reference volumes V0 (areas in 2D, lengths in 1D).
-    pub volume: Vec<T>,
-    /// Reference half-size l0 of every particle's box, along each axis.
-    pub half_size: SVector<T, D>,
-}
-
 impl<T: RealField + Copy, const D: usize> Particles<T, D> {
-    /// Those at some places, in that order.
-    pub(crate) fn some(&self, places: &[u32]) -> Self {
-        fn of<E: Copy>(all: &[E], places: &[u32]) -> Vec<E> {
-            places.iter().map(|&place| all[place as usize]).collect()
-        }
-        let Self { X, x, v, F, mass, volume, half_size } = self;
-        let [X, x, v] = [X, x, v].map(|vectors| of(vectors, places));
-        let [mass, volume] = [mass, volume].map(|numbers| of(numbers, places));
-        Self { X, x, v, F: of(F, places), mass, volume, half_size: *half_size }
-    }
-
     /// A body of density `density` at rest and undeformed, on a square lattice with `per_cell` particles per cell and
     /// direction: those of the grid whose centre satisfies `inside`.
     ///
@@ -84,6 +57,7 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
             mass: vec![density * volume; n],
             volume: vec![volume; n],
             half_size: SVector::repeat(edge * real(0.5)),
+            ..Self::default()
         }
     }
 

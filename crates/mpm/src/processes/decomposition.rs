@@ -13,6 +13,7 @@ use nalgebra::RealField;
 use crate::error::{SetupError, StepError};
 use crate::grid::Layout;
 use crate::parallel::bins::BinRows;
+use crate::particles::columns::EachColumn;
 use crate::step::health::{Invalid, Outcome};
 
 /// The part of a body that one process begins with: any part, as long as each particle is in one.
@@ -42,8 +43,6 @@ pub(crate) struct Part {
     pub(crate) version: u64,
     /// The first bin of each process, and the number of bins.
     pub(crate) cuts: Vec<usize>,
-    /// Whether particles have affine velocities yet.
-    pub(crate) is_affine: bool,
 }
 
 /// Those of some particles that a process holds.
@@ -60,7 +59,7 @@ pub(crate) const UNEVEN: f64 = 1.1;
 impl Part {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
         let ids = Arc::new(ids);
-        Self { ranks, ids, own: None, version: 0, cuts: Vec::new(), is_affine: false }
+        Self { ranks, ids, own: None, version: 0, cuts: Vec::new() }
     }
 
     pub(crate) fn arrangement(&self) -> Arrangement<'_> {
@@ -235,8 +234,15 @@ impl Move {
     }
 
     pub(crate) fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
-        let mut all = vec![E::zeroed(); self.len()];
-        self.fill(cast_slice_mut(&mut all), cast_slice(elements), size_of::<E>());
+        self.all_shares(1, elements)
+    }
+
+    /// As [`all`](Self::all) of lists of `share` elements each.
+    pub(crate) fn all_shares<E: Pod>(&self, share: usize, elements: &[E]) -> Vec<E> {
+        let mut all = vec![E::zeroed(); share * self.len()];
+        if share > 0 {
+            self.fill(cast_slice_mut(&mut all), cast_slice(elements), share * size_of::<E>());
+        }
         all
     }
 
@@ -302,6 +308,12 @@ impl Move {
 
     pub(crate) fn replace<E: Pod>(&self, elements: &mut Vec<E>) {
         *elements = self.all(elements);
+    }
+}
+
+impl EachColumn for &Move {
+    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>) {
+        *column = self.all_shares(share, column);
     }
 }
 

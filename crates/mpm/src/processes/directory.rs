@@ -89,14 +89,23 @@ impl Directory {
 impl Answers {
     /// Those of the elements that this process has asked for, in that order. A call of all, where all processes' answers are whole.
     pub(crate) fn fetch<E: Pod>(&self, elements: &[E]) -> Vec<E> {
-        let here = self.moved.all(elements);
-        let pick = |places: &Vec<u32>| places.iter().map(|&place| here[place as usize]).collect();
-        let out: Vec<Vec<E>> = self.out.iter().map(pick).collect();
+        self.fetch_shares(1, elements)
+    }
+
+    /// As [`fetch`](Self::fetch) of lists of `share` elements each.
+    pub(crate) fn fetch_shares<E: Pod>(&self, share: usize, elements: &[E]) -> Vec<E> {
+        let here = self.moved.all_shares(share, elements);
+        fn pick<E: Copy>(all: &[E], share: usize, places: &[u32]) -> Vec<E> {
+            let of = |&place: &u32| &all[place as usize * share..][..share];
+            places.iter().flat_map(of).copied().collect()
+        }
+        let out: Vec<Vec<E>> = self.out.iter().map(|places| pick(&here, share, places)).collect();
+        let counts: Vec<usize> = self.counts.iter().map(|count| count * share).collect();
         let come = match &self.ranks {
-            Some(ranks) => exchange(&**ranks, &out, &self.counts),
+            Some(ranks) => exchange(&**ranks, &out, &counts),
             None => out.concat(),
         };
-        self.order.iter().map(|&place| come[place as usize]).collect()
+        pick(&come, share, &self.order)
     }
 }
 

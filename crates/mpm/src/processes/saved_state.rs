@@ -9,13 +9,13 @@ use std::slice;
 use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_ranks::total;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 use thiserror::Error;
 
 use crate::domain::Support;
-use crate::particles::Particles;
+use crate::particles::columns::{EachColumn, MovingColumns, Shares};
 use crate::processes::decomposition::Move;
-use crate::processes::directory::Directory;
+use crate::processes::directory::{Answers, Directory};
 use crate::simulation::Simulation;
 use crate::step::state::State;
 
@@ -82,10 +82,7 @@ struct Saved<T, const D: usize> {
     ids: Vec<u64>,
     /// The sub-bin of each at the last sort.
     keys: Vec<u32>,
-    x: Vec<SVector<T, D>>,
-    v: Vec<SVector<T, D>>,
-    F: Vec<SMatrix<T, D, D>>,
-    affine: Vec<SMatrix<T, D, D>>,
+    columns: MovingColumns<T, D>,
     /// Shared corners: the numbers of those that have the keys.
     corner_ids: Vec<u64>,
     /// Their positions.
@@ -95,7 +92,7 @@ struct Saved<T, const D: usize> {
 /// What the particles of a scheme have.
 #[derive(Clone, Copy)]
 struct Kind {
-    is_affine: bool,
+    shares: Shares,
     /// Whether they share corners. Keys are theirs then: those of the first ones, which one process alone has.
     has_corners: bool,
 }
@@ -118,10 +115,7 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
             steps_done: 0,
             ids: Vec::new(),
             keys: Vec::new(),
-            x: Vec::new(),
-            v: Vec::new(),
-            F: Vec::new(),
-            affine: Vec::new(),
+            columns: MovingColumns::none(),
             corner_ids: Vec::new(),
             corner_x: Vec::new(),
         };
@@ -130,26 +124,26 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
     }
 
     fn add(&mut self, part: SavedState) -> Result<(), SavedStateError> {
-        let Kind { is_affine, has_corners } = self.kind;
-        let (found, expected) = (part.len(), if has_corners { 9 } else { 7 });
+        let Kind { shares, has_corners } = self.kind;
+        let of_particles = 3 + MovingColumns::<T, D>::COUNT;
+        let (found, expected) = (part.len(), of_particles + if has_corners { 2 } else { 0 });
         if found != expected {
             return Err(SavedStateError::Arrays { found, expected });
         }
         let mut arrays = part.into_iter();
         let mut next = || arrays.next().unwrap_or_default();
         self.steps_done = elements(next(), 1)?[0];
-        let (ids, keys, x) = (next(), next(), next());
-        let count = x.len() / size_of::<SVector<T, D>>();
+        let (ids, keys) = (next(), next());
+        let count = arrays.as_slice().first().map_or(0, |x| x.len() / size_of::<SVector<T, D>>());
         // Where one process had all, numbers are places.
         let numbers = |ids: Vec<u8>, count: usize| {
             if ids.is_empty() { Ok((0..count as u64).collect()) } else { elements(ids, count) }
         };
         self.ids.extend(numbers(ids, count)?);
-        self.x.extend(elements::<SVector<T, D>>(x, count)?);
-        self.v.extend(elements::<SVector<T, D>>(next(), count)?);
-        self.F.extend(elements::<SMatrix<T, D, D>>(next(), count)?);
-        let affine = if is_affine { count } else { 0 };
-        self.affine.extend(elements::<SMatrix<T, D, D>>(next(), affine)?);
+        let mut saved = Append { count, arrays: &mut arrays, found: Ok(()) };
+        self.columns.each(&shares, &mut saved);
+        saved.found?;
+        let mut next = || arrays.next().unwrap_or_default();
         let keyed = if has_corners { keys.len() / size_of::<u32>() } else { count };
         self.keys.extend(elements::<u32>(keys, keyed)?);
         if has_corners {
@@ -168,22 +162,42 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
     /// Those that are here after a move.
     fn follow(&mut self, moved: &Move) {
         moved.replace(&mut self.keys);
-        [&mut self.x, &mut self.v].into_iter().for_each(|vectors| moved.replace(vectors));
-        moved.replace(&mut self.F);
-        if self.kind.is_affine {
-            moved.replace(&mut self.affine);
+        self.columns.each(&self.kind.shares, &mut &*moved);
+    }
+}
+
+/// Appends a saved array of so many particles to each column, in turn.
+struct Append<'a, A> {
+    count: usize,
+    arrays: &'a mut A,
+    found: Result<(), SavedStateError>,
+}
+
+impl<A: Iterator<Item = Vec<u8>>> EachColumn for Append<'_, A> {
+    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>) {
+        match elements(self.arrays.next().unwrap_or_default(), self.count * share) {
+            Ok(elements) => column.extend::<Vec<E>>(elements),
+            Err(error) => self.found = self.found.and(Err(error)),
         }
+    }
+}
+
+/// Puts the elements that were asked for in the place of each column.
+struct Fetch<'a>(&'a Answers);
+
+impl EachColumn for Fetch<'_> {
+    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>) {
+        *column = self.0.fetch_shares(share, column);
     }
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// The arrays of the particles here, but for the number of steps.
     fn arrays(&self) -> Vec<&[u8]> {
-        let Self { particles, affine, support, bins, part, .. } = self;
-        let Particles { x, v, F, .. } = particles;
+        let Self { particles, support, bins, part, .. } = self;
         let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
         let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
-        arrays.extend([cast_slice(x), cast_slice(v), cast_slice(F), cast_slice(affine)]);
+        arrays.extend(particles.moving_bytes());
         if let Support::Mesh(corners) = support {
             let numbers = corners.mesh.numbers.as_ref();
             let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
@@ -201,10 +215,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Puts the saved state of all particles in place, of which this process has read some parts. Gives the number of steps.
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
-        let kind = Kind {
-            is_affine: self.transfer.is_affine(),
-            has_corners: matches!(self.support, Support::Mesh(_)),
-        };
+        let kind =
+            Kind { shares: self.shares, has_corners: matches!(self.support, Support::Mesh(_)) };
         let saved = self.agreed(Saved::of_parts(parts, kind))?;
         let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
         self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
@@ -244,14 +256,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
         };
         self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
 
-        let Saved { keys, x, v, F, affine, .. } = saved;
-        (self.particles.x, self.particles.v, self.particles.F) = (x, v, F);
-        self.affine = affine;
-        Ok(keys)
+        self.particles.replace_moving(saved.columns);
+        Ok(saved.keys)
     }
 
     /// Puts particles that share corners in place, where they are. Gives the keys of their corners.
-    fn put_mesh(&mut self, saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
+    fn put_mesh(&mut self, mut saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
         let Support::Mesh(corners) = &self.support else { return Ok(Vec::new()) };
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let ids = match &self.part {
@@ -265,12 +275,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         // All processes ask before one of them gives up.
         let is_whole = particles.is_whole && points.is_whole && points.is_unique;
         self.agreed(if is_whole { Ok(()) } else { Err(SavedStateError::Particles) })?;
-        self.particles.x = particles.fetch(&saved.x);
-        self.particles.v = particles.fetch(&saved.v);
-        self.particles.F = particles.fetch(&saved.F);
-        if self.transfer.is_affine() {
-            self.affine = particles.fetch(&saved.affine);
-        }
+        saved.columns.each(&self.shares, &mut Fetch(&particles));
+        self.particles.replace_moving(saved.columns);
         let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
         if let Support::Mesh(corners) = &mut self.support {
             corners.positions().copy_from_slice(&x);

@@ -6,7 +6,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_lanes::simd::Lanes;
-use nalgebra::{SMatrix, SVector};
 
 use crate::domain::Support;
 use crate::domain::corner_exchange::ChunkSums;
@@ -19,12 +18,12 @@ use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::{FromCorners, ToCorners};
 use crate::parallel::chunks::each;
-use crate::particles::Particles;
+use crate::particles::columns::{Fixed, Moving};
 use crate::scheme::Transfer;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
-use crate::step::g2p::{OfBlock, advance, check_all};
+use crate::step::g2p::{Follow, check_all};
 use crate::step::health::Outcome;
 use crate::step::state::State;
 
@@ -63,13 +62,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// G2P of this step, and P2G of the next one, which starts at `t_next`, to the corners.
     fn g2p_and_to_corners(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
-        let Self { particles, affine, constants, bins, of_time, exchange, support, .. } = self;
+        let Self { particles, constants, bins, of_time, exchange, support, .. } = self;
         let (law, transfer, buffers, c) = (&*self.law, self.transfer, &self.buffers, *constants);
         let uniform = self.uniform;
         let Support::Mesh(corners) = support else { return Outcome::default() };
         let mut measured = std::mem::replace(&mut corners.measured, Measured::none());
         let values = std::mem::replace(&mut exchange.values, CornerValues::none());
-        let Particles { X, x, v, F, mass, volume, .. } = &mut *particles;
+        let (fixed, mut moving) = particles.split();
         let (at_start, is_in_doubt) = (&*support, AtomicBool::new(false));
         if let Support::Mesh(corners) = at_start {
             let pass = Pass {
@@ -79,9 +78,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 values: &values,
                 law,
                 transfer,
-                forcing: Forcing::new(body_force, X, t_next, &c, of_time),
-                mass,
-                volume,
+                forcing: Forcing::new(body_force, fixed.X, t_next, &c, of_time),
+                fixed,
                 uniform,
                 buffers,
                 is_in_doubt: &is_in_doubt,
@@ -90,21 +88,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
             let particles = chunks.iter().map(|chunk| chunk.particles.clone());
             let parts = measured.split(&corners.mesh, particles.clone());
             let sums = exchange.begin(chunks, transfer.is_affine());
-            let (mut x, mut v, mut F) = (&mut x[..], &mut v[..], &mut F[..]);
-            let mut affine = &mut affine[..];
-            let pieces = particles.zip(parts).zip(sums).map(|((particles, measured), sums)| {
-                let count = particles.len();
-                let of_affine = affine.len().min(count);
-                Piece {
+            let pieces =
+                particles.zip(parts).zip(sums).map(|((particles, measured), sums)| Piece {
                     first: particles.start,
-                    x: x.split_off_mut(..count).unwrap_or_default(),
-                    v: v.split_off_mut(..count).unwrap_or_default(),
-                    F: F.split_off_mut(..count).unwrap_or_default(),
-                    affine: affine.split_off_mut(..of_affine).unwrap_or_default(),
+                    moving: moving.split_off(particles.len()),
                     measured,
                     sums,
-                }
-            });
+                });
             each(pieces.collect(), &|piece| pass.advance(piece));
         }
         exchange.values = values;
@@ -115,18 +105,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if !is_in_doubt.into_inner() {
             return outcome;
         }
-        outcome.merge(check_all((particles, affine), (&c, support), bins.bin_of()))
+        outcome.merge(check_all(particles, (&c, support), bins.bin_of()))
     }
 }
 
 /// The particles of a chunk, and what belongs to them.
 struct Piece<'a, T, const D: usize> {
     first: usize,
-    x: &'a mut [SVector<T, D>],
-    v: &'a mut [SVector<T, D>],
-    F: &'a mut [SMatrix<T, D, D>],
-    /// Empty without affine velocities.
-    affine: &'a mut [SMatrix<T, D, D>],
+    moving: Moving<'a, T, D>,
     measured: MeasuredPart<'a, T, D>,
     sums: ChunkSums<'a, T, D>,
 }
@@ -142,8 +128,7 @@ struct Pass<'a, T, const D: usize> {
     transfer: Transfer,
     /// The body force at the start of the next step.
     forcing: Forcing<'a, T, D>,
-    mass: &'a [T],
-    volume: &'a [T],
+    fixed: Fixed<'a, T, D>,
     uniform: Option<(T, T)>,
     buffers: &'a BufferPool<T, D>,
     /// Whether a particle may be invalid.
@@ -154,8 +139,8 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
     /// Advances the particles of a chunk, then sums their contributions to the next step at corners.
     fn advance(&self, piece: Piece<'_, T, D>) {
         let &Self { c, support, corners, values, law, transfer, ref forcing, .. } = self;
-        let &Self { mass, volume, uniform, buffers: pool, is_in_doubt, .. } = self;
-        let Piece { first: of_chunk, x, v, F, affine, mut measured, mut sums } = piece;
+        let &Self { fixed, uniform, buffers: pool, is_in_doubt, .. } = self;
+        let Piece { first: of_chunk, moving, mut measured, mut sums } = piece;
         let SharedCorners { mesh, next, .. } = corners;
         let (is_affine, of_cells) = (transfer.is_affine(), mesh.is_of_cells());
         sums.clear();
@@ -165,18 +150,15 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
         if let Some((mass, volume)) = uniform {
             contributions.set_uniform(mass, volume);
         }
-        let (mut of_affine, mut start) = (affine.chunks_mut(BLOCK), 0);
-        let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(F.chunks_mut(BLOCK));
-        for ((x, v), F) in blocks {
-            let (first, count) = (of_chunk + start, x.len());
-            let affine = of_affine.next().unwrap_or_default();
+        for (start, mut block) in moving.pieces(BLOCK) {
+            let (first, count) = (of_chunk + start, block.len());
             let interpolated = &mut interpolated[..count];
             let shares = measured.from(mesh, (of_chunk, first));
             FromCorners { c, corners, shares, values, first, receiver: interpolated }
                 .interpolate(is_affine);
-            let mut of_block = OfBlock { x, v, F, affine };
-            advance(c, transfer, (c.time_step, None), interpolated, &mut of_block);
-            let OfBlock { x, v, F, affine } = of_block;
+            let follow = Follow { c, law, late: c.time_step, early: None };
+            follow.advance(transfer, interpolated, &mut block);
+            let Moving { x, v, F, affine, internal, .. } = block;
 
             let mut is_valid =
                 of_cells || measured.at(mesh, next, (of_chunk, first..first + count));
@@ -186,10 +168,10 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             let kinematics = copies.of_successive(x, F);
             forcing.evaluate(ids, kinematics.x, &mut contributions.b);
             if uniform.is_none() {
-                contributions.take(ids, mass, volume);
+                contributions.take(ids, fixed.mass, fixed.volume);
             }
             contributions.set_values(c, v, affine);
-            law.stress(c, kinematics.F, contributions);
+            law.stress(c, kinematics.F, internal, contributions);
             is_valid &= ToCorners {
                 c,
                 corners,
@@ -204,7 +186,6 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             if !is_valid {
                 is_in_doubt.store(true, Ordering::Relaxed);
             }
-            start += count;
         }
         pool.give_back(buffers);
     }

@@ -6,6 +6,7 @@
 //!
 //! Steps in a [single pass](crate::step::is_fused) fuse this with the next P2G ([`g2p2g`](crate::step::g2p2g)).
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_lanes::simd::Lanes;
@@ -17,13 +18,14 @@ use crate::domain::corner_exchange::Exchange;
 use crate::domain::corner_values::Seen;
 use crate::grid::geometry::Constants;
 use crate::kernel::any::Interpolated;
-use crate::kernel::block::Block;
+use crate::kernel::block::{Block, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::have_volume_next;
 use crate::parallel::bins::Bins;
-use crate::parallel::chunks::{ChunkOfFour, each_chunk, each_chunk_of_four};
+use crate::parallel::chunks::each;
 use crate::particles::Particles;
+use crate::particles::columns::Moving;
 use crate::scheme::{Taken, Transfer};
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::State;
@@ -34,22 +36,28 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, F_early, support, buffers, exchange, .. } = self;
+        let Self { particles, constants, nodes, support, buffers, exchange, .. } = self;
+        let Self { F_early, internal_early, law, .. } = self;
         let c = *constants;
         if let Support::Mesh(corners) = support {
             exchange.interpolate(&c, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
-        let Particles { x, F, .. } = &*particles;
+        let Particles { x, F, internal, .. } = &*particles;
         let (support, buffers) = (&*support, &*buffers);
         let found = SharedOutcome::default();
-        each_chunk(F_early, CHUNK, &|chunk, F_early| {
+        let variables = self.shares.internal;
+        internal_early.copy_from_slice(internal);
+        let mut of_internal = internal_early.chunks_mut((CHUNK * variables).max(1));
+        let pieces = F_early.chunks_mut(CHUNK).map(|F| (F, of_internal.next().unwrap_or_default()));
+        each(pieces.enumerate().collect(), &|(piece, (F_early, internal))| {
             let mut outcome = Outcome::default();
             let mut grid = FromGrid::new(&c, support, nodes, buffers.take(support, false));
-            let (x, F) = (&x[chunk * CHUNK..], &F[chunk * CHUNK..]);
+            let (x, F) = (&x[piece * CHUNK..], &F[piece * CHUNK..]);
+            let mut of_internal = internal.chunks_mut((BLOCK * variables).max(1));
             let blocks = F_early.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
             for (index, ((F_early, x), F)) in blocks.enumerate() {
-                let first = chunk * CHUNK + index * BLOCK;
+                let first = piece * CHUNK + index * BLOCK;
                 let interpolated = grid.g2p(first, x, F);
                 for (k, (((F_early, interpolated), x), F)) in
                     F_early.iter_mut().zip(interpolated).zip(x).zip(F).enumerate()
@@ -60,6 +68,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
                         outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
                     }
                 }
+                let internal = of_internal.next().unwrap_or_default();
+                if !internal.is_empty() {
+                    law.evolve(time, F, F_early, internal);
+                }
             }
             buffers.give_back(grid.buffers);
             found.add(outcome);
@@ -69,14 +81,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Velocity by the transfer, position, and F for the rest of the step.
     pub(crate) fn g2p(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, F_early, support, affine, transfer, .. } =
-            self;
+        let Self { particles, constants, nodes, bins, support, transfer, .. } = self;
+        let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
         let buffers = &self.buffers;
         let (c, transfer) = (*constants, *transfer);
         let nodes = support.seen(nodes, &self.exchange.values);
-        let arrays = (particles, affine);
         g2p(
-            arrays,
+            particles,
             bins,
             c,
             (support, &self.exchange),
@@ -84,32 +95,32 @@ impl<T: Lanes, const D: usize> State<T, D> {
             transfer,
             |(block, support), interpolated, first, of_block| {
                 block.g2p((&c, support), nodes, interpolated);
-                let F_early = F_early.get(first..first + interpolated.len());
-                advance(&c, transfer, (late, F_early), interpolated, of_block);
+                let early = early(first..first + interpolated.len());
+                Follow { c: &c, law, late, early }.advance(transfer, interpolated, of_block);
             },
         )
     }
 
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
-        let Self { particles, constants, nodes, support, affine, transfer, buffers, .. } = self;
+        let Self { particles, constants, nodes, support, transfer, buffers, .. } = self;
         let (c, support, transfer) = (*constants, &*support, *transfer);
         let nodes = support.seen(nodes, &self.exchange.values);
         let buffers = &*buffers;
-        let Particles { x, v, F, .. } = particles;
-        each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
+        each_piece(particles, &|first, piece| {
             let own = buffers.take(support, transfer.is_affine());
             let mut grid = FromGrid::new(&c, support, nodes, own);
-            for_blocks(chunk, |first, OfBlock { x, v, F, affine }| {
-                take_velocity(&c, transfer, grid.g2p(first, x, F), v, affine);
-            });
+            for (start, Moving { x, v, F, affine, .. }) in piece.pieces(BLOCK) {
+                take_velocity(&c, transfer, grid.g2p(first + start, x, F), v, affine);
+            }
             buffers.give_back(grid.buffers);
         });
     }
 
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, reprojected, support, F_early, .. } = self;
+        let Self { particles, constants, nodes, bins, reprojected, support, .. } = self;
+        let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
         let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
         if let Support::Mesh(corners) = support {
             std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
@@ -119,22 +130,21 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let reprojected = support.seen(reprojected, &exchange.reprojected);
         let nodes = support.seen(nodes, &exchange.values);
         let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { reprojected };
-        let arrays = (particles, &mut Vec::new());
         g2p(
-            arrays,
+            particles,
             bins,
             c,
             (support, &*exchange),
             buffers,
             Transfer::Flip,
             |(block, support), interpolated, first, of_block| {
-                let OfBlock { x, F, .. } = of_block;
                 block.g2p((&c, support), nodes, interpolated);
-                for (x, interpolated) in x.iter_mut().zip(&*interpolated) {
+                for (x, interpolated) in of_block.x.iter_mut().zip(&*interpolated) {
                     *x += interpolated.velocity * c.time_step;
                 }
                 block.g2p((&c, support), reprojected, interpolated);
-                stretch(&c, late, F_early.get(first..first + F.len()), interpolated, F);
+                let early = early(first..first + interpolated.len());
+                Follow { c: &c, law, late, early }.stretch(interpolated, of_block);
             },
         )
     }
@@ -144,20 +154,16 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if !self.transfer.is_affine() {
             return;
         }
-        self.affine = vec![SMatrix::zeros(); self.particles.x.len()];
-        if let Some(part) = &mut self.part {
-            part.is_affine = true;
-        }
         self.p2g_momentum();
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, support, affine, buffers, exchange, .. } = self;
+        let Self { particles, constants, nodes, support, buffers, exchange, .. } = self;
         if let Support::Mesh(corners) = support {
             exchange.interpolate(constants, corners, nodes);
         }
         let nodes = support.seen(nodes, &exchange.values);
-        let Particles { x, F, .. } = &*particles;
+        let Particles { x, F, affine, .. } = particles;
         let mut grid = FromGrid::new(constants, support, nodes, buffers.take(support, true));
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
         for (index, ((affine, x), F)) in blocks.enumerate() {
@@ -219,20 +225,75 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     }
 }
 
-/// Velocities by the transfer, positions by the grid's velocity, and F for the rest of the step, a time `late`, from that after its early
-/// part, where it has one.
-pub(crate) fn advance<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    transfer: Transfer,
-    (late, F_early): (T, Option<&[SMatrix<T, D, D>]>),
-    interpolated: &[Interpolated<T, D>],
-    OfBlock { x, v, F, affine }: &mut OfBlock<'_, T, D>,
-) {
-    take_velocity(c, transfer, interpolated, v, affine);
-    for (x, interpolated) in x.iter_mut().zip(interpolated) {
-        *x += interpolated.velocity * c.time_step;
+/// F and the internal variables of some particles after the early part of a step.
+#[derive(Clone, Copy)]
+pub(crate) struct Early<'a, T, const D: usize> {
+    F: &'a [SMatrix<T, D, D>],
+    internal: &'a [T],
+}
+
+impl<'a, T, const D: usize> Early<'a, T, D> {
+    /// These of some of all particles, where steps have an early part.
+    fn of(
+        F: &'a [SMatrix<T, D, D>],
+        internal: &'a [T],
+    ) -> impl Fn(Range<usize>) -> Option<Self> + Sync
+    where
+        T: Sync,
+    {
+        let variables = internal.len().checked_div(F.len()).unwrap_or(0);
+        move |particles| {
+            let internal = &internal[particles.start * variables..];
+            let internal = internal.get(..particles.len() * variables)?;
+            Some(Self { F: F.get(particles)?, internal })
+        }
     }
-    stretch(c, late, F_early, interpolated, F);
+}
+
+/// How particles follow the grid in the late part of a step.
+pub(crate) struct Follow<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) law: &'a dyn BlockLaw<T, D>,
+    /// The time of the late part.
+    pub(crate) late: T,
+    /// After the early part, where there is one.
+    pub(crate) early: Option<Early<'a, T, D>>,
+}
+
+impl<T: Lanes, const D: usize> Follow<'_, T, D> {
+    /// Velocities by the transfer, positions by the grid's velocity, F and the internal variables for the rest of the step.
+    pub(crate) fn advance(
+        &self,
+        transfer: Transfer,
+        interpolated: &[Interpolated<T, D>],
+        particles: &mut Moving<'_, T, D>,
+    ) {
+        let Moving { x, v, affine, .. } = particles;
+        take_velocity(self.c, transfer, interpolated, v, affine);
+        for (x, interpolated) in x.iter_mut().zip(interpolated) {
+            *x += interpolated.velocity * self.c.time_step;
+        }
+        self.stretch(interpolated, particles);
+    }
+
+    /// F at the end of the step, and the internal variables.
+    fn stretch(&self, interpolated: &[Interpolated<T, D>], particles: &mut Moving<'_, T, D>) {
+        let Self { c, law, late, early } = *self;
+        let Moving { F, internal, .. } = particles;
+        if let Some(early) = early {
+            F.copy_from_slice(early.F);
+            internal.copy_from_slice(early.internal);
+        }
+        if late > T::zero() {
+            let start = if internal.is_empty() { Vec::new() } else { F.to_vec() };
+            for (F, interpolated) in F.iter_mut().zip(interpolated) {
+                *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
+            }
+            if !internal.is_empty() {
+                law.evolve(late, &start, F, internal);
+            }
+        }
+    }
 }
 
 /// Velocities, and affine ones, by the transfer.
@@ -262,54 +323,19 @@ fn take_velocity<T: Lanes, const D: usize>(
     }
 }
 
-/// F at the end of the step: that after its early part, where it has one, stretched for a time `late`.
-fn stretch<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    late: T,
-    F_early: Option<&[SMatrix<T, D, D>]>,
-    interpolated: &[Interpolated<T, D>],
-    F: &mut [SMatrix<T, D, D>],
+/// Calls `work(first, piece)` for pieces of particles, `first` the id of the first one, on the threads of the pool.
+fn each_piece<T: Lanes, const D: usize>(
+    particles: &mut Particles<T, D>,
+    work: &(dyn Fn(usize, Moving<'_, T, D>) + Sync),
 ) {
-    if let Some(F_early) = F_early {
-        F.copy_from_slice(F_early);
-    }
-    if late > T::zero() {
-        for (F, interpolated) in F.iter_mut().zip(interpolated) {
-            *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
-        }
-    }
+    let (_, moving) = particles.split();
+    each(moving.pieces(CHUNK).collect(), &|(first, piece)| work(first, piece));
 }
 
-/// What belongs to the particles of a block.
-pub(crate) struct OfBlock<'a, T, const D: usize> {
-    pub(crate) x: &'a mut [SVector<T, D>],
-    pub(crate) v: &'a mut [SVector<T, D>],
-    pub(crate) F: &'a mut [SMatrix<T, D, D>],
-    /// Empty without affine velocities.
-    pub(crate) affine: &'a mut [SMatrix<T, D, D>],
-}
-
-type Chunk<'a, T, const D: usize> =
-    ChunkOfFour<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>>;
-
-/// Calls `work(first id, arrays)` for every block of a chunk.
-fn for_blocks<T, const D: usize>(
-    chunk: Chunk<'_, T, D>,
-    mut work: impl FnMut(usize, OfBlock<'_, T, D>),
-) {
-    let ChunkOfFour { number, a, b, c, e } = chunk;
-    let mut of_e = e.chunks_mut(BLOCK);
-    let blocks = a.chunks_mut(BLOCK).zip(b.chunks_mut(BLOCK)).zip(c.chunks_mut(BLOCK));
-    for (index, ((x, v), F)) in blocks.enumerate() {
-        let affine = of_e.next().unwrap_or_default();
-        work(number * CHUNK + index * BLOCK, OfBlock { x, v, F, affine });
-    }
-}
-
-/// Calls `update(weights, buffer for interpolated values, first id, arrays)` for every block of particles, then checks that
+/// Calls `update(weights, buffer for interpolated values, first id, particles)` for every block of particles, then checks that
 /// each particle is valid and in its bin.
 fn g2p<T: Lanes, const D: usize>(
-    (particles, affine): (&mut Particles<T, D>, &mut Vec<SMatrix<T, D, D>>),
+    particles: &mut Particles<T, D>,
     bins: &Bins,
     c: Constants<T, D>,
     (support, exchange): (&mut Support<T, D>, &Exchange<T, D>),
@@ -319,21 +345,20 @@ fn g2p<T: Lanes, const D: usize>(
         (&mut Block<T, D>, &Support<T, D>),
         &mut [Interpolated<T, D>],
         usize,
-        &mut OfBlock<'_, T, D>,
+        &mut Moving<'_, T, D>,
     ) + Sync,
 ) -> Outcome {
-    let Particles { x, v, F, .. } = particles;
     let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
     let at_start = &*support;
     // Where domains share corners, these have to be at their new places before particles are told invalid.
     let is_in_doubt = AtomicBool::new(false);
-    each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
+    each_piece(particles, &|of_piece, piece| {
         let mut outcome = Outcome::default();
         let mut copies = Copies::new();
         let mut own = buffers.take(at_start, transfer.is_affine());
         let Buffers { block, interpolated, .. } = &mut *own;
-        for_blocks(chunk, |first, mut of_block| {
-            let count = of_block.x.len();
+        for (start, mut of_block) in piece.pieces(BLOCK) {
+            let (first, count) = (of_piece + start, of_block.len());
             if !matches!(at_start, Support::Mesh(_)) {
                 copies.copy(of_block.x, of_block.F);
             }
@@ -344,7 +369,7 @@ fn g2p<T: Lanes, const D: usize>(
             }
             block.compute_weights(&c, at_start, &successive(first)[..count], copies.kinematics());
             update((block, at_start), &mut interpolated[..count], first, &mut of_block);
-            let OfBlock { x, F, .. } = of_block;
+            let Moving { x, F, .. } = of_block;
             match at_start {
                 Support::Product(_) | Support::Cpdi { .. } => {
                     outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
@@ -359,7 +384,7 @@ fn g2p<T: Lanes, const D: usize>(
                     }
                 }
             }
-        });
+        }
         buffers.give_back(own);
         found.add(outcome);
     });
@@ -367,23 +392,24 @@ fn g2p<T: Lanes, const D: usize>(
     corners.arrive(false);
     found.add(exchange.check(&c, corners, bin_of));
     if is_in_doubt.into_inner() {
-        found.add(check_all((particles, affine), (&c, support), bin_of));
+        found.add(check_all(particles, (&c, support), bin_of));
     }
     found.all()
 }
 
 /// Checks all particles.
 pub(crate) fn check_all<T: Lanes, const D: usize>(
-    (Particles { x, v, F, .. }, affine): (&mut Particles<T, D>, &mut [SMatrix<T, D, D>]),
+    particles: &mut Particles<T, D>,
     (c, support): (&Constants<T, D>, &Support<T, D>),
     bin_of: &[u32],
 ) -> Outcome {
     let found = SharedOutcome::default();
-    each_chunk_of_four((x, v, F, affine), CHUNK, &|chunk| {
+    each_piece(particles, &|of_piece, piece| {
         let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
-        for_blocks(chunk, |first, OfBlock { x, F, .. }| {
-            outcome = outcome.merge(check(c, support, &mut copies, first, bin_of, x, F));
-        });
+        for (start, Moving { x, F, .. }) in piece.pieces(BLOCK) {
+            let found = check(c, support, &mut copies, of_piece + start, bin_of, x, F);
+            outcome = outcome.merge(found);
+        }
         found.add(outcome);
     });
     found.all()

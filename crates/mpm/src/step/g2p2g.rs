@@ -18,41 +18,41 @@ use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::block::{Block, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers};
-use crate::kernel::copies::{BLOCK, Copies, Kinematics};
+use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::prefetch::prefetch;
-use crate::parallel::disjoint::{Contiguous, PartElements};
-use crate::particles::Particles;
+use crate::particles::columns::{DisjointMoving, Fixed, Moving, MovingColumns, PartMoving, Shares};
 use crate::scheme::Transfer;
 use crate::shape::weights::Weights;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
-use crate::step::g2p::{OfBlock, advance};
+use crate::step::g2p::Follow;
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::State;
-
-/// Position, velocity, deformation gradient and affine velocity of a bin's particles.
-type OfBin<'a, T, const D: usize> =
-    PartElements<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>>;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
             self;
-        let (affine, transfer) = (&mut self.affine, self.transfer);
+        let (transfer, shares) = (self.transfer, self.shares);
         let buffers = &self.buffers;
         let (support, law) = (&self.support, &*self.law);
-        let Particles { X, x, v, F, mass, volume, .. } = particles;
-        let forcing = Forcing::new(body_force, X, t_next, c, of_time);
+        let (fixed, moving) = particles.split();
+        let forcing = Forcing::new(body_force, fixed.X, t_next, c, of_time);
         let uniform = *uniform;
         let step =
-            G2p2g { c, support, law, transfer, nodes, mass, volume, uniform, forcing, buffers };
+            G2p2g { c, support, law, transfer, nodes, fixed, uniform, forcing, buffers, shares };
         let found = SharedOutcome::default();
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one(), vectors });
-        update.g2p2g(bins, next, (x, v, F, affine), &|band, first, bin, elements| {
-            found.add(step.advance_bin(band, first, bin, elements));
+        let divide = |partition| {
+            DisjointMoving::new(partition, moving).expect("each particle is in one bin")
+        };
+        update.g2p2g(bins, next, divide, &|band, first, bin, divided, part| {
+            if let Some(particles) = divided.take(part) {
+                found.add(step.advance_bin(band, first, bin, particles));
+            }
         });
         std::mem::swap(nodes, next);
         found.all()
@@ -67,12 +67,12 @@ struct G2p2g<'a, T, const D: usize> {
     transfer: Transfer,
     /// The grid of this step, updated.
     nodes: &'a [Node<T, D>],
-    mass: &'a [T],
-    volume: &'a [T],
+    fixed: Fixed<'a, T, D>,
     uniform: Option<(T, T)>,
     /// The body force at the start of the next step.
     forcing: Forcing<'a, T, D>,
     buffers: &'a BufferPool<T, D>,
+    shares: Shares,
 }
 
 impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
@@ -83,7 +83,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         band: &mut [Node<T, D>],
         first: usize,
         bin: u32,
-        mut elements: OfBin<'_, T, D>,
+        mut particles: PartMoving<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
         let mut buffers = self.buffers.take(self.support, self.transfer.is_affine());
@@ -91,36 +91,22 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             buffers.contributions.set_uniform(mass, volume);
         }
         let mut copies = None;
-        for (index, ids) in elements.indices().chunks(BLOCK).enumerate() {
+        for (index, ids) in particles.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
             if self.uniform.is_none() {
-                buffers.contributions.take(ids, self.mass, self.volume);
+                buffers.contributions.take(ids, self.fixed.mass, self.fixed.volume);
             }
-            if let Some(block) = elements.contiguous::<BLOCK>(place) {
+            if let Some(block) = particles.contiguous(place, BLOCK) {
                 let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
                 outcome = outcome.merge(found);
                 continue;
             }
-            let (copies, of_affine) =
-                copies.get_or_insert_with(|| (Copies::new(), [SMatrix::zeros(); BLOCK]));
-            for k in 0..ids.len() {
-                let (x, v, F, affine) = elements.get(place + k);
-                (copies.x[k], copies.v[k], copies.F[k]) = (*x, *v, *F);
-                if let Some(affine) = affine {
-                    of_affine[k] = *affine;
-                }
-            }
-            let Copies { x, v, F } = copies;
-            let block = (x, v, F, self.transfer.is_affine().then_some(&mut *of_affine));
+            let copies = copies.get_or_insert_with(|| MovingColumns::at_rest(BLOCK, &self.shares));
+            particles.gather(place, ids.len(), copies);
+            let block = copies.first(BLOCK, &self.shares);
             let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
             outcome = outcome.merge(found);
-            for k in 0..ids.len() {
-                let (x, v, F, affine) = elements.get(place + k);
-                (*x, *v, *F) = (copies.x[k], copies.v[k], copies.F[k]);
-                if let Some(affine) = affine {
-                    *affine = of_affine[k];
-                }
-            }
+            particles.scatter(place, ids.len(), copies);
         }
         self.buffers.give_back(buffers);
         outcome
@@ -133,9 +119,12 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],
-        (x, v, F, affine): ContiguousBlock<'_, T, D>,
+        mut particles: Moving<'_, T, D>,
     ) -> Outcome {
+        let Moving { x, v, F, .. } = &mut particles;
+        let (x, v, F) = (whole(x), whole(v), whole(F));
         let &Self { c, support, law, transfer, nodes, ref forcing, .. } = self;
+        let is_with_memory = self.shares.internal > 0;
         if c.planted.is(Fault::WeightsOfNewPosition) {
             let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
             block.compute_weights(c, support, ids, Kinematics { x: &ahead, F });
@@ -146,15 +135,12 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         let interpolated = &mut interpolated[..ids.len()];
         if transfer != Transfer::Flip {
             block.g2p((c, support), Seen::Nodes(nodes), interpolated);
-            let mut of_block = OfBlock {
-                x: &mut x[..ids.len()],
-                v: &mut v[..ids.len()],
-                F: &mut F[..ids.len()],
-                affine: affine.map_or(&mut [][..], |affine| &mut affine[..ids.len()]),
-            };
-            advance(c, transfer, (c.time_step, None), interpolated, &mut of_block);
-            contributions.set_values(c, of_block.v, of_block.affine);
+            let mut own = particles.first(ids.len());
+            let follow = Follow { c, law, late: c.time_step, early: None };
+            follow.advance(transfer, interpolated, &mut own);
+            contributions.set_values(c, own.v, own.affine);
         } else {
+            let start = is_with_memory.then(|| F.to_vec());
             let mut receiver = AdvanceParticles {
                 c,
                 time_step: c.time_step,
@@ -172,7 +158,12 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                     receiver.receive(k, interpolated);
                 }
             }
+            if let Some(start) = start {
+                law.evolve(c.time_step, &start, &particles.F[..BLOCK], particles.internal);
+            }
         }
+        let Moving { x, F, internal, .. } = particles;
+        let (x, F) = (whole(x), whole(F));
         block.compute_weights(c, support, ids, Kinematics { x, F });
         if !support.are_valid(c, ids, &[bin; BLOCK], Kinematics { x, F }) {
             let mut outcome = Outcome::default();
@@ -187,15 +178,16 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         if c.planted.is(Fault::LastNodeSkipped) {
             block.skip_last_node(c, x);
         }
-        law.stress(c, F, contributions);
+        law.stress(c, F, internal, contributions);
         block.p2g(&c.strides, band, first, contributions, ids.len());
         Outcome::default()
     }
 }
 
-/// Positions, velocities, deformation gradients and affine velocities of the particles of a block, contiguous in memory.
-type ContiguousBlock<'a, T, const D: usize> =
-    Contiguous<'a, SVector<T, D>, SVector<T, D>, SMatrix<T, D, D>, SMatrix<T, D, D>, BLOCK>;
+/// A column of a whole block.
+fn whole<E>(column: &mut [E]) -> &mut [E; BLOCK] {
+    column.first_chunk_mut().expect("blocks are whole")
+}
 
 /// Receiver of G2P by FLIP: advances velocity, position and F, and sets mass, momentum and body force of the next P2G.
 struct AdvanceParticles<'a, T, const D: usize> {

@@ -36,10 +36,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
-        let (support, law, affine, transfer) =
-            (&self.support, &self.law, &self.affine, self.transfer);
-        let buffers = &self.buffers;
-        let Particles { X, x, v, F, mass, volume, .. } = &*particles;
+        let (support, law, transfer) = (&self.support, &self.law, self.transfer);
+        let (buffers, variables) = (&self.buffers, self.shares.internal);
+        let Particles { X, x, v, F, mass, volume, affine, internal, .. } = &*particles;
         let c = *constants;
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
@@ -55,7 +54,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
                     contributions.set_value(&c, k, &v[p as usize]);
                 }
                 contributions.take_affine(ids, mass, affine);
-                law.stress(&c, &copies.F, contributions);
+                copies.pick_internal(ids, internal, variables);
+                law.stress(&c, &copies.F, &copies.internal, contributions);
             };
         p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
     }
@@ -63,9 +63,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass and momentum, and from them the velocities at the start of the step.
     pub(crate) fn p2g_momentum(&mut self) {
         let Self { particles, constants, layout, bins, nodes, exchange, .. } = self;
-        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
+        let (support, transfer) = (&self.support, self.transfer);
         let buffers = &self.buffers;
-        let Particles { x, v, F, mass, .. } = &*particles;
+        let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
@@ -79,8 +79,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self;
         let (support, law, transfer) = (&self.support, &self.law, self.transfer);
         let buffers = &self.buffers;
-        let Particles { X, x, F, mass, volume, .. } = &*particles;
-        let (c, F_early) = (*constants, &F_early[..]);
+        let Particles { X, x, F, mass, volume, internal, .. } = &*particles;
+        let (c, F_early, internal_early) = (*constants, &F_early[..], &self.internal_early[..]);
+        let variables = self.shares.internal;
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
@@ -91,10 +92,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 forcing.evaluate(ids, &copies.x, &mut contributions.b);
                 contributions.take(ids, mass, volume);
                 (0..ids.len()).for_each(|k| contributions.set_force(&c, k));
-                if !c.planted.is(Fault::StressOfOldStretch) {
+                if c.planted.is(Fault::StressOfOldStretch) {
+                    copies.pick_internal(ids, internal, variables);
+                } else {
                     copies.pick_F(ids, F_early);
+                    copies.pick_internal(ids, internal_early, variables);
                 }
-                law.stress(&c, &copies.F, contributions);
+                law.stress(&c, &copies.F, &copies.internal, contributions);
             };
         p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
     }
@@ -102,9 +106,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
     pub(crate) fn p2g_updated_momentum(&mut self) {
         let Self { particles, constants, layout, bins, reprojected, exchange, .. } = self;
-        let (support, affine, transfer) = (&self.support, &self.affine, self.transfer);
+        let (support, transfer) = (&self.support, self.transfer);
         let buffers = &self.buffers;
-        let Particles { x, v, F, mass, .. } = &*particles;
+        let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection);
         let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };

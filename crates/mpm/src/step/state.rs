@@ -12,6 +12,7 @@ use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::parallel::bins::Bins;
 use crate::particles::Particles;
+use crate::particles::columns::Shares;
 use crate::processes::decomposition::Part;
 use crate::scheme::Transfer;
 use crate::step::health::Outcome;
@@ -22,8 +23,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) support: Support<T, D>,
     pub(crate) law: Box<dyn BlockLaw<T, D>>,
     pub(crate) transfer: Transfer,
-    /// APIC: the affine velocity of each particle per cell; else empty.
-    pub(crate) affine: Vec<SMatrix<T, D, D>>,
+    /// How many elements a particle has in the columns that steps change.
+    pub(crate) shares: Shares,
     /// Mass and volume of every particle, where they are uniform.
     pub(crate) uniform: Option<(T, T)>,
     pub(crate) constants: Constants<T, D>,
@@ -34,6 +35,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) part: Option<Part>,
     /// F after the early part of a step, while the weights still need F at its start; empty without such a part.
     pub(crate) F_early: Vec<SMatrix<T, D, D>>,
+    /// The internal variables that belong to it.
+    pub(crate) internal_early: Vec<T>,
     /// Whether there is such a part.
     pub(crate) keeps_F_early: bool,
     /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.

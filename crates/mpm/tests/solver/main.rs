@@ -2,6 +2,7 @@
 
 mod failures;
 mod mechanics;
+mod memory;
 mod order;
 mod polygons;
 mod ranks;

@@ -70,6 +70,7 @@ fn a_wall_is_a_mirror() {
                     mass: vec![],
                     volume: vec![],
                     half_size: Vector2::repeat(per_cell_size * h),
+                    ..Particles::default()
                 };
                 let (mut places, mut moved, mut cells) = (vec![], vec![], vec![]);
                 for side in if mirrored { vec![1.0, -1.0] } else { vec![1.0] } {

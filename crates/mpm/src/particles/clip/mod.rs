@@ -227,6 +227,7 @@ fn at_rest<T: RealField + Copy, const D: usize>(
         mass,
         volume,
         half_size: SVector::repeat(real(0.5 * spacing)),
+        ..Particles::default()
     };
     Body { particles, half_edges: Vec::new(), mesh: Some(mesh) }
 }

@@ -52,10 +52,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
         part.version += 1;
         let before = std::mem::replace(&mut part.ids, Arc::new(ids)).len();
-        let Particles { X, x, v, F, mass, volume, half_size: _ } = particles;
-        [X, x, v].into_iter().for_each(|vectors| moved.replace(vectors));
-        moved.replace(F);
-        [&mut *mass, &mut *volume].into_iter().for_each(|numbers| moved.replace(numbers));
+        particles.each(&self.shares, &mut &moved);
         match support {
             Support::Product(_) | Support::Mesh(_) => {}
             Support::Cpdi { half_edges } => {
@@ -63,11 +60,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 *half_edges = HalfEdges::new(moved.all(&each));
             }
         }
-        if part.is_affine {
-            moved.replace(&mut self.affine);
-        }
+        let Particles { x, mass, volume, internal, .. } = &self.particles;
         if self.keeps_F_early {
             self.F_early.resize(x.len(), SMatrix::identity());
+            self.internal_early.resize(internal.len(), T::zero());
         }
         let (first_mass, first_volume) = (mass.first().copied(), volume.first().copied());
         self.uniform = first_mass.zip(first_volume).filter(|(m, V)| {

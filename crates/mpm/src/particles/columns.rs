@@ -1,0 +1,269 @@
+//! What a particle has, stated once: sort, split, gather, move between processes, save and resume follow from the rows of [`columns!`].
+//!
+//! A column has the same number of successive elements for each particle, its share: one, none where a run does without the column, or
+//! as many as a law has internal variables.
+
+use bytemuck::{Pod, cast_slice};
+use mmsmith_lanes::simd::Lanes;
+use nalgebra::{SMatrix, SVector};
+
+use crate::parallel::disjoint::{DisjointColumn, PartColumn, Partition, Run};
+
+/// Work on a column, whatever its elements are.
+pub(crate) trait EachColumn {
+    /// `share` is how many elements a particle has.
+    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>);
+}
+
+macro_rules! columns {
+    (
+        fixed { $($(#[$fixed_doc:meta])* $fixed:ident: $Fixed:ty,)* }
+        moving { $($(#[$moving_doc:meta])* $moving:ident: $Moving:ty,)* }
+    ) => {
+        /// State of the particles as a structure of arrays; the index is the particle's id and never changes.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Particles<T, const D: usize> {
+            $($(#[$fixed_doc])* pub $fixed: Vec<$Fixed>,)*
+            $($(#[$moving_doc])* pub $moving: Vec<$Moving>,)*
+            /// Reference half-size l0 of every particle's box, along each axis.
+            pub half_size: SVector<T, D>,
+        }
+
+        impl<T: nalgebra::RealField, const D: usize> Default for Particles<T, D> {
+            /// No particles.
+            fn default() -> Self {
+                Self {
+                    $($fixed: Vec::new(),)*
+                    $($moving: Vec::new(),)*
+                    half_size: SVector::zeros(),
+                }
+            }
+        }
+
+        /// The shares of the columns that steps change.
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) struct Shares {
+            $(pub(crate) $moving: usize,)*
+        }
+
+        impl<T: Copy, const D: usize> Particles<T, D> {
+            /// The particles at some places, in that order.
+            pub(crate) fn some(&self, places: &[u32]) -> Self {
+                let count = self.X.len();
+                Self {
+                    $($fixed: some(&self.$fixed, count, places),)*
+                    $($moving: some(&self.$moving, count, places),)*
+                    half_size: self.half_size,
+                }
+            }
+        }
+
+        impl<T: Lanes, const D: usize> Particles<T, D> {
+            /// The columns that stay, and those that steps change.
+            pub(crate) fn split(&mut self) -> (Fixed<'_, T, D>, Moving<'_, T, D>) {
+                let count = self.X.len();
+                (
+                    Fixed { $($fixed: &self.$fixed,)* },
+                    Moving { count, $($moving: &mut self.$moving,)* },
+                )
+            }
+
+            /// The same columns as bytes.
+            pub(crate) fn moving_bytes(&self) -> Vec<&[u8]> {
+                vec![$(cast_slice(&self.$moving),)*]
+            }
+
+            /// Works on every column.
+            pub(crate) fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
+                $(work.column(1, &mut self.$fixed);)*
+                $(work.column(shares.$moving, &mut self.$moving);)*
+            }
+
+            /// Takes the columns that steps change from others.
+            pub(crate) fn replace_moving(&mut self, columns: MovingColumns<T, D>) {
+                $(self.$moving = columns.$moving;)*
+            }
+        }
+
+        /// The columns that stay.
+        #[derive(Clone, Copy)]
+        pub(crate) struct Fixed<'a, T, const D: usize> {
+            $($(#[$fixed_doc])* pub(crate) $fixed: &'a [$Fixed],)*
+        }
+
+        /// The columns that steps change, of some successive particles.
+        pub(crate) struct Moving<'a, T, const D: usize> {
+            count: usize,
+            $($(#[$moving_doc])* pub(crate) $moving: &'a mut [$Moving],)*
+        }
+
+        impl<'a, T, const D: usize> Moving<'a, T, D> {
+            /// The first particles, as many as there are and no more than `count`.
+            pub(crate) fn first(&mut self, count: usize) -> Moving<'_, T, D> {
+                let (all, count) = (self.count.max(1), count.min(self.count));
+                Moving {
+                    count,
+                    $($moving: {
+                        let elements = self.$moving.len() / all * count;
+                        &mut self.$moving[..elements]
+                    },)*
+                }
+            }
+
+            /// Takes the first particles away, as many as there are and no more than `count`.
+            pub(crate) fn split_off(&mut self, count: usize) -> Moving<'a, T, D> {
+                let (all, count) = (self.count.max(1), count.min(self.count));
+                self.count -= count;
+                Moving {
+                    count,
+                    $($moving: {
+                        let elements = self.$moving.len() / all * count;
+                        self.$moving.split_off_mut(..elements).unwrap_or_default()
+                    },)*
+                }
+            }
+        }
+
+        /// The columns that steps change, apart from particles.
+        pub(crate) struct MovingColumns<T, const D: usize> {
+            $(pub(crate) $moving: Vec<$Moving>,)*
+        }
+
+        impl<T: Lanes, const D: usize> MovingColumns<T, D> {
+            /// How many columns there are.
+            pub(crate) const COUNT: usize = [$(stringify!($moving)),*].len();
+
+            /// Of no particles.
+            pub(crate) fn none() -> Self {
+                Self { $($moving: Vec::new(),)* }
+            }
+
+            /// Of so many particles, every element zero.
+            fn zero(count: usize, shares: &Shares) -> Self {
+                Self { $($moving: vec![<$Moving as bytemuck::Zeroable>::zeroed(); count * shares.$moving],)* }
+            }
+
+            /// Works on every column.
+            pub(crate) fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
+                $(work.column(shares.$moving, &mut self.$moving);)*
+            }
+
+            /// The first particles of those whose shares these are.
+            pub(crate) fn first(&mut self, count: usize, shares: &Shares) -> Moving<'_, T, D> {
+                Moving { count, $($moving: &mut self.$moving[..count * shares.$moving],)* }
+            }
+        }
+
+        /// The columns that steps change, whose elements belong to the parts of a partition.
+        pub(crate) struct DisjointMoving<'a, T, const D: usize> {
+            $($moving: DisjointColumn<'a, $Moving>,)*
+            partition: &'a Partition,
+        }
+
+        impl<'a, T: Lanes, const D: usize> DisjointMoving<'a, T, D> {
+            /// `None` where the partition does not have each particle once.
+            pub(crate) fn new(partition: &'a mut Partition, moving: Moving<'a, T, D>) -> Option<Self> {
+                let whole = partition.whole()?;
+                Some(Self {
+                    $($moving: whole.column(moving.$moving)?,)*
+                    partition: whole.partition(),
+                })
+            }
+
+            /// The elements of a part: once, then `None`, as for a part that does not exist.
+            pub(crate) fn take(&self, part: usize) -> Option<PartMoving<'_, T, D>> {
+                Some(PartMoving {
+                    indices: self.partition.part(part)?,
+                    $($moving: self.$moving.take(part)?,)*
+                })
+            }
+        }
+
+        /// The columns that steps change, of the particles of a part.
+        pub(crate) struct PartMoving<'a, T, const D: usize> {
+            indices: &'a [u32],
+            $($moving: PartColumn<'a, $Moving>,)*
+        }
+
+        impl<'a, T: Lanes, const D: usize> PartMoving<'a, T, D> {
+            /// The numbers of the particles.
+            pub(crate) fn indices(&self) -> &'a [u32] {
+                self.indices
+            }
+
+            /// The particles from a place on in memory, if they lie side by side there.
+            #[inline(always)]
+            pub(crate) fn contiguous(&mut self, place: usize, count: usize) -> Option<Moving<'_, T, D>> {
+                let run = Run::find(self.indices, place, count)?;
+                Some(Moving { count, $($moving: self.$moving.run(run),)* })
+            }
+
+            /// Copies so many particles from a place on.
+            #[inline(always)]
+            pub(crate) fn gather(&mut self, place: usize, count: usize, copies: &mut MovingColumns<T, D>) {
+                $(self.$moving.gather(place, count, &mut copies.$moving);)*
+            }
+
+            /// Copies them back.
+            #[inline(always)]
+            pub(crate) fn scatter(&mut self, place: usize, count: usize, copies: &MovingColumns<T, D>) {
+                $(self.$moving.scatter(place, count, &copies.$moving);)*
+            }
+        }
+    };
+}
+
+columns! {
+    fixed {
+        /// Reference positions, lengths.
+        X: SVector<T, D>,
+        /// Masses.
+        mass: T,
+        /// Reference volumes V0 (areas in 2D, lengths in 1D).
+        volume: T,
+    }
+    moving {
+        /// Current positions, lengths.
+        x: SVector<T, D>,
+        /// Velocities.
+        v: SVector<T, D>,
+        /// Deformation gradients `F[i][J] = dx_i/dX_J`.
+        F: SMatrix<T, D, D>,
+        /// APIC: affine velocities per cell; empty with other transfers.
+        affine: SMatrix<T, D, D>,
+        /// Internal variables of the law, those of a particle one after the other; empty where the law has none.
+        internal: T,
+    }
+}
+
+impl<T: Lanes, const D: usize> MovingColumns<T, D> {
+    /// Of so many particles that are not deformed, every other element zero.
+    pub(crate) fn at_rest(count: usize, shares: &Shares) -> Self {
+        Self { F: vec![SMatrix::identity(); count], ..Self::zero(count, shares) }
+    }
+}
+
+/// The elements of the particles at some places of `count`, in that order.
+fn some<E: Copy>(all: &[E], count: usize, places: &[u32]) -> Vec<E> {
+    let share = all.len() / count.max(1);
+    let of = |&place: &u32| &all[place as usize * share..][..share];
+    places.iter().flat_map(of).copied().collect()
+}
+
+impl<'a, T, const D: usize> Moving<'a, T, D> {
+    /// Number of particles.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Pieces of `size` particles, each with the place of its first one here.
+    pub(crate) fn pieces(mut self, size: usize) -> impl Iterator<Item = (usize, Self)> {
+        let mut first = 0;
+        std::iter::from_fn(move || {
+            let piece = self.split_off(size);
+            let start = first;
+            first += piece.len();
+            (piece.len() > 0).then_some((start, piece))
+        })
+    }
+}
