@@ -14,7 +14,7 @@ use nalgebra::RealField;
 use crate::grid::Layout;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks};
+use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::parallel::coloring::Shared;
 use crate::parallel::disjoint::Partition;
 use crate::scheme::{Taken, Transfer};
@@ -251,7 +251,7 @@ where
         bins: &'b mut Bins,
         nodes: &mut [Node<T, D>],
         divide: impl FnOnce(&'b mut Partition) -> P,
-        add: &(dyn Fn(&mut [Node<T, D>], usize, u32, &P, usize) + Sync),
+        add: &UpdateAndAdd<'_, Node<T, D>, P>,
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {

@@ -113,6 +113,10 @@ pub(crate) struct Bins {
 /// node, and the particles in order.
 pub(crate) type AddToBand<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
 
+/// As [`AddToBand`] for kernels that change particles: `add(band, first, bin, divided, part)`, with the bin's number, the particles divided
+/// among bins, and the part that is this bin's.
+pub(crate) type UpdateAndAdd<'a, N, P> = dyn Fn(&mut [N], usize, u32, &P, usize) + Sync + 'a;
+
 /// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
 #[derive(Clone, Copy)]
 pub(crate) struct NodeHooks<'a, N> {
@@ -279,7 +283,7 @@ impl Bins {
         nodes: &mut [N],
         hooks: NodeHooks<'_, N>,
         divide: impl FnOnce(&'a mut Partition) -> P,
-        add: &(dyn Fn(&mut [N], usize, u32, &P, usize) + Sync),
+        add: &UpdateAndAdd<'_, N, P>,
     ) {
         let Self { rows, held, order, schedule, .. } = self;
         let start = held.bands.start;
