@@ -82,7 +82,7 @@ impl StepError {
     /// Numbers that say all of an error.
     pub(crate) const NUMBERS: usize = 10;
 
-    /// The same of another particle.
+    /// This error of another particle.
     pub(crate) fn about(mut self, id: usize) -> Self {
         let (Self::Inverted { particle, .. }
         | Self::NotFinite { particle, .. }

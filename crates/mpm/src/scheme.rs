@@ -89,7 +89,7 @@ named! {
         Cpdi = "cpdi",
         /// Quadrilaterals (in space hexahedra) whose corners neighbours share
         ///
-        /// The same as `Cpdi` on segments, quadrilaterals and hexahedra whose corners are points of the body, which move with
+        /// `Cpdi` on segments, quadrilaterals and hexahedra whose corners are points of the body, which move with
         /// the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
         Cpdi2 = "cpdi2",
     }
@@ -174,7 +174,7 @@ pub enum Transfer {
     Xpic(u32),
 }
 
-/// What particles take of the grid's velocity.
+/// How particles take the grid's velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Taken {
     /// Its change.
@@ -195,7 +195,7 @@ impl Transfer {
     /// The largest order of a filter: each costs a pass over the particles, and beyond some tens nothing is left to filter.
     const HIGHEST_ORDER: u32 = 100;
 
-    /// What particles take of the grid's velocity.
+    /// How particles take the grid's velocity.
     pub(crate) fn taken(self) -> Taken {
         match self {
             Self::Flip => Taken::Change,

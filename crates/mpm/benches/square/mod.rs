@@ -1,4 +1,4 @@
-//! What is advanced: a unit square with 2x2 particles a cell between four walls, set in motion without a body force.
+//! The scene: a unit square with 2x2 particles a cell between four walls, set in motion without a body force.
 
 use mmsmith_mpm::{Grid, Integrator, Material, Particles, Settings, Shape, Simulation, Transfer};
 use nalgebra::{Vector2, vector};

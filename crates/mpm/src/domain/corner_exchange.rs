@@ -28,12 +28,12 @@ use crate::shape::one_axis::{OnAxis, ProductShape};
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome, SharedOutcome};
 
-/// What says the stress on the boundary, and the time.
+/// The source of the tractions on the boundary, and the time.
 pub(crate) type Loading<'a, T, const D: usize> = Option<(&'a dyn BodyForce<T, D>, T)>;
 
-/// What passes between particles, corners and grid on its way.
+/// Buffers of the exchange in two stages: sums of particles at corners, and values of the grid at corners.
 pub(crate) struct Exchange<T, const D: usize> {
-    /// What the particles of each chunk give at each corner, see [`SharedCorners::chunks`].
+    /// Sums of the particles of each chunk at each corner, see [`SharedCorners::chunks`].
     sums: Vec<Node<T, D>>,
     /// Whether there are affine momenta.
     has_affine: bool,
@@ -45,7 +45,7 @@ pub(crate) struct Exchange<T, const D: usize> {
     pub(crate) values: CornerValues<T, D>,
     /// Whether velocities are projected again.
     reprojects: bool,
-    /// The same of such velocities, where there are any.
+    /// The values of the projected velocities at each corner, where there are any.
     pub(crate) reprojected: CornerValues<T, D>,
     /// The light nodes that a clipped body reaches.
     extension: Option<Extension<T, D>>,
@@ -60,7 +60,7 @@ pub(crate) struct Exchange<T, const D: usize> {
 /// The sums of a chunk of particles.
 pub(crate) struct ChunkSums<'a, T, const D: usize> {
     pub(crate) sums: &'a mut [Node<T, D>],
-    /// Of affine momenta, where they count.
+    /// Sums of affine momenta, where there are any.
     pub(crate) affine_sums: &'a mut [AlongAxes<T, D>],
 }
 
@@ -216,7 +216,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         self.interpolate_and_follow(c, corners, nodes, &mut []);
     }
 
-    /// The same, and the corners follow these values in a step, for their `next` positions; unless these are empty.
+    /// As [`interpolate`](Self::interpolate), and the corners follow these values in a step, for their `next` positions; unless these are empty.
     pub(crate) fn interpolate_and_follow(
         &mut self,
         c: &Constants<T, D>,

@@ -17,7 +17,7 @@ pub(crate) struct CornerValues<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> CornerValues<T, D> {
-    /// Of no corner.
+    /// Values without corners.
     pub(crate) fn none() -> Self {
         Self { nodes: Vec::new(), moments: Vec::new() }
     }
@@ -29,11 +29,11 @@ impl<T: Lanes, const D: usize> CornerValues<T, D> {
     }
 }
 
-/// What particles take in G2P.
+/// The values that G2P interpolates.
 #[derive(Clone, Copy)]
 pub(crate) enum Seen<'a, T, const D: usize> {
     /// Values at nodes.
     Nodes(&'a [Node<T, D>]),
-    /// Those of the grid at shared corners.
+    /// Values of the grid at shared corners.
     Corners(&'a CornerValues<T, D>),
 }

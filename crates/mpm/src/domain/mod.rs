@@ -121,7 +121,7 @@ impl<T: Lanes, const D: usize> Support<T, D> {
         if let Self::Mesh(corners) = self { Some(corners.volume(p)) } else { None }
     }
 
-    /// What particles take values from.
+    /// The values that particles interpolate: at nodes, or at corners.
     pub(crate) fn seen<'a>(
         &self,
         nodes: &'a [Node<T, D>],

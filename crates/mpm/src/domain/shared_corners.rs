@@ -61,7 +61,7 @@ pub(crate) struct Measured<T, const D: usize> {
     volumes: Vec<T>,
 }
 
-/// The same of some successive particles.
+/// Shares of some successive particles.
 pub(crate) struct MeasuredPart<'a, T, const D: usize> {
     shares: &'a mut [Share<T, D>],
     volumes: &'a mut [T],
@@ -83,7 +83,7 @@ impl<T: Lanes, const D: usize> Measured<T, D> {
         Self { shares, volumes }
     }
 
-    /// Those of a particle and the ones after it.
+    /// The shares of a particle and of the particles after it.
     pub(crate) fn from(&self, mesh: &Mesh<T, D>, first: usize) -> &[Share<T, D>] {
         self.shares.get(mesh.places(first).start..).unwrap_or_default()
     }
@@ -153,7 +153,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         Self::of_part(mesh, at_corner, &ids, (own, None))
     }
 
-    /// Of particles with these numbers in the whole body, ascending, where this process sorts the first `own` corners, and others do the
+    /// Corners of the particles with these numbers in the whole body, ascending, where this process sorts the first `own` corners, and others do the
     /// rest.
     pub(crate) fn of_part(
         mesh: Mesh<T, D>,

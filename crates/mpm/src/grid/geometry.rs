@@ -65,7 +65,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         self.stretch_for(self.time_step, L, F)
     }
 
-    /// The same for another time than a step.
+    /// `(I + time L) F`, as [`stretch`](Self::stretch) for any time.
     #[inline(always)]
     pub(crate) fn stretch_for(
         &self,

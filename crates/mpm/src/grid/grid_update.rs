@@ -343,7 +343,7 @@ where
         self.update.add(image, &self.c.ghost(ghost).flipped(flip));
     }
 
-    /// The same for one of the edges, among the rows from row `first` on.
+    /// Updates one of the edges, among the rows from row `first` on.
     fn fold_edge(&self, edge: &Edge, nodes: &mut [Node<T, D>], first: usize) {
         self.layout.fold_edge(&edge.rows, first, nodes, &|image, ghost, flip| {
             self.fold(image, ghost, flip);

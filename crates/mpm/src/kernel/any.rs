@@ -6,6 +6,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::grid::geometry::Constants;
 use crate::grid::node::{LANES, Node};
+use crate::kernel::beyond;
 use crate::shape::one_axis::EXTENDED;
 use crate::shape::weights::Weights;
 
@@ -60,7 +61,7 @@ pub(crate) trait Receive<T, const D: usize> {
     /// The values at particle `k` of a block.
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>);
 
-    /// The same in one or two dimensions, in four lanes: `[velocity, acceleration]`, and their slopes along each axis.
+    /// As [`receive`](Self::receive) in one or two dimensions, in four lanes: `[velocity, acceleration]`, and their slopes along each axis.
     #[inline(always)]
     fn receive_lanes<const W: usize>(
         &mut self,
@@ -176,7 +177,7 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
         self.value[k] = Node::new(&(v * m), &self.force(c, k), m);
     }
 
-    /// The same in two dimensions, from position and velocity in four lanes `[x, y, v_x, v_y]`.
+    /// As [`set_value`](Self::set_value) in two dimensions, from position and velocity in four lanes `[x, y, v_x, v_y]`.
     #[inline(always)]
     pub(crate) fn set_value_in_plane(&mut self, vectors: impl Vectors, k: usize, xv: Lane4<T>) {
         let (m, b) = (self.mass[k], self.b[k]);
@@ -265,7 +266,7 @@ struct Row<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
     S: T,
-    /// The same with the slope along an axis in place of its weight; entry 0 is unused.
+    /// Products with the slope along an axis in place of its weight; entry 0 is unused.
     slopes: [Factors<T>; D],
 }
 
@@ -344,8 +345,7 @@ pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
         let row = row(weights, start, strides, index);
         let [to_value, to_slope] = contributions_to_row(value, &slope, &row, L::AFFINE);
         let Some(nodes) = band.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
-            debug_assert!(false, "a stencil beyond its band");
-            return;
+            beyond("a stencil beyond its band")
         };
         for (i, Node { values }) in nodes.iter_mut().enumerate() {
             let factors = Factors::of(weights, 0, i);
@@ -422,8 +422,7 @@ where
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
         let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-            debug_assert!(false, "a stencil beyond the grid");
-            break;
+            beyond("a stencil beyond the grid")
         };
         sums.add_row(weights, &row, nodes);
     }

@@ -14,6 +14,7 @@ use crate::domain::corner_values::Seen;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
+use crate::kernel::beyond;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::parallelograms::ParallelogramWeights;
 use crate::kernel::product::ProductWeights;
@@ -109,7 +110,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             (Self::Shared { first, .. }, Support::Mesh(_)) => {
                 *first = ids.first().map_or(0, |id| *id as usize);
             }
-            _ => debug_assert!(false, "a block for another shape function"),
+            _ => beyond("a block for another shape function"),
         }
     }
 
@@ -134,7 +135,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
             Self::Parallelograms(weights) => {
                 weights.p2g(strides, band, first, contributions, count)
             }
-            Self::Shared { .. } => debug_assert!(false, "these give to corners"),
+            Self::Shared { .. } => beyond("these give to corners"),
         }
     }
 
@@ -160,7 +161,7 @@ impl<T: Lanes, const D: usize> Block<T, D> {
                 let shares = corners.measured.from(&corners.mesh, first);
                 FromCorners { c, corners, shares, values, first, receiver }.interpolate(is_affine);
             }
-            _ => debug_assert!(false, "values for another shape function"),
+            _ => beyond("values for another shape function"),
         }
     }
 }

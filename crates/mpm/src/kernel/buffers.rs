@@ -9,7 +9,7 @@ use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::block::Block;
 use crate::kernel::copies::BLOCK;
 
-/// What a pass over blocks computes with. Entries beyond the particles of a block are left from another block, and not read.
+/// Buffers of a pass over blocks. Entries beyond the particles of a block are left from another block, and not read.
 pub(crate) struct Buffers<T, const D: usize> {
     is_affine: bool,
     pub(crate) block: Block<T, D>,

@@ -6,6 +6,7 @@ use mmsmith_lanes::simd::{Lane8, Lanes, Vectors};
 
 use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Interpolated};
+use crate::kernel::beyond;
 use crate::shape::weights::Weights;
 
 /// The weights of a particle along an axis, each as a factor of eight numbers.
@@ -89,8 +90,7 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
             let to_along = vectors.mul8(to_along, S_across[row]);
             let place = start + row * strides[1] + plane * strides[D - 1];
             let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                debug_assert!(false, "a stencil beyond its band");
-                return;
+                beyond("a stencil beyond its band")
             };
             for (i, Node { values }) in nodes.iter_mut().enumerate() {
                 let with_slope = vectors.mul_add8(to_along, G[i], vectors.load8(values));
@@ -141,8 +141,7 @@ where
         for row in 0..places::<W>() {
             let place = start + row * strides[1] + plane * strides[D - 1];
             let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                debug_assert!(false, "a stencil beyond the grid");
-                return Interpolated::zero();
+                beyond("a stencil beyond the grid")
             };
             let (mut row_value, mut row_along) = (zero, zero);
             for (i, Node { values }) in nodes.iter().enumerate() {

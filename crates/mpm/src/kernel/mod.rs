@@ -20,3 +20,11 @@ pub(crate) mod points;
 pub(crate) mod prefetch;
 mod product;
 pub(crate) mod shared;
+
+/// Ends the run: a weight, a block or a node is not the one that the code around it has prepared. Checks of particles and bins rule it out;
+/// sums that lack a part would be worse than no result.
+#[cold]
+#[inline(never)]
+pub(crate) fn beyond(what: &str) -> ! {
+    panic!("{what}: a fault of the solver, not of the scene")
+}

@@ -18,6 +18,7 @@ use mmsmith_lanes::tensor::real;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
+use crate::kernel::beyond;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::points::start_of_row;
 use crate::shape::cells::{
@@ -134,7 +135,7 @@ impl<T: Lanes, const D: usize> ParallelogramWeights<T, D> {
         Self { own: Parallelograms::new(is_affine), of_group: GroupWeights::zero() }
     }
 
-    /// Of the parallelograms that F makes of those with these half-edges.
+    /// Weights of the parallelograms that F makes of the reference ones with these half-edges.
     pub(crate) fn compute(
         &mut self,
         c: &Constants<T, D>,
@@ -431,8 +432,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                     let Row { start: from_first, place } = weights.rows[row];
                     let nodes = band.get_mut(start + from_first..);
                     let Some(nodes) = nodes.and_then(|n| n.first_chunk_mut::<REACHED>()) else {
-                        debug_assert!(false, "a domain beyond its band");
-                        return;
+                        beyond("a domain beyond its band")
                     };
                     let mut of_row = value;
                     if AFFINE {
@@ -485,8 +485,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE
                 for corner in 0..1 << D {
                     let start = own.first_node[k] + cells.start[corner][n];
                     let Some(values) = corners_of_cell(vectors, strides, nodes, start) else {
-                        debug_assert!(false, "a domain beyond the grid");
-                        return;
+                        beyond("a domain beyond the grid")
                     };
                     let mut r = [Lane8::zero(); D];
                     for a in 0..D {
@@ -659,7 +658,7 @@ impl<T: Lanes, const D: usize> Linear<T, D> {
     }
 }
 
-/// What a particle gets or gives at one of its corners, on its way from or to one of the nodes around that.
+/// The term of one corner of a particle and one of the nodes around that corner, in P2G or G2P.
 #[derive(Clone, Copy)]
 struct Place<T, const D: usize> {
     corner: usize,
@@ -712,7 +711,7 @@ struct Sums<T, const D: usize> {
     value: Lane8<T>,
     /// By `H_a`.
     slopes: [Lane8<T>; D],
-    /// Of the values times the arms along each axis.
+    /// Sums of values times the arms along each axis.
     moments: [Lane8<T>; D],
 }
 
@@ -769,8 +768,7 @@ fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
     let affine: [_; D] = array::from_fn(|a| contributions.affine_lanes(k, a).0);
     own.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
         let Some(Node { values }) = band.get_mut(start + node) else {
-            debug_assert!(false, "a corner beyond its band");
-            return;
+            beyond("a corner beyond its band")
         };
         let w = hat * real(1.0 / f64::from(1 << D));
         for (q, sum) in values.iter_mut().enumerate() {

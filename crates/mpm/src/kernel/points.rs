@@ -7,6 +7,7 @@ use crate::domain::corner_values::AlongAxes;
 use crate::domain::shared_corners::SharedCorners;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
+use crate::kernel::beyond;
 use crate::shape::one_axis::{Hat, ShapeFunction, index};
 
 /// The nodes around a point.
@@ -149,10 +150,7 @@ fn put<T: Lanes, V: Vectors, const D: usize>(
     for (row, sums) in sums.iter().enumerate().take(1 << (D - 1)) {
         let start = start_of_row(&c.strides, first, row);
         let nodes = band.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
-        let Some(nodes) = nodes else {
-            debug_assert!(false, "a corner beyond its band");
-            return;
-        };
+        let Some(nodes) = nodes else { beyond("a corner beyond its band") };
         for (Node { values }, sum) in nodes.iter_mut().zip(sums) {
             *values = vectors.add8(vectors.load8(values), *sum).0;
         }
@@ -217,8 +215,7 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
                 let Some([low, high]) =
                     nodes.get(start..).and_then(|nodes| nodes.first_chunk::<2>())
                 else {
-                    debug_assert!(false, "a corner beyond the grid");
-                    return;
+                    beyond("a corner beyond the grid")
                 };
                 let (low, high) = (vectors.load8(&low.values), vectors.load8(&high.values));
                 // Rounded before they are added: those of a node and of its mirror image cancel.

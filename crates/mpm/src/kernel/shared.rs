@@ -167,7 +167,7 @@ struct Adding<'a, 'b, T, const D: usize, const AFFINE: bool> {
     have_volume: &'b mut bool,
 }
 
-/// What a particle gives at each of its corners.
+/// The flux of a particle to each of its corners.
 struct Giving<T, const D: usize> {
     value: Lane8<T>,
     /// `-V0 tau` along each axis.
@@ -444,7 +444,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
     }
 }
 
-/// What affine velocities of a group of cells are computed with: `B D^-1`. Of the weights `sum_c w_c N_i(x_c)` at nodes the moments
+/// Affine velocities `B D^-1` of a group of cells. Of the weights `sum_c w_c N_i(x_c)` at nodes the moments
 /// `B = sum v S arm` and the inertia `D = sum S arm arm` about the centre are those of the corners, with those of the hat functions
 /// around each.
 struct OfAffine<T, V, const D: usize> {

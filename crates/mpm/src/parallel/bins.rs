@@ -124,7 +124,7 @@ pub(crate) struct NodeHooks<'a, N> {
     pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
     /// After the last contribution; the second argument is the index of the first node.
     pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
-    /// What passes between this process and those that hold other bins, where there are such.
+    /// The exchange with processes that hold other bins, where there are such.
     pub(crate) halo: Option<Halo<'a, N>>,
 }
 
@@ -297,7 +297,7 @@ impl Bins {
 
 /// Calls `add(band, first, bin)` for each bin here, and the hooks around it.
 ///
-/// Of a segment that is shared with another process one has the first band. It sends its sums, which the other one adds to as soon as they
+/// A segment that two processes share belongs to the first band of one of them. That process sends its sums, which the other one adds to as soon as they
 /// have come, and gets the updated nodes back.
 fn for_each_band<N: Send>(
     rows: BinRows,

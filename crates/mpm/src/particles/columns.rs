@@ -1,4 +1,4 @@
-//! What a particle has, stated once: sort, split, gather, move between processes, save and resume follow from the rows of [`columns!`].
+//! The columns of particles, stated once: sort, split, gather, move between processes, save and resume follow from the rows of [`columns!`].
 //!
 //! A column has the same number of successive elements for each particle, its share: one, none where a run does without the column, or
 //! as many as a law has internal variables.
@@ -68,7 +68,7 @@ macro_rules! columns {
                 )
             }
 
-            /// The same columns as bytes.
+            /// The columns that steps change, as bytes.
             pub(crate) fn moving_bytes(&self) -> Vec<&[u8]> {
                 vec![$(cast_slice(&self.$moving),)*]
             }
@@ -133,12 +133,12 @@ macro_rules! columns {
             /// How many columns there are.
             pub(crate) const COUNT: usize = [$(stringify!($moving)),*].len();
 
-            /// Of no particles.
+            /// Columns without particles.
             pub(crate) fn none() -> Self {
                 Self { $($moving: Vec::new(),)* }
             }
 
-            /// Of so many particles, every element zero.
+            /// Columns of `count` particles, every element zero.
             fn zero(count: usize, shares: &Shares) -> Self {
                 Self { $($moving: vec![<$Moving as bytemuck::Zeroable>::zeroed(); count * shares.$moving],)* }
             }
@@ -237,7 +237,7 @@ columns! {
 }
 
 impl<T: Lanes, const D: usize> MovingColumns<T, D> {
-    /// Of so many particles that are not deformed, every other element zero.
+    /// Columns of `count` particles that are not deformed, every other element zero.
     pub(crate) fn at_rest(count: usize, shares: &Shares) -> Self {
         Self { F: vec![SMatrix::identity(); count], ..Self::zero(count, shares) }
     }

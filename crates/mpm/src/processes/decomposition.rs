@@ -33,7 +33,7 @@ pub struct Arrangement<'a> {
     pub version: u64,
 }
 
-/// What a process knows of its part.
+/// The part of the body that one process holds.
 pub(crate) struct Part {
     pub(crate) ranks: Arc<dyn Ranks>,
     /// The numbers of the particles here, ascending.
@@ -45,7 +45,7 @@ pub(crate) struct Part {
     pub(crate) cuts: Vec<usize>,
 }
 
-/// Those of some particles that a process holds.
+/// The particles that this process owns, among those that are present as halo.
 pub(crate) struct Own {
     /// Their places, ascending.
     pub(crate) places: Vec<u32>,

@@ -17,7 +17,7 @@ pub(crate) struct Directory {
     numbers: Vec<u64>,
 }
 
-/// What all processes ask for.
+/// The answers to the questions of all processes.
 pub(crate) struct Answers {
     ranks: Option<Arc<dyn Ranks>>,
     moved: Move,
@@ -34,7 +34,7 @@ pub(crate) struct Answers {
 }
 
 impl Directory {
-    /// Of the elements with these numbers, which this process has. A call of all.
+    /// A directory of the elements with these numbers, which this process has. A call of all.
     pub(crate) fn new(ranks: Option<&Arc<dyn Ranks>>, numbers: &[u64]) -> Self {
         let processes = ranks.map_or(1, |ranks| ranks.count());
         let homes: Vec<usize> = numbers.iter().map(|&number| home(number, processes)).collect();
@@ -87,7 +87,7 @@ impl Directory {
 }
 
 impl Answers {
-    /// Those of the elements that this process has asked for, in that order. A call of all, where all processes' answers are whole.
+    /// The elements that this process has asked for, in that order. A call of all, where all processes' answers are whole.
     pub(crate) fn fetch<E: Pod>(&self, elements: &[E]) -> Vec<E> {
         self.fetch_shares(1, elements)
     }

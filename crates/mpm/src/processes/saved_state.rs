@@ -89,7 +89,7 @@ struct Saved<T, const D: usize> {
     corner_x: Vec<SVector<T, D>>,
 }
 
-/// What the particles of a scheme have.
+/// The columns of a scheme's particles.
 #[derive(Clone, Copy)]
 struct Kind {
     shares: Shares,
@@ -159,7 +159,7 @@ impl<T: Lanes, const D: usize> Saved<T, D> {
         Ok(())
     }
 
-    /// Those that are here after a move.
+    /// Replaces the elements by those of the particles that are here after a move.
     fn follow(&mut self, moved: &Move) {
         moved.replace(&mut self.keys);
         self.columns.each(&self.kind.shares, &mut &*moved);

@@ -30,7 +30,7 @@ impl<T: RealField + Copy, const D: usize> HalfEdges<T, D> {
         }
     }
 
-    /// Those of a particle.
+    /// The half-edges of a particle.
     pub(crate) fn of(&self, p: usize) -> &SMatrix<T, D, D> {
         match self {
             Self::Same(half_edges) => half_edges,

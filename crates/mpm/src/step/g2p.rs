@@ -204,7 +204,7 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         Self { c, support, nodes, copies: Copies::new(), buffers }
     }
 
-    /// Of the particles from the id `first` on, no more than a block.
+    /// Interpolated values of the particles from the id `first` on, no more than a block.
     fn g2p(
         &mut self,
         first: usize,

@@ -112,7 +112,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         outcome
     }
 
-    /// The same for a block of particles.
+    /// As [`advance_bin`](Self::advance_bin) for a block of particles.
     fn advance_block(
         &self,
         Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,

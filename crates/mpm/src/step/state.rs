@@ -49,7 +49,7 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) filtered: Vec<SVector<T, D>>,
     /// Buffers for blocks of particles.
     pub(crate) buffers: BufferPool<T, D>,
-    /// What passes between polygons and grid.
+    /// Buffers between shared corners and the grid.
     pub(crate) exchange: Exchange<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,

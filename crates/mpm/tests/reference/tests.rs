@@ -221,7 +221,7 @@ fn an_error_names_the_particle() {
     assert!(error.starts_with("particle "), "{error}");
 }
 
-/// What light nodes of a clipped body continue is linear: shares sum to 1, and to the light node's place.
+/// Light nodes of a clipped body continue linear fields: shares sum to 1, and to the light node's place.
 #[test]
 fn light_nodes_continue_linear_functions() {
     fn check<const D: usize>(radius: f64)

@@ -105,7 +105,7 @@ impl<const D: usize> Nodes<D> {
         self.grid.cells[axis] + 1 + 2 * PAD as usize
     }
 
-    /// What a layer across an axis adds to a node's number; layer 0 is on the lower face.
+    /// The part of a node's number that a layer across an axis contributes; layer 0 is on the lower face.
     fn offset(&self, layer: isize, axis: usize) -> usize {
         let stride: usize = (0..axis).map(|a| self.layers(a)).product();
         (layer + PAD) as usize * stride

@@ -1,4 +1,4 @@
-//! What a state has to be to be simulated, up to the limits, and which particle a failed step names, with which figures.
+//! Conditions on a state to be simulated, up to the limits, and which particle a failed step names, with which figures.
 
 #![allow(clippy::unwrap_used)]
 
@@ -12,7 +12,7 @@ use crate::schemes::{INTEGRATORS, SHAPES, single};
 
 const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
 
-/// Of binary fractions, and with axes that differ.
+/// A grid of binary fractions whose axes differ.
 fn grid<const D: usize>() -> Grid<f64, D> {
     Grid {
         lower: SVector::from_fn(|a, _| [-0.5, 0.25, 1.0][a]),
@@ -387,7 +387,7 @@ fn single_precision_has_the_same_limits() {
 
 type Change<'a> = &'a dyn Fn(&mut Grid<f64, 2>, &mut Body<f64, 2>, &mut f64);
 
-/// What is answered to a change of a sound scene, with the half-edges of domains and without.
+/// The answer to a change of a sound scene, with the half-edges of domains and without.
 fn answers(shape: Shape, change: Change) -> [Option<SetupError>; 2] {
     let (mut grid, mut time_step) = (grid::<2>(), 1e-3);
     let mut body = Body::lattice(&grid, 2, 2.0, |_| true);

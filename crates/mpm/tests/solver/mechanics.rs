@@ -1,4 +1,4 @@
-//! What every scheme has to keep: free flight, symmetry at walls, the same motion in one dimension and in three, bits on any
+//! Properties that every scheme keeps: free flight, symmetry at walls, the same motion in one dimension and in three, bits on any
 //! number of threads; and how runs and set-ups fail.
 
 use mmsmith_mpm::{

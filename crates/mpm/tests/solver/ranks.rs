@@ -259,7 +259,7 @@ fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
     }
 }
 
-/// What `count` processes save after some steps, each its part, and what they come to in some more.
+/// The states that `count` processes save after some steps, each its part, and what they come to in some more.
 fn save_and_go_on<const D: usize>(
     (grid, whole, settings): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>),
     count: usize,

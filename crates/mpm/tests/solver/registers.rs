@@ -1,4 +1,4 @@
-//! The same bits from all vector registers and from any number of threads.
+//! Bits do not depend on the vector registers and from any number of threads.
 
 #![allow(clippy::unwrap_used)]
 

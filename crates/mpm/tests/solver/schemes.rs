@@ -119,9 +119,9 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
 enum Edges {
     /// Not given: domains are boxes.
     Boxes,
-    /// Those of boxes.
+    /// Half-edges of boxes.
     Given,
-    /// Those of parallelograms, for the shape that has them.
+    /// Half-edges of parallelograms, for the shape that has them.
     Sheared,
 }
 
@@ -131,10 +131,10 @@ struct Scene {
     walls: [bool; 2],
     /// Along all axes but the second, which has one more.
     cells: usize,
-    /// Of the lattice of particles, in those of the grid.
+    /// Spacing of the lattice of particles, in cells of the grid.
     spacing: f64,
     per_cell: usize,
-    /// Of the body, in cells of the lattice.
+    /// Radius of the body, in cells of the lattice.
     radius: f64,
     /// Sizes of boxes in those which touch.
     overlap: f64,

@@ -1,4 +1,4 @@
-//! What a run's state is: numbers that a run continues from to the same bits, and that mean the same in other units.
+//! The state of a run: numbers that a run continues from to the same bits, and that mean the same in other units.
 
 #![allow(clippy::unwrap_used)]
 

@@ -22,7 +22,7 @@ use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::mesh::Mesh;
 
-/// What is left of a box with less than this share of its volume is a sliver.
+/// A clipped box with less than this share of its whole volume is a sliver.
 const SLIVER: f64 = 0.2;
 
 /// Places closer to a side than this, in units of the particles' distance, lie on it.
@@ -97,7 +97,7 @@ impl<const D: usize> Side<D> {
         a + along * share.clamp(0.0, 1.0)
     }
 
-    /// The same side in the dimension that a body has.
+    /// This side in the dimension of a body.
     fn carried<const E: usize>(self) -> Side<E> {
         match self {
             Self::Straight { normal, distance } => {
@@ -153,7 +153,7 @@ impl<const D: usize> Lattice<D> {
     }
 }
 
-/// What two parts of boxes have in common.
+/// The boundary that two clipped boxes share.
 struct Contact {
     with: usize,
     /// A length or an area.

@@ -10,7 +10,7 @@ use crate::grid::Grid;
 use crate::particles::body::Body;
 use crate::particles::mesh::{Interpolation, Mesh, cross};
 
-/// What tells corners apart.
+/// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     /// A corner of boxes.
@@ -21,7 +21,7 @@ enum Key {
     Meeting { of_box: [i64; 2], sides: [usize; 2] },
 }
 
-/// What an edge of a polygon lies on.
+/// The line or circle on which an edge of a polygon lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Line {
     /// The line of the lattice from a corner of boxes along an axis.
@@ -102,7 +102,7 @@ impl Corners<'_> {
         }
     }
 
-    /// What the sides leave of a box: corners and the lines of the edges that begin there, counter-clockwise.
+    /// The polygon that is left of a box inside the sides: corners and the lines of the edges that begin there, counter-clockwise.
     fn clipped(&mut self, of_box: [i64; 2]) -> Vec<(u32, Line)> {
         let [i, j] = of_box;
         let around = [
@@ -170,7 +170,7 @@ impl Corners<'_> {
     }
 }
 
-/// What a circle leaves between itself and its chord from `a` to `b`, an area, positive where it belongs to the body.
+/// The segment between a circle and its chord from `a` to `b`, an area, positive where it belongs to the body.
 fn segment(side: Side<2>, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
     let (radius, sign) = match side {
         Side::Straight { .. } => return 0.0,

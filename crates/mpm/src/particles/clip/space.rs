@@ -13,7 +13,7 @@ use crate::grid::Grid;
 use crate::particles::body::Body;
 use crate::particles::mesh::{Interpolation, Mesh};
 
-/// What tells corners apart.
+/// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     /// A corner of boxes.
@@ -22,7 +22,7 @@ enum Key {
     Cut { ends: [u32; 2], side: usize },
 }
 
-/// What a face lies on.
+/// The plane or surface on which a face lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Plane {
     /// The face between boxes from a corner of the lattice on, with its normal along an axis.
@@ -39,7 +39,7 @@ struct Face {
     corners: Vec<u32>,
 }
 
-/// What the sides leave of a box.
+/// The polyhedron that is left of a box inside the sides.
 type Polyhedron = Vec<Face>;
 
 /// The corners of all polyhedra.
@@ -92,7 +92,7 @@ impl Corners<'_> {
         })
     }
 
-    /// What the sides leave of a box; nothing where it lies outside.
+    /// The polyhedron that is left of a box inside the sides; nothing where the box lies outside.
     fn clipped(&mut self, of_box: [i64; 3]) -> Polyhedron {
         let index = |bits: usize| std::array::from_fn(|a| of_box[a] + (bits >> a & 1) as i64);
         // Most boxes are whole or none, which needs no corners.
@@ -125,7 +125,7 @@ impl Corners<'_> {
         if faces.len() < 4 { Vec::new() } else { faces }
     }
 
-    /// What a side leaves of a face.
+    /// The part of a face inside a side.
     fn clip(&mut self, face: Face, side: usize) -> Option<Face> {
         let mut kept = Vec::with_capacity(face.corners.len() + 1);
         for (k, &from) in face.corners.iter().enumerate() {
@@ -198,7 +198,7 @@ fn close(faces: &mut Polyhedron, side: usize) {
     }
 }
 
-/// What lies between a sphere and a triangle with its corners on it, counter-clockwise as seen from outside of the body: a volume,
+/// The volume between a sphere and a triangle with its corners on it, counter-clockwise as seen from outside of the body: a volume,
 /// positive where it belongs to the body.
 ///
 /// The solid angle is that of A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125-126. Arcs between corners are

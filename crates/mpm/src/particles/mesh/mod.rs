@@ -64,9 +64,9 @@ pub struct Mesh<T, const D: usize> {
 /// The numbers that corners and loads of a part have in the whole body.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Numbers {
-    /// Of the corners.
+    /// Numbers of the corners.
     pub corners: Vec<u64>,
-    /// Of the loads, ascending.
+    /// Numbers of the loads, ascending.
     pub loads: Vec<u64>,
 }
 

@@ -10,7 +10,7 @@ use crate::processes::decomposition::{Lists, Move};
 
 /// The polygons of some particles, which can be told apart from the others.
 pub(crate) struct Records<T, const D: usize> {
-    /// Of each particle the number of its polygons, and of each of these: how many corners it has, their numbers in the whole body, how
+    /// For each particle the number of its polygons, and for each polygon: how many corners it has, their numbers in the whole body, how
     /// many faces, and of each face how many corners, and their places in the polyhedron.
     topology: Lists<u64>,
     /// Reference positions of a particle's corners, in the order of its polygons.
@@ -28,7 +28,7 @@ pub(crate) struct LoadRecords<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> Records<T, D> {
-    /// Those of some particles.
+    /// The records of some particles.
     pub(crate) fn new(own: &Mesh<T, D>, particles: impl Iterator<Item = usize> + Clone) -> Self {
         let at = |positions: &'_ [SVector<T, D>], p: usize| -> Vec<SVector<T, D>> {
             let corners = &own.corners[own.places(p)];
@@ -41,7 +41,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
         }
     }
 
-    /// Those of the particles that are here after a move.
+    /// The records of the particles that are here after a move.
     pub(crate) fn follow(&self, moved: &Move) -> Self
     where
         T: Pod,
@@ -92,7 +92,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
 }
 
 impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
-    /// Those of some loads.
+    /// The records of some loads.
     pub(crate) fn new(own: &Mesh<T, D>, loads: &[usize]) -> Self {
         let number = |load: &usize| match &own.numbers {
             Some(numbers) => numbers.loads[*load],
@@ -114,7 +114,7 @@ impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
         &self.numbers
     }
 
-    /// Those that are here after a move, with these numbers.
+    /// The records that are here after a move, with these numbers.
     pub(crate) fn follow(&self, moved: &Move, numbers: Vec<u64>) -> Self
     where
         T: Pod,
@@ -126,7 +126,7 @@ impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
 }
 
 impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
-    /// Those of some of the particles, with the loads that act on them, each a part of one particle's surface.
+    /// The mesh of some of the particles, with the loads that act on them, each a part of one particle's surface.
     #[must_use]
     pub fn part(&self, particles: &[usize]) -> Self {
         // The particles at the corners of loads.
