@@ -36,7 +36,7 @@ const CERTAIN: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Expr(pub(crate) u32);
 
-/// What a node holds.
+/// Node of the graph: a leaf, or an operation on earlier nodes.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
     /// An exact number.
@@ -83,9 +83,9 @@ pub struct Graph {
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
     samples: Vec<(f64, f64)>,
-    /// What [`Graph::open`] has found.
+    /// Results of [`Graph::open`].
     pub(crate) open: NumberMap<Expr, Expr>,
-    /// What [`Graph::residue`] has found.
+    /// Results of [`Graph::residue`].
     pub(crate) residues: NumberMap<Expr, Option<u64>>,
 }
 
@@ -157,7 +157,7 @@ impl Graph {
         expr
     }
 
-    /// What the expression's root is.
+    /// The node at the expression's root.
     #[must_use]
     pub fn node(&self, expr: Expr) -> &Node {
         &self.nodes[expr.0 as usize]

@@ -76,9 +76,9 @@ pub enum Operation {
     Atan2(Slot, Slot),
     /// `ln(y)` of `y = 1 + x`, given as `(x, y)`: by `y` where `x < -1/2`, else by `x`.
     LnOfBoth(Slot, Slot),
-    /// What rounding takes from a sum: `a + b` less its rounded value, exactly.
+    /// Rounding error of a sum: `a + b` less its rounded value, exactly.
     SumError(Slot, Slot),
-    /// What rounding takes from a product: `a b` less its rounded value, exactly.
+    /// Rounding error of a product: `a b` less its rounded value, exactly.
     ProductError(Slot, Slot),
 }
 
@@ -105,7 +105,7 @@ impl Operation {
         slots.into_iter().take(count)
     }
 
-    /// The same operation on the slots that `place` says.
+    /// This operation with each slot replaced by `place` of that slot.
     pub(crate) fn with_operands(&self, place: impl Fn(Slot) -> Slot) -> Self {
         match *self {
             Operation::Number(_) | Operation::Pi | Operation::Input(_) => self.clone(),
@@ -127,7 +127,7 @@ impl Operation {
     }
 }
 
-/// What a value depends on, as a set of rates of change; nothing but parameters where both are false.
+/// Dependence of a value, as a set of rates of change; on parameters only where both are false.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Dependence {
     /// On the position `X`.
@@ -294,7 +294,7 @@ impl Program {
         self.operations.iter().filter_map(end).max().unwrap_or(0)
     }
 
-    /// What the value in `slot` depends on.
+    /// Dependence of the value in `slot`.
     #[must_use]
     pub fn dependence(&self, slot: Slot) -> Dependence {
         self.dependence[slot.index()]
@@ -404,7 +404,7 @@ struct Lowering<'a> {
     definitions: &'a [(Expr, Expr)],
 }
 
-/// What an expression depends on, where some symbols have definitions.
+/// Dependence of an expression, where some symbols have definitions.
 fn dependence(
     graph: &Graph,
     inputs: &[(Expr, Dependence)],

@@ -149,7 +149,7 @@ proptest! {
     }
 }
 
-/// What is one expression in exact arithmetic as well as to the canonical form, which never multiplies out.
+/// Texts that are one expression in exact arithmetic are one in the canonical form, which never multiplies out.
 #[test]
 fn texts_that_are_the_same_expression() {
     let mut differ = Vec::new();
@@ -208,7 +208,7 @@ fn texts_that_are_the_same_expression() {
     assert!(differ.is_empty(), "{}", differ.join("\n"));
 }
 
-/// What is the same for positive values only, or one of the two has no value at zero.
+/// Texts that are equal for positive values only, or of which one has no value at zero, are two expressions.
 #[test]
 fn texts_that_are_not_the_same_expression() {
     for (a, b) in [

@@ -120,8 +120,7 @@ fn many_different_terms() {
     assert!(evaluate_on_small_stack(terms.join("+")).is_ok());
 }
 
-/// What is made of large parts again and again takes too long, though text and result are short; what is made of deep
-/// parts is too deep.
+/// Expressions of large parts, repeated many times, are too long, though text and result are short; expressions of deep parts are too deep.
 #[test]
 fn short_text_of_large_parts() {
     let mut graph = Graph::new();

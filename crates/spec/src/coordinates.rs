@@ -87,7 +87,7 @@ pub(crate) struct Geometry {
     pub(crate) rotation: Vec<Vec<Expr>>,
     /// The Cartesian coordinates.
     pub(crate) cartesian: Vec<Expr>,
-    /// What the symbols `q_k` mean in Cartesian symbols; empty where they are the same.
+    /// Definitions of the symbols `q_k` in Cartesian symbols; empty where they are the same.
     pub(crate) definitions: Vec<(Expr, Expr)>,
     /// The angles among the `q_k`.
     angles: Vec<Angle>,

@@ -98,7 +98,7 @@ impl Derivation {
         gradient
     }
 
-    /// What the turning of the unit vectors adds to component `i` of the divergence of `A`, as the terms of a sum.
+    /// Terms of the sum that the turning of the unit vectors adds to component `i` of the divergence of `A`.
     pub(crate) fn divergence_of_frame(&mut self, A: &Matrix, i: usize) -> Vec<Expr> {
         let n = A.len();
         let mut terms = Vec::new();

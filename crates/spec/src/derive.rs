@@ -26,7 +26,7 @@ pub struct Fields {
     pub graph: Graph,
     /// The Cartesian coordinates, the time, and the parameters, with what each of them is; program inputs.
     pub inputs: Vec<(Expr, Dependence)>,
-    /// What further symbols mean, such as the polar radius.
+    /// Definitions of further symbols, such as the polar radius.
     pub definitions: Vec<(Expr, Expr)>,
     /// Displacement.
     pub u: Vector,

@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Its display is several lines: the message, `file:line:column`, and the line with the place marked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// What is wrong.
+    /// The mistake.
     pub message: String,
     /// The file, as the user called it.
     pub file: String,
@@ -17,7 +17,7 @@ pub struct Diagnostic {
     pub source: String,
     /// Where in the text, in bytes.
     pub span: Range<usize>,
-    /// What would be right, where that can be said.
+    /// The correction, where it can be stated.
     pub help: Option<String>,
 }
 

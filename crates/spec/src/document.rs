@@ -61,7 +61,7 @@ impl Document {
         self.time.as_ref()?.get_ref().wave_speed.as_ref()
     }
 
-    /// What belongs into the table of times is to be written here: that table, or the law where there is none.
+    /// Place where entries of the table of times are to be written: that table, or the law where there is none.
     pub(crate) fn time_span(&self) -> Range<usize> {
         self.time.as_ref().map_or_else(|| self.material.span(), Spanned::span)
     }
@@ -300,7 +300,7 @@ impl<'de> Deserialize<'de> for Dimension {
     }
 }
 
-/// What stands in a list, and how such a list is written.
+/// Entry of a list, and how such a list is written.
 pub(crate) trait Listed {
     /// For messages where there is something else.
     const FORM: &'static str;

@@ -1,4 +1,4 @@
-//! What the momentum balance needs of a material: the first Piola-Kirchhoff stress and its divergence.
+//! Stress of a material in the momentum balance: the first Piola-Kirchhoff stress and its divergence.
 
 pub(crate) mod energy;
 mod invariants;
@@ -62,7 +62,7 @@ pub(crate) struct Stress {
 struct OfGradient {
     /// As it was derived, for sums in which terms may cancel.
     open: Vector,
-    /// Of entries in one piece.
+    /// From entries of `H` in one piece.
     of_H: Vector,
 }
 
@@ -221,8 +221,8 @@ impl Deformation {
         })
     }
 
-    /// The same where it is a difference of waves, as products: it vanishes where they are equal, and `lambda` multiplies it, which next to
-    /// incompressibility is large.
+    /// [`trace_along`](Self::trace_along) in products where it is a difference of waves: it vanishes where they are equal, and `lambda`
+    /// multiplies it, which next to incompressibility is large.
     fn trace_difference_along(&self, derivation: &mut Derivation, k: usize) -> Option<Expr> {
         let trace = self.trace(&mut derivation.graph);
         let along = derivation.along(trace, k);
@@ -469,7 +469,7 @@ fn modulus_at_rest(graph: &mut Graph, modulus: Expr) -> Expr {
     graph.single_term(open).unwrap_or(open)
 }
 
-/// What [`Graph::whole`] kept in one piece.
+/// The expression that [`Graph::whole`] kept in one piece.
 pub(crate) fn inside(graph: &Graph, expr: Expr) -> Expr {
     match graph.node(expr) {
         Node::Whole(inner) => *inner,

@@ -134,7 +134,7 @@ impl Rotation {
         }
     }
 
-    /// What it does, for people.
+    /// Description of the rotation, for people.
     #[must_use]
     pub fn formula(&self, graph: &Graph) -> String {
         let angle = graph.print(self.angle);

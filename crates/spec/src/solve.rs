@@ -36,7 +36,7 @@ const LONGEST_SHOWN: usize = 80;
 pub struct Solved {
     /// The unknowns with their values, expressions of the parameters in [`Spec::graph`].
     pub unknowns: Vec<(String, Expr)>,
-    /// What was made of each condition.
+    /// The result of each condition.
     pub conditions: Vec<SolvedCondition>,
     /// Derivatives of components of the displacement in forms that keep more digits than those by the rules.
     pub(crate) slopes: Vec<Slope>,
@@ -53,7 +53,7 @@ pub(crate) struct Slope {
     pub(crate) slope: Expr,
 }
 
-/// What was made of a condition.
+/// Result of a condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SolvedCondition {
     /// The condition, as the specification states it.
@@ -481,7 +481,7 @@ impl<'a> Solver<'a> {
         Ok(groups.into_values().map(|parts| Equation { condition, parts }).collect())
     }
 
-    /// What stands in the way of a condition, and what would help.
+    /// The obstacle to a condition, and its remedy.
     fn explained(&self, text: &str, factor: Expr, obstacle: &Obstacle) -> (String, String) {
         let names: Vec<&str> = self.unknowns.iter().map(|(name, _)| name.as_str()).collect();
         let names = names.join(", ");

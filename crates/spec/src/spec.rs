@@ -53,7 +53,7 @@ pub struct Spec {
     pub boundaries: Vec<Boundary>,
     /// A rigid rotation that is superposed on the displacement, in all Cartesian fields.
     pub rotation: Option<Rotation>,
-    /// What `[solve]` has found; the displacement has it put in.
+    /// The result of `[solve]`; the displacement has it put in.
     pub solved: Option<Solved>,
     /// Published listings of the fields.
     pub cross_checks: Vec<CrossCheck>,
@@ -72,7 +72,7 @@ pub struct Parameter {
     pub default: f64,
     /// The unit; may be empty.
     pub unit: String,
-    /// What it means; may be empty.
+    /// The meaning; may be empty.
     pub description: String,
     /// The bounds as the file states them; empty where there are none.
     pub range: String,
@@ -166,7 +166,7 @@ pub enum Law {
     },
 }
 
-/// What the key `law` of a specification names.
+/// Value of the key `law` of a specification.
 #[derive(Clone, Copy)]
 enum Kind {
     Library(&'static Row),
@@ -350,7 +350,7 @@ impl fmt::Display for Surface {
     }
 }
 
-/// What holds on a surface.
+/// Condition on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
     /// No normal displacement, no shear traction.
@@ -386,7 +386,7 @@ impl fmt::Display for Condition {
 pub struct Boundary {
     /// Where.
     pub surface: Surface,
-    /// What.
+    /// The condition on the surface.
     pub condition: Condition,
 }
 

@@ -16,20 +16,20 @@ pub struct SurfaceFields {
     /// The traction `P N`, force per reference area with the outward reference normal `N`, in Cartesian components.
     /// Its position is on the surface: the coordinate that is fixed there has been put in.
     pub traction: Vec<Expr>,
-    /// What the conditions declared on this surface say is zero.
+    /// The claims of the conditions declared on this surface.
     pub claims: Vec<Claim>,
 }
 
 /// Quantities that are zero on a surface if its condition is right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// What they are.
+    /// The kind of quantities.
     pub what: ClaimKind,
     /// The quantities: [`Graph::ZERO`] where that could be shown in symbols.
     pub quantities: Vec<Expr>,
 }
 
-/// What a condition says about a surface.
+/// Quantities that a condition claims are zero on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClaimKind {
     /// No traction.

@@ -63,7 +63,7 @@ pub(crate) fn principal_minors(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
     minors_of_size(graph, A, 1)
 }
 
-/// Those of at least two rows.
+/// The determinants of the principal submatrices of at least two rows.
 pub(crate) fn minors_beyond_trace(graph: &mut Graph, A: &Matrix) -> Vec<Expr> {
     minors_of_size(graph, A, 2)
 }

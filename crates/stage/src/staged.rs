@@ -67,7 +67,7 @@ pub struct Constants {
     pub period: Slot,
     /// The law with its constants, or the parameters in one that the specification states.
     pub law: Law<Slot>,
-    /// Those of the body.
+    /// The measures of the body.
     pub domain: Measures,
 }
 
@@ -102,9 +102,9 @@ pub struct Traction {
 /// The sides of a relation between parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
-    /// What stands before the sign.
+    /// The side before the sign.
     pub left: Slot,
-    /// What stands after it.
+    /// The side after it.
     pub right: Slot,
 }
 
@@ -247,13 +247,13 @@ impl Staged {
         self.block(&[], sides.chain(self.fixed.iter().copied()).collect())
     }
 
-    /// What `stages` keep of the time.
+    /// Values of the time that `stages` keep.
     #[must_use]
     pub fn time_stage(&self, stages: &Stages) -> Block<'_> {
         self.after_parameters(&stages.time)
     }
 
-    /// What `stages` keep of a point.
+    /// Values of a point that `stages` keep.
     #[must_use]
     pub fn point_stage(&self, stages: &Stages) -> Block<'_> {
         self.after_parameters(&stages.point)
@@ -432,8 +432,8 @@ fn fixed_slots(program: &Program) -> Vec<Slot> {
     slots
 }
 
-/// What `outputs` need of the time alone beside the values in `fixed`: what is read where time and position come together, or
-/// is a result.
+/// Values of the time alone that `outputs` need beside the values in `fixed`: those read where time and position come together, and
+/// results.
 fn time_slots(program: &Program, fixed: &[Slot], outputs: &[Slot]) -> Vec<Slot> {
     let fixed: BTreeMap<Slot, ()> = fixed.iter().map(|&slot| (slot, ())).collect();
     let needed = needed(program, &fixed, outputs);

@@ -17,7 +17,7 @@ const DEEPEST_GRAPH: u32 = 400;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{message}")]
 pub struct BuildError {
-    /// What is wrong, and what would be right.
+    /// The mistake, and its correction.
     pub message: String,
     /// Where, in bytes from the start of the text.
     pub span: Range<usize>,

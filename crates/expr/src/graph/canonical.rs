@@ -422,7 +422,7 @@ impl Graph {
     }
 }
 
-/// What a sum or product is collected in: numbers by expression, none of them zero.
+/// Terms of a sum or factors of a product while they are collected: numbers by expression, none of them zero.
 #[derive(Default)]
 struct Collected {
     /// In order of the expressions, as long as there are few: nearly always.

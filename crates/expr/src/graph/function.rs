@@ -9,7 +9,7 @@ use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-/// What a function's value does where the sign of its argument changes.
+/// Parity of a function: how its value changes with the sign of its argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Parity {
     Even,
@@ -26,11 +26,11 @@ pub enum RustCall {
     Library(&'static str),
 }
 
-/// What is known of a function.
+/// Properties of a function.
 struct Row {
-    /// What text calls it: the name that it is printed with, then other spellings.
+    /// Names in text: the one that the function is printed with, then other spellings.
     names: &'static [&'static str],
-    /// What [`Row::differential`] calls the arguments.
+    /// Names of the arguments in [`Row::differential`].
     arguments: &'static [&'static str],
     /// The change of the value in terms of the arguments and of their changes, each called `d` and the argument's name.
     differential: &'static str,
@@ -48,12 +48,12 @@ struct Row {
     rust: RustCall,
     /// The function of `math.h`, if there is one; listings in C may call it.
     math_h: Option<&'static str>,
-    /// What languages that lack the function, or have it with other bits than Rust, call instead: a function of the project.
+    /// The project's own function, for languages that lack this one or have it with other bits than Rust.
     own: Option<&'static str>,
 }
 
 impl Row {
-    /// What most have in common.
+    /// Values that most functions share.
     const ANY: Row = Row {
         names: &[],
         arguments: &["x"],
@@ -485,7 +485,7 @@ static DIFFERENCES: LazyLock<Vec<Option<Rule>>> = LazyLock::new(|| {
 pub(crate) struct Rule {
     graph: Graph,
     root: Expr,
-    /// What stands for each place.
+    /// The symbol of each place.
     places: Vec<Expr>,
     mentioned: BTreeSet<Expr>,
 }
@@ -576,7 +576,7 @@ mod tests {
         assert_eq!(Function::from_name(""), None);
     }
 
-    /// What rows say of a sign, of zero, of slopes and of differences is what their values in double precision do.
+    /// Signs, zeros, slopes and differences in the rows agree with the values in double precision.
     #[test]
     fn rows_agree_with_their_values() {
         // Those of two arguments have operations of their own, which other tests compare.

@@ -15,7 +15,7 @@ const MOST_DIGITS: usize = 400;
 /// A syntax tree whose nodes know their place in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ast {
-    /// What it is.
+    /// The kind of syntax.
     pub kind: AstKind,
     /// Where it stands, in bytes from the start of the text.
     pub span: Range<usize>,
@@ -42,7 +42,7 @@ pub enum AstKind {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{message}")]
 pub struct ParseError {
-    /// What is wrong, and what would be right.
+    /// The mistake, and its correction.
     pub message: String,
     /// Where, in bytes from the start of the text.
     pub span: Range<usize>,

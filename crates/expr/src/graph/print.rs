@@ -156,7 +156,7 @@ mod tests {
         }
     }
 
-    /// What is in one piece shows as a sum within a sum does, and else does not show.
+    /// A sum in one piece is printed in parentheses, as a sum within a sum; no other part in one piece shows that it is one.
     #[test]
     fn what_is_in_one_piece() {
         let mut graph = Graph::new();

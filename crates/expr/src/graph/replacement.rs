@@ -4,7 +4,7 @@ use crate::graph::NumberMap;
 use crate::{Expr, Graph};
 use std::collections::BTreeMap;
 
-/// What to put in for which expressions. What several expressions have in common is built anew once.
+/// Expressions and their replacements. Parts that several expressions share are rebuilt once.
 #[derive(Clone, Debug)]
 pub struct Replacement {
     /// Given, and found since.

@@ -360,7 +360,7 @@ fn rounded(number: &Rational) -> Rational {
     long.then(double).flatten().unwrap_or_else(|| number.clone())
 }
 
-/// What a positive number is more than its nearest double, as whether it is less and the size; `None` where it is that
+/// Difference of a positive number from its nearest double: whether the number is less, and the size; `None` where the number is that
 /// double.
 fn rest_of(number: &Rational) -> Option<(bool, Rational)> {
     let rest = number - Rational::from_float(nearest_f64(number))?;
@@ -462,7 +462,7 @@ mod tests {
         ("cosh(X/10^6 - k)", 1.4423823122947754e41),
     ];
 
-    /// What is beyond the largest number is infinite, whatever the sum has lost.
+    /// Values beyond the largest number are infinite, whatever the sum has lost.
     #[test]
     fn what_overflows_is_infinite() {
         for X in [98_765_432.123_456_79, -98_765_431.987_654_3, 987_654_321.123_456] {

@@ -32,7 +32,7 @@ impl Builder {
         self.push_input(operation, Dependence::default())
     }
 
-    /// The same for an input, which has no operands and depends on `own`.
+    /// As [`push`](Self::push), for an input, which has no operands and depends on `own`.
     pub(crate) fn push_input(&mut self, operation: Operation, own: Dependence) -> Slot {
         if let Some(&slot) = self.known.get(&operation) {
             return slot;

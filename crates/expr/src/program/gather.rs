@@ -1,8 +1,8 @@
 //! Factors gathered where position and time meet.
 //!
-//! What is computed for each point at each time is paid for most often, and forms that the algebra of symbols finds still
-//! multiply there what could be multiplied before. [`Program::with_gathered_factors`] looks at the operations between the
-//! values that are kept of points and the outputs, as products and as sums of two:
+//! Operations for each point at each time are the most frequent ones, and forms that the algebra of symbols finds still multiply there
+//! values that could be multiplied before. [`Program::with_gathered_factors`] looks at the operations between the values that are kept of
+//! points and the outputs, as products and as sums of two:
 //!
 //! - A factor that both terms of a sum have is taken out: `a x y + b x` becomes `(a y + b) x`.
 //! - A factor of a sum that depends on time or parameters only goes to the factors of this kind that the terms have
@@ -23,8 +23,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// What a number costs that is the same at all points, in additions: vector registers are filled with it for every few
-/// points.
+/// Cost, in additions, of a number that is the same at all points: vector registers are filled with it for every few points.
 const UNIFORM_NUMBER: usize = 1;
 /// Operations that are nested more deeply than this are left as they are.
 const LARGEST_DEPTH: usize = 200;
@@ -59,7 +58,7 @@ impl Program {
         }
     }
 
-    /// What `outputs` cost for each point at each time, where the values of `kept` are kept of each point.
+    /// Cost of `outputs` for each point at each time, where the values of `kept` are kept of each point.
     pub(crate) fn cost_at_points(&self, outputs: &[Slot], kept: &[Slot]) -> usize {
         let mut seen = vec![false; self.operations().len()];
         let mut stack = outputs.to_vec();
@@ -84,7 +83,7 @@ impl Program {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 struct Product {
     negative: bool,
-    /// What depends on time or on parameters only, in order.
+    /// Factors that depend on time or on parameters only, in order.
     coefficient: Vec<Slot>,
     /// Nodes by number, in order.
     factors: Vec<usize>,
@@ -241,7 +240,7 @@ impl<'a> Gathering<'a> {
         Some(self.builder.program(all))
     }
 
-    /// What `outputs` are as products of nodes; `None` where they are nested too deeply.
+    /// `outputs` as products of nodes; `None` where they are nested too deeply.
     fn products(&mut self, outputs: &[Slot], kept: &[Slot]) -> Option<Vec<Product>> {
         let program = self.program;
         let mut uses = vec![0_usize; program.operations().len()];
@@ -803,7 +802,7 @@ mod tests {
         assert_eq!(gathered.operations(), second.operations());
     }
 
-    /// What is nested too deeply, or is a product of many factors, keeps its value.
+    /// Expressions that are nested too deeply, or are products of many factors, keep their values.
     #[test]
     fn large_expressions() {
         let at = [0.75, -1.5, 0.625, 3.0, 0.3];

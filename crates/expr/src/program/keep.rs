@@ -8,12 +8,12 @@
 use crate::program::{Operation, OperationCount, OperationsByStage, Program, Slot};
 use std::collections::{BTreeMap, VecDeque};
 
-/// What reading one kept number costs, in additions. A number of eight bytes takes about 0.8 ns from memory at the 10 GB/s
-/// that one core gets while it also computes, and an addition in a vector register of eight about 0.15 ns.
+/// Cost of reading one kept number, in additions. A number of eight bytes takes about 0.8 ns from memory at the 10 GB/s that one core gets
+/// while it also computes, and an addition in a vector register of eight about 0.15 ns.
 pub(crate) const KEPT_NUMBER: usize = 5;
 
-/// What is kept of each point for its state, at most: 128 bytes in double precision, four times what a step needs of
-/// a particle's position in the plane. Where the cheapest choice is more, some of it is computed anew.
+/// Most numbers that are kept of each point for its state: 128 bytes in double precision, four times what a step needs of a particle's
+/// position in the plane. Where the cheapest choice is more, some of it is computed anew.
 pub const MOST_KEPT_OF_STATES: usize = 16;
 
 /// A call costs forty additions, so that no program of a field comes to as much.
@@ -210,7 +210,7 @@ mod tests {
         Program::lower(&mut graph, &inputs, &[], &outputs)
     }
 
-    /// What the choice costs at each evaluation.
+    /// Cost of the choice at each evaluation.
     fn cost(program: &Program, kept: &[Slot]) -> usize {
         let count = program.operations_with_kept(program.outputs(), kept).both;
         KEPT_NUMBER * kept.len() + count.cost()

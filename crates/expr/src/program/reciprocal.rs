@@ -17,13 +17,12 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A quantity and the power of it that some slot holds.
 type Power = (Slot, u32);
 
-/// Of what the reciprocal is formed.
+/// Power of a quantity whose reciprocal is formed.
 #[derive(Clone, Copy)]
 enum Unit {
-    /// Of the power of the quantity that a slot holds: the greatest of which all denominators are powers, where it is
-    /// at hand.
+    /// The power of the quantity that a slot holds: the greatest of which all denominators are powers, where it is at hand.
     Slot(Slot, u32),
-    /// Of the square of the quantity, which is a square root.
+    /// The square of the quantity, which is a square root.
     Root,
 }
 

@@ -21,8 +21,8 @@ pub struct Section {
 }
 
 impl Program {
-    /// What `outputs` need beside `given`, which are values of a point, and beside values that do not depend on the
-    /// position; and the program of these, whose outputs are what [`Section::run`] takes as uniform.
+    /// Operations that `outputs` need, given the values `given` of a point and the values that do not depend on the position; and the
+    /// program of the latter, whose outputs [`Section::run`] takes as uniform.
     #[must_use]
     pub fn section(&self, outputs: &[Slot], given: &[Slot]) -> (Section, Program) {
         let mut reached = vec![false; self.operations.len()];

@@ -91,7 +91,7 @@ impl Program {
         [layers, points]
     }
 
-    /// What `outputs` cost for each point of a lattice at each time.
+    /// Cost of `outputs` for each point of a lattice at each time.
     fn cost_in_lattice(&self, outputs: &[Slot], dimension: usize) -> usize {
         let of_layers: usize = self.layers(outputs, dimension).iter().map(Vec::len).sum();
         let [_, points] = self.operations_in_lattice(outputs, dimension);
@@ -119,7 +119,7 @@ enum Coordinates {
 }
 
 impl Coordinates {
-    /// Those of an operation, from those of its operands.
+    /// Coordinates of an operation, from those of its operands.
     fn of(operation: &Operation, known: &[Coordinates], dimension: usize) -> Self {
         if let Operation::Input(axis) = *operation {
             return if axis < dimension { Coordinates::One(axis) } else { Coordinates::None };
@@ -329,7 +329,7 @@ impl<'a> Separating<'a> {
         axes.all(|axis| Some(axis) == first)
     }
 
-    /// What a product has of each coordinate; factors of none are in the first part.
+    /// Parts of a product, one for each coordinate; factors of none are in the first part.
     fn parts(&self, product: &Term) -> Vec<Term> {
         let mut parts = vec![Term::default(); self.dimension];
         let mut uniform = BTreeMap::new();
@@ -429,7 +429,7 @@ mod tests {
     use crate::{Ast, Graph};
     use proptest::prelude::*;
 
-    /// Of `x`, `y` and `z`, which are coordinates, the time `t` and a parameter `a`.
+    /// Program in the coordinates `x`, `y` and `z`, the time `t` and a parameter `a`.
     fn program(texts: &[&str]) -> Program {
         let mut graph = Graph::new();
         let rate = |name: &str| Dependence { position: "xyz".contains(name), time: name == "t" };
@@ -453,7 +453,7 @@ mod tests {
         (found - expected).abs() <= 1e-13 * scale
     }
 
-    /// What is left for each point: its operations, and values of layers along each axis.
+    /// Work left for each point: its operations, and values of layers along each axis.
     #[test]
     fn what_is_left_for_points_of_a_lattice() {
         for (texts, operations, layers) in [

@@ -158,8 +158,7 @@ fn where_pi_is_a_factor_it_is_left_out() {
 
 const NAMES: [&str; 8] = ["a", "b", "k", "t", "s", "x", "y", "z"];
 
-/// What the program for `text` does, as nested operations; parameters are a, b, k, times t, s, places x, y, z, and r means
-/// `sqrt(x^2 + y^2)`.
+/// Program for `text`, as nested operations; parameters are a, b, k, times t, s, places x, y, z, and r means `sqrt(x^2 + y^2)`.
 fn lowered(text: &str) -> String {
     let mut graph = Graph::new();
     let inputs = NAMES.map(|name| {

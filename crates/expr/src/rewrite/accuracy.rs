@@ -92,7 +92,7 @@ impl Samples {
         hardly_larger(growth.into_iter().map(|growth| growth.unwrap_or(f64::INFINITY)).collect())
     }
 
-    /// The same for a form that need not be defined wherever the other is, only at most points.
+    /// As [`admit`](Self::admit), for a form that need be defined only at half of the points where the other one is.
     pub(crate) fn admit_where_defined(&self, before: &Program, after: &Program) -> bool {
         let growth = self.growth_of_bounds(before, after);
         let known: Vec<f64> = growth.iter().flatten().copied().collect();
@@ -125,7 +125,7 @@ fn sample(point: usize, input: usize) -> f64 {
     scale * (0.05 + 0.9 * turns.fract())
 }
 
-/// What a program divides by, or takes the logarithm or a root of, and the factors of these.
+/// Divisors in a program, arguments of logarithms and roots, and the factors of all these.
 fn divisors(program: &Program) -> BTreeSet<Slot> {
     let operations = program.operations();
     let divisor = |operation: &Operation| match *operation {

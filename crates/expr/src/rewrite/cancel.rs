@@ -500,7 +500,7 @@ mod tests {
         assert!(!vanishes("(r/sqrt(r^2 + a))*(1 + a/(r*(r + sqrt(r^2 + b)))) - 1"));
     }
 
-    /// What is zero modulo a prime, where it has no value in floating point, is decided by polynomials.
+    /// Expressions that are zero modulo a prime, and have no value in floating point, are decided by polynomials.
     #[test]
     fn multiples_of_the_prime_do_not_vanish() {
         let mut graph = Graph::new();

@@ -31,7 +31,7 @@ struct Factor {
     power: Rational,
 }
 
-/// What takes the place of parts of two factors, with the number that multiplies it.
+/// Exchange of parts of two factors for another factor, with the number that multiplies it.
 struct Exchange {
     /// How much of the power of each of the two goes.
     taken: [Rational; 2],
@@ -282,7 +282,7 @@ impl Graph {
     }
 }
 
-/// What two factors of one direction are exchanged for, in this order.
+/// The exchange of two factors of one direction, in this order.
 fn exchange(first: &Factor, second: &Factor) -> Option<Exchange> {
     let (p, q) = (&first.power, &second.power);
     // The argument of the first as a multiple of that of the second.

@@ -69,7 +69,8 @@ pub struct CosineAndSine {
 }
 
 impl CosineAndSine {
-    /// Of this many times the angle, by halves: each product vanishes where the whole does, or the terms of a sum have one sign there.
+    /// Cosine and sine of this many times the angle, by halves: each product vanishes where the whole does, or the terms of a sum have one
+    /// sign there.
     #[must_use]
     pub fn times(self, graph: &mut Graph, times: i64) -> Self {
         match times {
@@ -95,7 +96,7 @@ impl CosineAndSine {
         }
     }
 
-    /// Of the sum of two angles.
+    /// Cosine and sine of the sum of two angles.
     #[must_use]
     pub fn plus(self, graph: &mut Graph, other: Self) -> Self {
         let (cc, ss) = (graph.mul(self.cosine, other.cosine), graph.mul(self.sine, other.sine));

@@ -10,7 +10,7 @@ pub(super) type Monomial = BTreeMap<Expr, u32>;
 /// A sum of monomials, each with a coefficient that is not zero.
 pub(super) type Polynomial<C> = BTreeMap<Monomial, C>;
 
-/// What coefficients are, and how they are computed with.
+/// Type and arithmetic of coefficients.
 pub(super) trait Coefficients {
     type Value: Clone;
 

@@ -10,7 +10,7 @@ use crate::{Expr, Function, Graph, Node, Rational};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What would multiply out to more terms than this is left as it is.
+/// Expressions that would multiply out to more terms than this are left as they are.
 const MOST_TERMS: usize = 64;
 /// Powers beyond this are not multiplied out.
 const LARGEST_POWER: u32 = 8;
@@ -22,7 +22,7 @@ impl Graph {
     /// `expr` multiplied out in sines and cosines, with `cos^2 = 1 - sin^2`, where terms cancel and the result is
     /// shorter; else `expr` itself.
     ///
-    /// What contains neither the sine nor the cosine of an angle that occurs with both is never multiplied out.
+    /// Expressions that contain neither the sine nor the cosine of an angle that occurs with both are never multiplied out.
     pub fn shortened(&mut self, expr: Expr) -> Expr {
         let (mut sines, mut cosines) = (BTreeSet::new(), BTreeSet::new());
         self.collect_angles(expr, &mut sines, &mut cosines, &mut BTreeSet::new());

@@ -46,7 +46,7 @@ type Factors = Vec<(Expr, Rational)>;
 
 struct Reusing<'a> {
     graph: &'a mut Graph,
-    /// What is not a parameter.
+    /// Symbols that are no parameters.
     variables: BTreeSet<Expr>,
     /// The products that are worth computing once, those of most factors first.
     products: Vec<(Expr, Factors)>,
@@ -120,7 +120,7 @@ impl Reusing<'_> {
         self.graph.product(product)
     }
 
-    /// What all outputs have as factors, in one piece.
+    /// Puts the factors that all outputs share into one piece.
     fn share_common_factors(&mut self, outputs: &mut [Expr]) {
         let factors: Option<Vec<Factors>> = outputs
             .iter()

@@ -248,7 +248,7 @@ impl Graph {
         self.sum([(Rational::from(own.factor), product)])
     }
 
-    /// Those of `places` on which `expr` depends.
+    /// The `places` on which `expr` depends.
     fn places_of(&self, expr: Expr, places: &BTreeSet<Expr>) -> BTreeSet<Expr> {
         self.reachable(&[expr]).into_iter().filter(|part| places.contains(part)).collect()
     }

@@ -282,7 +282,7 @@ pub(super) fn uses_invariants_only(graph: &mut Graph, energy: Expr, dimension: u
         .all(|name| !symbols.contains(&graph.symbol(&name)))
 }
 
-/// What a law may be written in.
+/// Quantities that a law may be written in.
 struct Components {
     /// `F`, `C`, `J`, `I1` and `I2` in the components of the displacement gradient.
     replacement: BTreeMap<Expr, Expr>,

@@ -154,7 +154,7 @@ pub(super) fn volume_symbols(graph: &mut Graph) -> [Expr; 2] {
     [v, graph.add(Graph::ONE, v)]
 }
 
-/// What stands for `v`, `1 + v` and logarithms of it at a deformation.
+/// Replacements of `v`, `1 + v` and logarithms of it at a deformation.
 pub(super) fn volume_values(graph: &mut Graph, deformation: &Deformation) -> BTreeMap<Expr, Expr> {
     let [v, sum] = volume_symbols(graph);
     BTreeMap::from([
@@ -165,8 +165,7 @@ pub(super) fn volume_values(graph: &mut Graph, deformation: &Deformation) -> BTr
     ])
 }
 
-/// Of a stress `S A + N F^-T` with `A = F` less a multiple of `F^-T`, all that its divergence is made of,
-/// `Div P = S Div F + A grad S + F^-T (...)`.
+/// Parts of the divergence of a stress `S A + N F^-T` with `A = F` less a multiple of `F^-T`: `Div P = S Div F + A grad S + F^-T (...)`.
 pub(super) struct ChainRule<'a> {
     pub(super) A: &'a Matrix,
     /// `S`, at rest and what it is more, and its gradient.

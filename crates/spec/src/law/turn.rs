@@ -133,7 +133,7 @@ impl Turn {
     }
 }
 
-/// What `u` has sines and cosines of, where it depends on the place.
+/// Angles in sines and cosines of `u` that depend on the place.
 fn angles(graph: &Graph, u: &Vector, coordinates: &[Expr]) -> Vec<Expr> {
     let argument = |expr: Expr| match graph.node(expr) {
         Node::Call(Function::Sin | Function::Cos, arguments) => Some(arguments[0]),

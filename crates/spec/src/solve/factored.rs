@@ -21,7 +21,7 @@ const LARGEST_POWER: i64 = 8;
 /// Displacements of more terms are left as they are.
 const MOST_PARTS: usize = 64;
 
-/// What unknowns are, as fractions of polynomials in `atoms`.
+/// Values of the unknowns, as fractions of polynomials in `atoms`.
 pub(super) struct Solution {
     pub(super) atoms: Vec<Expr>,
     pub(super) values: Vec<Fraction>,
@@ -40,7 +40,7 @@ struct Part {
     power: i64,
     /// Atoms that depend on parameters only, with their powers.
     fixed: Vec<(Expr, i64)>,
-    /// What depends on time and on other coordinates.
+    /// The factor that depends on time and on other coordinates.
     changing: Expr,
 }
 
@@ -157,12 +157,12 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// What the terms of a displacement have in common.
+/// Denominator and factors that the terms of a displacement share.
 pub(super) struct Common<'a> {
     pub(super) denominator: &'a Polynomial,
     /// The denominator as an expression.
     pub(super) below: Expr,
-    /// What numerators are divided by as often as it goes.
+    /// Polynomials that numerators are divided by as often as it goes.
     pub(super) factors: &'a [Polynomial],
 }
 

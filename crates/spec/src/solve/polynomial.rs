@@ -150,7 +150,7 @@ impl Polynomial {
         Some(quotient)
     }
 
-    /// What is left when `factor` is divided out as often as it goes, and how often that is; of zero, zero.
+    /// The polynomial with `factor` divided out as often as it goes, and how often that is; of zero, zero.
     pub(super) fn divided_out(mut self, factor: &Self) -> (Self, u32) {
         let mut power = 0;
         while !self.is_zero()
@@ -246,7 +246,7 @@ impl Fraction {
         }
     }
 
-    /// The same with the leading coefficient of the denominator one.
+    /// This fraction with the leading coefficient of the denominator one.
     pub(super) fn with_monic_denominator(self) -> Self {
         let leading = self.denominator.terms().last().map(|(_, leading)| Rational::one() / leading);
         let Some(factor) = leading else { return self };
