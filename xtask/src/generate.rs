@@ -5,6 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use mmsmith_codegen::{Code, HOSTS, Host, Names, Unwritable, registry_source};
 use mmsmith_spec::Spec;
 use rayon::prelude::*;
+use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -15,19 +16,25 @@ pub(crate) struct Outcome {
     pub(crate) stale: bool,
 }
 
-/// The folder of the repository that holds a host's files, if any.
-fn folder(host: &Host) -> Option<&'static str> {
+/// The trace of a host's files in the repository.
+enum Kept {
+    /// The files themselves, in a folder.
+    Files(&'static str),
+    /// Their SHA-256 alone, a line each: `mms gen` writes the files.
+    Digests(&'static str),
+}
+
+fn kept_of(host: &Host) -> Option<Kept> {
     match host.name {
-        "rust" => Some("crates/solutions/src/generated"),
-        // A folder of its own, so that with its parent among the include paths no header hides one of the system.
-        "c" => Some("crates/solutions/include/mmsmith"),
+        "rust" => Some(Kept::Files("crates/solutions/src/generated")),
+        "c" => Some(Kept::Digests("crates/solutions/headers.sha256")),
         _ => None,
     }
 }
 
-/// The hosts whose files are in the repository.
+/// The hosts whose files the repository keeps a trace of.
 pub(crate) fn kept() -> Vec<&'static Host> {
-    HOSTS.iter().filter(|host| folder(host).is_some()).collect()
+    HOSTS.iter().filter(|host| kept_of(host).is_some()).collect()
 }
 
 /// The text of a file; a module is one of the crate of the solutions.
@@ -54,7 +61,7 @@ pub(crate) fn run(
     out: Option<&Path>,
     Options { check, times: tell_times }: Options,
 ) -> anyhow::Result<Outcome> {
-    let of_library = |host: &&&Host| folder(host).is_none() && out.is_none();
+    let of_library = |host: &&&Host| kept_of(host).is_none() && out.is_none();
     if let Some(host) = hosts.iter().find(of_library) {
         bail!(
             "the repository keeps no files for --target {0}: add --out DIR, as in `cargo xtask gen --target {0} --out code`",
@@ -81,11 +88,30 @@ pub(crate) fn run(
         }
     }
     let mut files: BTreeMap<PathBuf, Option<String>> = BTreeMap::new();
-    for (name, texts) in &sources {
-        for (host, text) in hosts.iter().zip(texts) {
-            let own = repository.join(folder(host).unwrap_or_default());
-            let file = out.unwrap_or(&own).join(host.file_name(&Names::of(name).module));
-            files.insert(file, Some(text.clone()));
+    for (k, host) in hosts.iter().enumerate() {
+        let texts = sources
+            .iter()
+            .map(|(name, texts)| (host.file_name(&Names::of(name).module), texts[k].as_str()));
+        match (out, kept_of(host)) {
+            (None, Some(Kept::Digests(list))) => {
+                let list = repository.join(list);
+                let names: Vec<String> = all
+                    .iter()
+                    .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
+                    .chain(sources.keys().cloned())
+                    .map(|name| host.file_name(&Names::of(&name).module))
+                    .collect();
+                let text = digests(&list, texts, &names)?;
+                files.insert(list, Some(text));
+            }
+            (Some(folder), _) => {
+                files.extend(texts.map(|(file, text)| (folder.join(file), Some(text.to_owned()))));
+            }
+            (None, Some(Kept::Files(folder))) => {
+                let own = repository.join(folder);
+                files.extend(texts.map(|(file, text)| (own.join(file), Some(text.to_owned()))));
+            }
+            (None, None) => {}
         }
     }
     if out.is_none() {
@@ -94,8 +120,8 @@ pub(crate) fn run(
         names.extend(sources.keys().cloned());
         let mut listed = names.clone();
         for host in hosts {
-            let own = repository.join(folder(host).unwrap_or_default());
-            let orphans = orphans(&own, host.ending, &names)?;
+            let Some(Kept::Files(folder)) = kept_of(host) else { continue };
+            let orphans = orphans(&repository.join(folder), host.ending, &names)?;
             if given.is_empty() {
                 // A file without a specification cannot be kept up to date.
                 files.extend(orphans.into_iter().map(|(path, _)| (path, None)));
@@ -107,9 +133,8 @@ pub(crate) fn run(
         listed.dedup();
         let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
         let registry = registry_source(&listed)?;
-        if let Some(own) =
-            hosts.iter().find(|host| host.name == "rust").and_then(|host| folder(host))
-        {
+        let own = hosts.iter().find(|host| host.name == "rust").and_then(|host| kept_of(host));
+        if let Some(Kept::Files(own)) = own {
             files.insert(repository.join(own).join("mod.rs"), Some(registry));
         }
     }
@@ -119,6 +144,25 @@ pub(crate) fn run(
         outcome.lines.extend(times);
     }
     Ok(outcome)
+}
+
+/// The list of the digests of a host's files as `sha256sum --check` reads it: `texts` anew, the other files of `names` as they are listed.
+fn digests<'a>(
+    list: &Path,
+    texts: impl Iterator<Item = (String, &'a str)>,
+    names: &[String],
+) -> anyhow::Result<String> {
+    let listed = if list.is_file() { read(list)? } else { String::new() };
+    let listed = listed.lines().filter_map(|line| line.split_once("  "));
+    let mut digests: BTreeMap<String, String> = listed
+        .filter(|(_, file)| names.iter().any(|name| name == file))
+        .map(|(digest, file)| (file.to_owned(), digest.to_owned()))
+        .collect();
+    for (file, text) in texts {
+        let digest = Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect();
+        digests.insert(file, digest);
+    }
+    Ok(digests.into_iter().map(|(file, digest)| format!("{digest}  {file}\n")).collect())
 }
 
 fn library_specs(library: &Path) -> anyhow::Result<Vec<PathBuf>> {
@@ -213,8 +257,16 @@ fn compare(
         match (wanted, present) {
             (Some(_), None) => lines.push(format!("missing: {shown}")),
             (Some(wanted), Some(present)) if *wanted != present => {
-                let line = wanted.lines().zip(present.lines()).take_while(|(a, b)| a == b).count();
-                lines.push(format!("stale: {shown}, from line {}", line + 1));
+                let same = wanted.lines().zip(present.lines()).take_while(|(a, b)| a == b).count();
+                // A list of digests tells the file, other files the line.
+                let listed = wanted.lines().nth(same).and_then(|line| line.split_once("  "));
+                let place = match listed {
+                    Some((_, file)) if path.extension().is_some_and(|e| e == "sha256") => {
+                        file.to_owned()
+                    }
+                    _ => format!("from line {}", same + 1),
+                };
+                lines.push(format!("stale: {shown}, {place}"));
             }
             (None, Some(_)) => lines.push(format!("without a specification: {shown}")),
             _ => {}
