@@ -419,8 +419,6 @@ fn allocate<T: Lanes, const D: usize>(
         body.half_edges = vec![SMatrix::from_diagonal(&body.particles.half_size); count];
     }
     let (support, mut particles) = Support::new(shape, body, grid.spacing);
-    let affine = if transfer.is_affine() { count } else { 0 };
-    particles.affine = vec![SMatrix::zeros(); affine];
     let at_rest = law.at_rest();
     let (found, expected) = (particles.internal.len(), count * at_rest.len());
     if found == 0 {
@@ -428,6 +426,10 @@ fn allocate<T: Lanes, const D: usize>(
     } else if found != expected {
         return Err(SetupError::LengthMismatch { array: "internal", found, expected });
     }
+    let affine = transfer.is_affine().into();
+    let shares = Shares { affine, internal: at_rest.len(), ..Shares::ONE };
+    particles.affine = Vec::new();
+    particles.fill(&shares);
     let fused = is_fused(integrator, transfer);
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
@@ -496,13 +498,7 @@ fn allocate<T: Lanes, const D: usize>(
             integrator.reprojects(),
         ),
         of_time: Vec::new(),
-        shares: Shares {
-            x: 1,
-            v: 1,
-            F: 1,
-            affine: transfer.is_affine().into(),
-            internal: law.at_rest().len(),
-        },
+        shares,
         particles,
         support,
         law,

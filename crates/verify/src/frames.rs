@@ -226,26 +226,32 @@ fn frame<T: Precision<D>, const D: usize>(
         volume.push(F_3D.determinant() * particles.volume[p].to_f64());
     }
     let array = |name: &str, values| Array { name: name.into(), values };
+    let variables = law.variables();
+    let internal = variables.iter().enumerate().map(|(k, variable)| {
+        let of_particles = particles.internal.iter().skip(k).step_by(variables.len());
+        array(&variable.name, Values::Scalar(of_particles.map(|q| q.to_f64()).collect()))
+    });
+    let arrays = vec![
+        array("displacement", Values::Vector(displacement)),
+        array("velocity", Values::Vector(velocity)),
+        array("deformation_gradient", Values::Tensor(gradient)),
+        array("stress", Values::Tensor(stress)),
+        array("first_piola_kirchhoff", Values::Tensor(first_piola_kirchhoff)),
+        array("von_mises", Values::Scalar(von_mises)),
+        array("exact_displacement", Values::Vector(exact_displacement)),
+        array("error", Values::Vector(error)),
+        array("error_magnitude", Values::Scalar(error_magnitude)),
+        array("volume", Values::Scalar(volume)),
+        array("reference_position", Values::Vector(reference_position)),
+        array("id", Values::Id((0..count as u64).collect())),
+    ];
     Some(Frame {
         time,
         step,
         velocity_time: None,
         provenance: None,
         points,
-        arrays: vec![
-            array("displacement", Values::Vector(displacement)),
-            array("velocity", Values::Vector(velocity)),
-            array("deformation_gradient", Values::Tensor(gradient)),
-            array("stress", Values::Tensor(stress)),
-            array("first_piola_kirchhoff", Values::Tensor(first_piola_kirchhoff)),
-            array("von_mises", Values::Scalar(von_mises)),
-            array("exact_displacement", Values::Vector(exact_displacement)),
-            array("error", Values::Vector(error)),
-            array("error_magnitude", Values::Scalar(error_magnitude)),
-            array("volume", Values::Scalar(volume)),
-            array("reference_position", Values::Vector(reference_position)),
-            array("id", Values::Id((0..count as u64).collect())),
-        ],
+        arrays: arrays.into_iter().chain(internal).collect(),
     })
 }
 

@@ -46,6 +46,11 @@ macro_rules! columns {
             $(pub(crate) $moving: usize,)*
         }
 
+        impl Shares {
+            /// One element in each column.
+            pub(crate) const ONE: Self = Self { $($moving: 1,)* };
+        }
+
         impl<T: Copy, const D: usize> Particles<T, D> {
             /// The particles at some places, in that order.
             pub(crate) fn some(&self, places: &[u32]) -> Self {
@@ -77,6 +82,14 @@ macro_rules! columns {
             pub(crate) fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
                 $(work.column(1, &mut self.$fixed);)*
                 $(work.column(shares.$moving, &mut self.$moving);)*
+            }
+
+            /// Gives columns without elements their share, every element zero.
+            pub(crate) fn fill(&mut self, shares: &Shares) {
+                let zero = MovingColumns::<T, D>::zero(self.X.len(), shares);
+                $(if self.$moving.is_empty() {
+                    self.$moving = zero.$moving;
+                })*
             }
 
             /// Takes the columns that steps change from others.
