@@ -328,7 +328,7 @@ fn check<T: Lanes, const D: usize>(
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
     let Body { particles, half_edges, mesh } = body;
-    let Particles { X, x, v, F, mass, volume, half_size, affine: _, internal: _ } = particles;
+    let Particles { X, x, v, F, mass, volume, half_size, .. } = particles;
     let expected = X.len();
     let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
     for (array, found) in [
