@@ -422,7 +422,7 @@ mod tests {
         }
     }
 
-    /// What the right stress balances is the body force, in every kind of coordinates.
+    /// The body force balances the right stress, in every kind of coordinates.
     #[test]
     fn the_balance_of_the_right_stress_is_the_body_force() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../mms-specs");

@@ -183,7 +183,7 @@ In two dimensions the deformation is plane strain. Units are those of the parame
         lines.iter().map(|line| comment(line)).collect()
     }
 
-    /// What parameters mean, a line each.
+    /// Meanings of parameters, a line each.
     pub(crate) fn parameter_lines(&self) -> Vec<String> {
         let about = |p: &Parameter| {
             let meaning = meaning(&p.name, &p.description, &p.unit, &p.range);
@@ -236,11 +236,11 @@ In two dimensions the deformation is plane strain. Units are those of the parame
 pub(crate) struct Refusal {
     /// Whether `#` is a finite number.
     pub(crate) finite: &'static str,
-    /// What joins conditions.
+    /// The operator that joins conditions.
     pub(crate) and: &'static str,
     /// A number that two sides of a condition are compared as, for `#`.
     pub(crate) side: &'static str,
-    /// What happens unless the first `#` holds, with the second as the message.
+    /// Lines that refuse the parameters unless the first `#` holds, with the second as the message.
     pub(crate) lines: &'static str,
     /// A literal of text.
     pub(crate) string: fn(&str) -> String,

@@ -7,7 +7,7 @@ use std::iter::Peekable;
 use std::str::Chars;
 use std::sync::LazyLock;
 
-/// What functions are made of beside sums, products and calls of `math.h`.
+/// Operations of functions beside sums, products and calls of `math.h`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Primitive {
     /// The second where the first holds, else the third.
@@ -70,7 +70,7 @@ pub(crate) struct Routine {
     pub(crate) steps: Vec<Step>,
     /// Its value.
     pub(crate) result: String,
-    /// The same for languages in which a function can end early: nothing is computed that its value does not need.
+    /// The statements for languages in which a function can end early: nothing is computed that its value does not need.
     pub(crate) body: Vec<Line>,
 }
 
@@ -179,7 +179,7 @@ impl Function {
         needed
     }
 
-    /// Those of them that it is made of whatever its choices are.
+    /// Steps that a term is made of whatever its choices are.
     fn always_needs(&self, term: &Term) -> Vec<bool> {
         let Some([condition, first, second]) = term.choice() else { return self.needs(term) };
         let ways = self.always_needs(first).into_iter().zip(self.always_needs(second));
@@ -340,7 +340,7 @@ impl Function {
 }
 
 impl Term {
-    /// The same for a value of `k`, with the value before by its number.
+    /// This term for a value of `k`, with the value before by its number.
     fn at(&self, k: u32, before: &str) -> Term {
         let both = |parts: &[Term; 2]| Box::new([parts[0].at(k, before), parts[1].at(k, before)]);
         let folded = |parts: &[Term; 2], of: fn(f64, f64) -> f64| match &*both(parts) {

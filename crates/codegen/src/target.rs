@@ -12,7 +12,7 @@ pub(crate) trait Target {
     /// Where a function finds what is not computed in it.
     type Places: Copy;
 
-    /// What stands before the index of a value in a statement that names it, and what ends the statement.
+    /// Text before the index of a value in a statement that names it, and the end of the statement.
     const STATEMENT: [&'static str; 2];
 
     /// A double; negative ones so that they can stand after a sign.
@@ -141,11 +141,11 @@ impl Called {
 /// A host that a solution can be written for.
 #[derive(Debug)]
 pub struct Host {
-    /// What `--target` calls it.
+    /// The name for `--target`.
     pub name: &'static str,
-    /// What is written.
+    /// The files of the host, in a line.
     pub about: &'static str,
-    /// What a file's name ends with, after the name of the module.
+    /// The end of a file's name, after the name of the module.
     pub ending: &'static str,
     /// The text of the file.
     pub(crate) write: fn(&Code<'_>) -> Result<String, Unwritable>,

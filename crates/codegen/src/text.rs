@@ -9,7 +9,7 @@ pub(crate) fn one_line(text: &str) -> String {
     words.join(" ").chars().filter(|c| !c.is_control()).collect()
 }
 
-/// What a value may be and what it means: the description or the name, the unit, the range.
+/// Meaning and values of a parameter: the description or the name, the unit, the range.
 pub(crate) fn meaning(name: &str, description: &str, unit: &str, range: &str) -> String {
     let mut text = one_line(if description.is_empty() { name } else { description });
     if !unit.is_empty() {
@@ -65,7 +65,7 @@ pub(crate) fn push_index(text: &mut String, index: usize) {
     let _ = write!(text, "{index}");
 }
 
-/// Of longer text, C's comments and messages show the beginning.
+/// C's comments show this many characters of longer text ...
 const LONGEST: usize = 2_000;
 /// ... and its messages this many characters, which stay below what every compiler takes when each is an escape of four.
 const LONGEST_MESSAGE: usize = 500;

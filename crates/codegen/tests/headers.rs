@@ -1,5 +1,4 @@
-//! What every generated header has to be by itself: it defines all that it calls, says what its functions give, and has
-//! names that C takes.
+//! Rules for every generated header by itself: it defines all that it calls, says what its functions give, and has names that C takes.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! What every generated Rust module has to be by itself.
+//! Rules for every generated Rust module by itself.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! What every host's file has to be, whatever the host.
+//! Rules for every host's file, whatever the host.
 
 #![allow(clippy::unwrap_used)]
 

@@ -179,7 +179,7 @@ lane_by_lane! {
     fn low_and_high(a, b) { [a[0], a[1], b[2], b[3]] }
 }
 
-/// What formulas for one particle need of numbers, so that they hold for eight at once as well.
+/// Numbers with the operations that formulas for one particle need, so that these hold for eight at once as well.
 pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The quotient.
     fn divided_by(self, divisor: Self) -> Self;
@@ -571,9 +571,9 @@ impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
 pub enum Registers {
     /// None: one number after the other.
     Scalar,
-    /// Of four doubles (AVX2 with fused multiply-adds).
+    /// Registers of four doubles (AVX2 with fused multiply-adds).
     Avx2,
-    /// Of eight doubles (AVX-512).
+    /// Registers of eight doubles (AVX-512).
     Avx512,
 }
 
@@ -581,7 +581,7 @@ pub enum Registers {
 static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx512 as u8);
 
 impl Registers {
-    /// Those that this processor has.
+    /// The registers that this processor has.
     pub fn present() -> Vec<Self> {
         match Arch::new() {
             #[cfg(target_arch = "x86_64")]
@@ -654,7 +654,7 @@ mod tests {
         .into()
     }
 
-    /// The same for eight numbers.
+    /// All operations on eight lanes, one after the other.
     fn operations8<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 8]> {
         let lanes = |from: f64| {
             Lane8(std::array::from_fn(|q| nalgebra::convert::<f64, T>((from + q as f64).sqrt())))

@@ -25,7 +25,7 @@ struct Root {
 }
 
 impl Root {
-    /// Of `y` beyond [`LARGEST_IN_SERIES`].
+    /// Root of `y` beyond [`LARGEST_IN_SERIES`].
     fn of(y: f64) -> Self {
         let root = y.sqrt();
         // What rounding takes from a large root is many units in the last place of its exponential. The square of its halves of 26

@@ -53,8 +53,8 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
         if NEAR { self.ln_near_one() } else { self.ln_of_both(y) }
     }
 
-    /// What rounding takes from a sum: `self + other` less its rounded value, exactly (D. E. Knuth, The Art of Computer
-    /// Programming, vol. 2, 4.2.2).
+    /// Rounding error of a sum: `self + other` less its rounded value, exactly (D. E. Knuth, The Art of Computer Programming, vol. 2,
+    /// 4.2.2).
     #[inline]
     #[must_use]
     fn sum_error(self, other: Self) -> Self {
@@ -63,8 +63,8 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
         (self - (sum - other_in_sum)) + (other - other_in_sum)
     }
 
-    /// What rounding takes from a product: `self * other` less its rounded value, exactly while both and the product are
-    /// below 1e300 and what is lost is not below the normal numbers (T. J. Dekker, Numer. Math. 18, 1971).
+    /// Rounding error of a product: `self * other` less its rounded value, exactly while both and the product are below 1e300 and what is
+    /// lost is not below the normal numbers (T. J. Dekker, Numer. Math. 18, 1971).
     #[must_use]
     fn product_error(self, other: Self) -> Self;
 

@@ -11,7 +11,7 @@ use std::thread;
 /// Numbers that a thread takes at once.
 const SHARE: u32 = 1 << 22;
 
-/// What is wrong with one result.
+/// Result that is wrong.
 struct Wrong {
     function: &'static str,
     x: f32,
@@ -82,7 +82,7 @@ fn assert_none(wrong: &[Wrong]) {
 
 /// The nearest number, but for results within this of the middle between two.
 const ROUNDED: f64 = 0.5 + 1e-6;
-/// The same where the truth is a formula in doubles that loses a few digits itself.
+/// As [`ROUNDED`], where the truth is a formula in doubles that loses a few digits itself.
 const NEARLY_ROUNDED: f64 = 0.5 + 1e-3;
 
 #[test]
@@ -133,7 +133,7 @@ fn sines_of_multiples_of_pi_are_the_nearest_numbers() {
     }));
 }
 
-/// Of numbers from zero on: others are no `z = (a - b)^2/(2 a b)`.
+/// Numbers from zero on: others are no `z = (a - b)^2/(2 a b)`.
 #[test]
 #[ignore = "a minute and more in release mode"]
 fn logarithms_of_ratios_are_the_nearest_numbers() {
@@ -162,7 +162,7 @@ fn logarithms_of_ratios_are_the_nearest_numbers() {
     }));
 }
 
-/// Of numbers from zero to where the values leave single precision.
+/// Numbers from zero to where the values leave single precision.
 #[test]
 #[ignore = "a minute and more in release mode"]
 fn hyperbolic_cosines_of_roots_are_the_nearest_numbers() {

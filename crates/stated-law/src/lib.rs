@@ -120,7 +120,7 @@ pub struct StatedLaw<T> {
     number: PhantomData<fn() -> T>,
 }
 
-/// What a law comes to, whatever the numbers are.
+/// Programs of a law, whatever the numbers are.
 #[derive(Clone, Debug)]
 struct Programs {
     stress: Program,

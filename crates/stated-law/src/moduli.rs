@@ -22,7 +22,7 @@ pub struct ModuliAtRest {
 }
 
 impl ModuliAtRest {
-    /// Of the law with this stress, and this normal stress along the axes left out.
+    /// Moduli of the law with this stress, and this normal stress along the axes left out.
     pub(crate) fn of<const D: usize>(stress: &Program, across: Option<&Program>) -> Option<Self> {
         /// Deviations of the stress keep their digits, so that the step can be this small.
         const STEP: f64 = 1.0 / 16_777_216.0;

@@ -42,7 +42,7 @@ impl Rest {
         Self::new(value, terms.iter().map(error).sum())
     }
 
-    /// Of a function with this value.
+    /// `function` of this value, with a bound on its rounding errors.
     fn of(self, function: impl Fn(f64) -> f64) -> Self {
         let value = function(self.value);
         let spread = [self.value - self.error, self.value + self.error]

@@ -30,7 +30,7 @@ const FUNCTIONS: [(&str, Function); 20] = [
     ("lnratio2_curvature", Function::LogRatioCurvature),
 ];
 
-/// What names in a text stand for.
+/// Meanings of names in a text.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Names {
     pub(crate) arguments: BTreeMap<String, (Argument, Value)>,

@@ -42,7 +42,7 @@ pub enum Response {
 }
 
 impl<T> Law<T> {
-    /// The same law with `change` applied to each constant.
+    /// This law with `change` applied to each constant.
     #[must_use]
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Law<U> {
         match self {

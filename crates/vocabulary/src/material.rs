@@ -265,7 +265,7 @@ macro_rules! materials {
             ///
             /// # Errors
             ///
-            /// Those of `value`, and [`UnknownLaw`].
+            /// Errors of `value`, and [`UnknownLaw`].
             pub fn from_constants<E: From<UnknownLaw>>(
                 name: &str,
                 volumetric: Volumetric,
@@ -287,13 +287,13 @@ macro_rules! materials {
                 }
             }
 
-            /// The same law with `change` applied to each constant.
+            /// This law with `change` applied to each constant.
             #[must_use]
             pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Material<U> {
                 self.map_named(|_, value| change(value))
             }
 
-            /// The same law with `change` applied to each constant, by its name.
+            /// This law with `change` applied to each constant, by its name.
             #[must_use]
             pub fn map_named<U>(
                 self,
@@ -307,7 +307,7 @@ macro_rules! materials {
                 }
             }
 
-            /// What is known of the law but for the values of its constants.
+            /// Properties of the law but for the values of its constants.
             #[must_use]
             pub fn row(&self) -> &'static Row {
                 let name = match self {

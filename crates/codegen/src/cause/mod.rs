@@ -23,7 +23,7 @@ pub struct Cause {
     pub mistake: &'static str,
     /// Where to look in the code.
     pub look: &'static str,
-    /// What shows it.
+    /// The fields that show the mistake.
     pub counter: Counter,
 }
 
@@ -76,7 +76,7 @@ pub enum Timed {
     Everything,
 }
 
-/// What a solver may take for the motion after the start where this is prescribed.
+/// Motion that a solver may take for the given one after the start, where the motion is prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moved {
     /// The displacement with the wrong sign.
@@ -265,7 +265,7 @@ impl Cause {
     }
 }
 
-/// What a solver is given that is noticed inside the body; tractions where these are all that is changed.
+/// Fields for a solver that act inside the body; tractions where these are all that is changed.
 fn handed(before: &Fields, after: &Fields) -> [Vec<Expr>; 2] {
     let inside = |fields: &Fields| [&fields.u[..], &fields.v, &fields.b].concat();
     let tractions = |fields: &Fields| {

@@ -56,7 +56,7 @@ impl<'a> Translator<'a> {
         (statements, outputs.iter().map(|output| tokens(output)).collect())
     }
 
-    /// The same where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
+    /// As [`statements`](Self::statements), where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
     pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
         Translator { tells_near: true, ..self.clone() }.statements(block)
     }

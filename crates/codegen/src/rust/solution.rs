@@ -1,4 +1,4 @@
-//! What the solver asks a solution in Rust: fields, tractions, law, domain and boundaries.
+//! Items of a solution in Rust that the solver asks for: fields, tractions, law, domain and boundaries.
 
 use super::Generator;
 use mmsmith_expr::Slot;

@@ -219,7 +219,7 @@ fn origin(operand: Operand<'_>) -> &'static [&'static str] {
 }
 
 impl Target for C {
-    /// What stands before the name of a parameter.
+    /// Text before the name of a parameter.
     type Places = &'static str;
 
     const STATEMENT: [&'static str; 2] = ["const double ", ";\n"];

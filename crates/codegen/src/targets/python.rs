@@ -13,11 +13,11 @@ pub(crate) struct Python {
     /// Calls of functions, with `#` for each argument.
     pub(crate) function: fn(Called) -> Cow<'static, str>,
     pub(crate) primitive: fn(Primitive) -> &'static str,
-    /// What the host's user has to know.
+    /// Remarks for the host's user.
     pub(crate) remarks: &'static str,
     /// Imports, and the functions `_position`, `_scalar`, `_vector` and `_matrix`, which shape results.
     pub(crate) preamble: &'static str,
-    /// What stands before a function of the runtime.
+    /// The decorator before a function of the runtime.
     pub(crate) decorator: &'static str,
     /// The first statements of the constructor.
     pub(crate) demands: &'static str,

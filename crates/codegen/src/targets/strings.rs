@@ -8,16 +8,16 @@ use mmsmith_expr::{Function, Operation, Slot, nearest_f64};
 use mmsmith_stage::{Operand, Shape};
 use std::collections::BTreeMap;
 
-/// What the remarks of all such hosts say.
+/// Remarks that all such hosts share.
 pub(crate) const ACCURACY: &str = "\
 The parameters are numbers in the expressions: write the file anew with --set for others. sin(pi x) is formed as it stands, and ln(1 + x) as \
 ln(y) x/(y - 1) with y = 1 + x, which keeps the digits of a small x.";
 
 /// How a host writes expressions.
 pub(crate) struct Strings {
-    /// What `--target` calls it.
+    /// The name for `--target`.
     pub(crate) host: &'static str,
-    /// What it calls the coordinates.
+    /// The host's names of the coordinates.
     pub(crate) coordinates: [&'static str; 3],
     /// Functions of `math.h` that it has, with its names for them.
     pub(crate) functions: &'static [(&'static str, &'static str)],
@@ -28,7 +28,7 @@ pub(crate) struct Strings {
 /// A field as expressions.
 pub(crate) struct Field {
     pub(crate) name: String,
-    /// What it is, in words.
+    /// The field in words.
     pub(crate) about: String,
     /// Row by row.
     pub(crate) entries: Vec<Entry>,
@@ -41,7 +41,7 @@ pub(crate) struct Entry {
     pub(crate) text: String,
 }
 
-/// What stands for a value in an expression.
+/// Value in an expression.
 #[derive(Clone)]
 enum Value {
     /// Nothing but zero, with which products and sums are shorter.
