@@ -39,7 +39,7 @@ struct Fields {
     fault: Option<String>,
 }
 
-/// What is the same at all points.
+/// Properties of a solution that are the same at all points.
 struct Facts {
     corners: Option<(Vec<f64>, Vec<f64>)>,
     radii: Option<(f64, f64)>,

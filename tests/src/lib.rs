@@ -1,4 +1,4 @@
-//! What the tests in this package share: the commands as users run them, and their output as data.
+//! Helpers of the tests in this package: the commands as users run them, and their output as data.
 //!
 //! The tests themselves are in `tests/`, one file a subject: golden values, orders of accuracy, the claims of the
 //! original study, generation, bad input, particle files.

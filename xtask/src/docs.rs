@@ -19,7 +19,7 @@ mod timing;
 const README_LINES: usize = 150;
 const README_WORDS: usize = 1200;
 
-/// What a check found.
+/// Result of a check.
 pub(crate) struct Report {
     /// A line for each block, section and fault.
     pub(crate) lines: Vec<String>,

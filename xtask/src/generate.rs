@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What was done, in lines for people.
+/// Result of a generation, in lines for people.
 pub(crate) struct Outcome {
     pub(crate) lines: Vec<String>,
     pub(crate) stale: bool,

@@ -63,8 +63,8 @@ pub enum Quantity {
     Traction,
 }
 
-/// What is given on the sides of a body: the motion of those that are [`End::Moved`](super::End::Moved), the traction on
-/// those that are [`End::Loaded`](super::End::Loaded).
+/// Boundary data of a body: the motion of sides that are [`End::Moved`](super::End::Moved), the traction on sides that are
+/// [`End::Loaded`](super::End::Loaded).
 pub trait BoundaryData<const D: usize> {
     /// Writes a quantity at the reference positions `X` on a side at time `t`, in Cartesian components; both slices have
     /// the same length. The contents of `values` on entry are unspecified.
@@ -124,7 +124,7 @@ pub(crate) struct Face<const D: usize> {
     pub(crate) frames: Vec<SMatrix<f64, D, D>>,
     /// Areas that the points stand for, where the traction is given.
     pub(crate) areas: Vec<f64>,
-    /// What is given, in the grid's components.
+    /// The given values, in the grid's components.
     pub(crate) values: Vec<SVector<f64, D>>,
 }
 

@@ -24,7 +24,7 @@ pub(super) struct Operators<const D: usize> {
     pub(super) fits: Result<[[Fit; 2]; D], SetupError>,
 }
 
-/// What belongs to a component along axis `k`.
+/// The entry of `pairs` for a component along axis `k`: the second where it is the component along this axis, else the first.
 pub(super) fn along<T, const D: usize>(pairs: &[[T; 2]; D], k: usize, component: usize) -> &T {
     &pairs[k][usize::from(k == component)]
 }

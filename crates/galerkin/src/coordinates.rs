@@ -93,8 +93,7 @@ impl Coordinates {
         }
     }
 
-    /// What the particles have in common whose coordinates differ from these by the first; `None` where components are
-    /// Cartesian.
+    /// Factors common to the particles whose coordinates differ from these by the first; `None` where components are Cartesian.
     pub(crate) fn row<const D: usize>(self, coordinates: &SVector<f64, D>) -> Option<Row<D>> {
         let frame = self.frame(coordinates)?;
         let [cosecant, cotangent] = match self {
@@ -161,8 +160,7 @@ impl Coordinates {
         H
     }
 
-    /// What a force per gradient is per component and per derivative by the coordinates: the transpose of
-    /// [`gradient`](Self::gradient).
+    /// A force per gradient as forces per component and per derivative by the coordinates: the transpose of [`gradient`](Self::gradient).
     #[inline(always)]
     pub(crate) fn transposed_gradient<const D: usize>(
         self,

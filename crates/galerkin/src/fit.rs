@@ -10,7 +10,7 @@ pub(crate) struct Line {
     pub(crate) points: Vec<f64>,
     /// The part of the axis that each stands for.
     pub(crate) lengths: Vec<f64>,
-    /// The same with this axis's factor of the volume.
+    /// The lengths times this axis's factor of the volume.
     pub(crate) weights: Vec<f64>,
 }
 

@@ -757,7 +757,7 @@ fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row<D>> {
     products(counts).filter_map(|index| grid.coordinates.row(&place(index))).collect()
 }
 
-/// What takes values to coefficients, by axis and kind of component; or the axis whose particles do not determine them.
+/// Fits of coefficients to values, by axis and kind of component; or the axis whose particles do not determine them.
 fn fits<const D: usize>(
     grid: &Grid<D>,
     bases: &[[Basis; 2]; D],

@@ -1,5 +1,5 @@
-//! What splines in the reference configuration have to keep: momentum, energy to the order in time, the way back; and
-//! how runs and set-ups fail.
+//! Conservation by splines in the reference configuration: momentum, energy to the order in time, the way back; and failures of runs
+//! and set-ups.
 
 #![allow(clippy::unwrap_used)]
 
@@ -243,8 +243,8 @@ fn affine<const D: usize>() -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|i, k| [[0.1, 0.3, -0.15], [-0.2, 0.05, 0.1], [0.07, -0.12, -0.08]][i][k])
 }
 
-/// What is far from radial has all terms of gradients and forces; where one is wrong the body moves by an amount that does not
-/// depend on the grid.
+/// A motion far from radial has all terms of gradients and forces; where one is wrong the body moves by an amount that does not depend on
+/// the grid.
 #[test]
 fn a_homogeneous_deformation_is_in_equilibrium_with_its_tractions() {
     fn check<const D: usize>(grid: &Grid<D>, dt: f64) {

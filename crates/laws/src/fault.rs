@@ -133,7 +133,7 @@ struct InLaw {
     change: Change,
 }
 
-/// What becomes of a constant.
+/// Change of a constant.
 #[cfg(feature = "planted-faults")]
 enum Change {
     Times(f64),
@@ -260,7 +260,7 @@ impl Planted {
         false
     }
 
-    /// The same law.
+    /// `material` as it is.
     #[inline(always)]
     pub fn law_in_stresses<T>(self, material: Material<T>) -> Material<T> {
         material

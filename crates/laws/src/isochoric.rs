@@ -83,7 +83,7 @@ impl<T: RealField + Copy, const D: usize> Isochoric<T, D> {
 
 /// A law `W = w(I1bar) + kappa U(J)`.
 pub trait OfFirstInvariant: Copy + Send + Sync + 'static {
-    /// What it computes with. No parameter of the trait, so that one implementation of [`LibraryLaw`] serves all of them.
+    /// The number type. No parameter of the trait, so that one implementation of [`LibraryLaw`] serves all laws of this kind.
     type Scalar: RealField + Copy;
 
     /// `dw/dI1bar`, where `I1bar - 3` is `excess`; not a number where the energy is not defined.

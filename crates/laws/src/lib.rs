@@ -276,7 +276,7 @@ pub trait LibraryLaw<T: RealField + Copy>: Copy + Send + Sync + 'static {
         true
     }
 
-    /// The same Kirchhoff stress, to the last bit, in fewer operations, where those [do](Self::is_short).
+    /// [`kirchhoff`](Self::kirchhoff) with the same bits in fewer operations, where it [is short](Self::is_short).
     #[inline(always)]
     fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         self.kirchhoff(F)
@@ -285,7 +285,7 @@ pub trait LibraryLaw<T: RealField + Copy>: Copy + Send + Sync + 'static {
     /// First Piola-Kirchhoff stress.
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
 
-    /// The same first Piola-Kirchhoff stress, to the last bit, in fewer operations, where those [do](Self::is_short).
+    /// [`first_piola_kirchhoff`](Self::first_piola_kirchhoff) with the same bits in fewer operations, where it [is short](Self::is_short).
     #[inline(always)]
     fn first_piola_kirchhoff_short<const D: usize>(
         &self,

@@ -394,7 +394,7 @@ struct Mistaken {
     at_rest: f64,
     /// Whether its P is the nominal stress.
     is_transposed: bool,
-    /// What its energy is multiplied by.
+    /// The factor of its energy.
     energy: f64,
 }
 

@@ -92,7 +92,7 @@ impl Random {
     }
 }
 
-/// What is evaluated: parameters, a time and points, and what Rust makes of them.
+/// A case to evaluate: parameters, a time and points, and the values by Rust.
 struct Case {
     name: &'static str,
     values: Vec<f64>,
@@ -324,7 +324,7 @@ fn headers() -> &'static Path {
     })
 }
 
-/// What generated code must be compiled without a warning by.
+/// Options under which generated code must compile without a warning.
 fn strict(command: &mut Command) -> &mut Command {
     command.args(["-pedantic", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"])
 }

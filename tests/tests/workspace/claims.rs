@@ -16,7 +16,7 @@ fn errors(name: &str, shape: &str, integrator: &str, cells: &str) -> Vec<f64> {
     finished(&json(&[&["converge", name][..], &options].concat()))
 }
 
-/// The same over CFL numbers on one grid.
+/// [`errors`] over CFL numbers on one grid.
 fn errors_over_time_steps(name: &str, shape: &str, integrator: &str, cfls: &str) -> Vec<f64> {
     let grid = ["--cells", "32", "--cfls", cfls];
     let options = ["--shape", shape, "--integrator", integrator];

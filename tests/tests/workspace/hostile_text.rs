@@ -236,7 +236,7 @@ fn free_text_stays_text_in_c() {
     compile(&headers);
 }
 
-/// What is text in the files of a host.
+/// Syntax of text in the files of a host.
 struct Syntax {
     host: &'static str,
     /// How comments begin and end.

@@ -9,7 +9,7 @@ use mmsmith_tests::{mms, outcome, workspace};
 use serde_json::{Value, json};
 use std::fs;
 
-/// Of a run, whatever does not depend on clocks and machines.
+/// Results of a run that do not depend on clocks and machines.
 fn kept(command: &str) -> Value {
     let words: Vec<&str> = command.split(' ').collect();
     let (_, out, errors) = outcome(mms().arg("run").args(&words).args(["--json", "-"]));

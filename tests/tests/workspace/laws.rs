@@ -11,11 +11,11 @@ use mmsmith_tests::{at, column, json, workspace};
 
 /// A law as a specification states it.
 struct Law {
-    /// What it is; each test names it where it fails.
+    /// The law in words; each test names it where it fails.
     about: &'static str,
     /// The table `[material]`, but for the density.
     material: &'static str,
-    /// The same in space, where it has more components there.
+    /// The table in space, where the law has more components there.
     in_space: Option<&'static str>,
     /// Whether its stress turns with the body, so that a rotation can be superposed.
     is_objective: bool,
@@ -23,7 +23,7 @@ struct Law {
     in_stretches: bool,
 }
 
-/// What most of them are.
+/// Properties of most laws.
 const USUAL: Law =
     Law { about: "", material: "", in_space: None, is_objective: true, in_stretches: false };
 

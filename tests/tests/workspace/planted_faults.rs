@@ -238,7 +238,7 @@ fn specification(name: &str) -> Spec {
     Spec::parse(&std::fs::read_to_string(path).unwrap(), name).unwrap()
 }
 
-/// What `mms check` does: with the defaults, and with other parameters.
+/// The worse report of `mms check`, of one with the defaults and one with other parameters.
 fn judged(spec: &Spec, fields: &Fields) -> CheckReport {
     let usual: Vec<(&str, f64)> = Vec::new();
     let other: Vec<(&str, f64)> = spec

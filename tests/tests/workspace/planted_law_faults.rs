@@ -121,7 +121,7 @@ fn solution(spec: &Spec, fields: Fields) -> AnySolution<f64> {
     interpret_fields(spec, fields, []).unwrap()
 }
 
-/// What `mms check` finds wrong.
+/// Findings of `mms check` that have not passed.
 fn wrong(solution: &AnySolution<f64>) -> Vec<String> {
     let report = check(solution, 40).unwrap();
     let failed = report.findings.iter().filter(|finding| finding.verdict != Verdict::Passed);
@@ -135,7 +135,7 @@ struct Run {
     motion: &'static str,
     case: fn() -> Case,
     cells: [usize; 2],
-    /// What it shows at least where it is, and less than what it shows where it is not.
+    /// Bounds of the order: above `least_order` where the law is that of the fields, below `order_with_fault` where it is not.
     least_order: f64,
     order_with_fault: f64,
 }

@@ -25,7 +25,7 @@ use crate::reference::Reference;
 /// The problems that a check finds, with this fault in the solver.
 type Check = fn(Option<Fault>) -> Vec<String>;
 
-/// What there is to catch faults with.
+/// Checks that there are to catch faults with.
 const CHECKS: &[(&str, Check)] = &[
     ("agreement", agreement_of_two_solvers),
     ("momentum", momentum_and_free_flight),
@@ -367,7 +367,7 @@ const FAULTS: &[(Fault, &[&str])] = &[
     (Fault::XpicSign, &["agreement", "known errors"]),
 ];
 
-/// What `build` gives with the fault, if there is one.
+/// Result of `build` with the fault, if there is one.
 fn with<R>(fault: Option<Fault>, build: impl FnOnce() -> R) -> R {
     match fault {
         Some(fault) => fault::with(fault, build),
@@ -873,7 +873,7 @@ fn faults_are_planted_in_the_simulations_meant_and_in_no_others() {
     assert_eq!(run(), sound);
 }
 
-/// Those in laws, after them, are in `planted_law_faults.rs`.
+/// Faults in laws, after these, are in `planted_law_faults.rs`.
 #[test]
 fn every_fault_is_listed_once() {
     assert_eq!(

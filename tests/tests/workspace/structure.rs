@@ -180,7 +180,7 @@ fn a_circle_is_found() {
     assert_eq!(names, ["b", "c", "d"]);
 }
 
-/// What is judged is what is generated as long as all of it comes out of one pipeline.
+/// The code that is judged is the code that is generated as long as all of it comes out of one pipeline.
 #[test]
 fn the_passes_over_a_program_are_called_from_one_place() {
     fn callers(folder: &Path, found: &mut Vec<String>) {

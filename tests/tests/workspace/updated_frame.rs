@@ -11,7 +11,7 @@ fn converge(call: &str) -> serde_json::Value {
     json(&words)
 }
 
-/// Of the largest error of a field.
+/// Local orders of the largest error of a field.
 fn local_orders(study: &serde_json::Value, field: &str) -> Vec<f64> {
     let orders = study["orders"][field]["linf"]["local"].as_array().unwrap();
     orders.iter().map(|order| order.as_f64().unwrap()).collect()
@@ -34,7 +34,7 @@ fn fitted_quadrilaterals_are_of_second_order_with_free_surfaces() {
     }
 }
 
-/// What each scheme's order is, and that its error is what was measured when this was written.
+/// The order of each scheme, and its error as measured when this was written.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn every_scheme_has_its_order() {
@@ -142,7 +142,7 @@ fn results_are_the_same_bits_for_any_number_of_threads() {
     }
 }
 
-/// The same in space, on grids so coarse that the order is still on its way: with one finer it is 1.91 and 2.08.
+/// Clipped lattices in space, on grids so coarse that the order is still on its way: with one finer it is 1.91 and 2.08.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn clipped_lattices_in_space_come_near_second_order_with_free_and_loaded_surfaces() {

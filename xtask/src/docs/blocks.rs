@@ -1,4 +1,4 @@
-//! What becomes of each code block: it is run, read, compared, or exempt with a reason.
+//! Fate of each code block: it is run, read, compared, or exempt with a reason.
 
 use super::markdown::{Block, Page};
 use anyhow::Context;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What is done with a block.
+/// Action on a block.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     /// A command wrote it.
@@ -26,7 +26,7 @@ pub(crate) enum Action {
 }
 
 impl Action {
-    /// What the marks and the language of a block ask for.
+    /// The action that the marks and the language of a block ask for.
     pub(crate) fn of(block: &Block, has_doctests: bool) -> Result<Self, String> {
         if block.generated {
             return Ok(Self::Generated);
@@ -70,12 +70,12 @@ impl Action {
     }
 }
 
-/// What came of a block.
+/// Outcome of a block.
 #[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) line: usize,
     pub(crate) language: String,
-    /// What was done, or why it failed.
+    /// The action done, or why it failed.
     pub(crate) result: Result<String, String>,
 }
 
@@ -99,7 +99,7 @@ for folder in crates tests; do
 done
 "#;
 
-/// What a script printed, and how it ended.
+/// Output of a script, and how it ended.
 pub(crate) struct Printed {
     pub(crate) status: Option<i32>,
     pub(crate) out: String,

@@ -28,7 +28,7 @@ pub(crate) struct Block {
     pub(crate) line: usize,
     /// The language after the fence; empty where there is none.
     pub(crate) language: String,
-    /// What it says.
+    /// The code itself.
     pub(crate) text: String,
     /// The comments right before it.
     pub(crate) marks: Vec<String>,

@@ -13,7 +13,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 enum Form {
     /// Each command and what it prints.
     Text,
-    /// What the command prints, which is Markdown and the same at all times.
+    /// The output of the command, which is Markdown and the same at all times.
     Exact,
     /// Each command and the Markdown that it writes to `OUT.md`.
     Tables,
@@ -28,7 +28,7 @@ enum Form {
     Pairs,
     /// A column for each run of a square or a cube: what a billion particles of it would take on many cores.
     Billion,
-    /// What a build into an empty folder takes, and a row for each crate that takes long.
+    /// The time of a build into an empty folder, and a row for each crate that takes long.
     Build,
     /// The picture that the command writes to its last word, a path of the repository.
     Picture,
@@ -107,7 +107,7 @@ fn shown(command: &str) -> String {
     }
 }
 
-/// What commands have in common, and what each has beside it.
+/// Words that commands share, and those that each has beside them.
 fn labels(commands: &[String]) -> (String, Vec<String>) {
     let groups: Vec<Vec<String>> = commands.iter().map(|command| groups(command)).collect();
     // One command alone has all its words in common with itself.
@@ -144,7 +144,7 @@ fn groups(command: &str) -> Vec<String> {
     groups
 }
 
-/// What is wrong with a section as it stands; those that are the same at all times are written once more and compared.
+/// The fault of a section as it stands, if any; sections that are the same at all times are written once more and compared.
 pub(crate) fn fault(section: &Section, lines: &[&str], place: &Workplace) -> Result<(), String> {
     let form = Form::of(section)?;
     if section.commands.is_empty() {
@@ -308,7 +308,7 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
     Ok(parts.join("\n"))
 }
 
-/// What Cargo's timings of a build say.
+/// Cargo's timings of a build, as a table.
 fn build(command: &str, place: &Workplace) -> anyhow::Result<String> {
     /// Crates that take less are not told of, in seconds.
     const LEAST: f64 = 3.0;
@@ -395,7 +395,7 @@ fn pairs(command: &str, place: &Workplace) -> anyhow::Result<String> {
     Ok(lines.join("\n") + "\n")
 }
 
-/// What a command prints that does its work, whether or not what it measures passes.
+/// Output of a command that does its work, whether or not what it measures passes.
 fn succeed(place: &Workplace, command: &str) -> anyhow::Result<String> {
     let printed = place.run(command)?;
     // A missed order is a result, and ends with 1 after it was printed.
@@ -458,8 +458,8 @@ const OF_A_BILLION: [&str; 10] = [
     "hours for a period",
 ];
 
-/// What 10^9 particles of a square or a cube would take, from the rate of a smaller one on one core, in the order of [`OF_A_BILLION`].
-/// Bins, rows and messages are those of the solver, which a test of it counts.
+/// Cost of 10^9 particles of a square or a cube, from the rate of a smaller one on one core, in the order of [`OF_A_BILLION`]. Bins, rows
+/// and messages are those of the solver, which a test of it counts.
 fn billion(document: &Value) -> Option<Vec<String>> {
     const PARTICLES: f64 = 1e9;
     let (settings, row) = (&document["settings"], &document["result"]);
