@@ -94,7 +94,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     Ok(passed)
 }
 
-/// What came out for one published listing.
+/// Result for one published listing.
 struct Comparison {
     source: String,
     report: Report,
@@ -129,7 +129,7 @@ impl Comparison {
     }
 }
 
-/// What a specification claims, and what became of it.
+/// Claims of a specification, and their results.
 struct Claims {
     surfaces: Vec<SurfaceFinding>,
     listings: Vec<Comparison>,

@@ -16,10 +16,10 @@ use crate::keep;
 use crate::processes;
 use crate::terminal;
 
-/// What a run leaves in its folder before its first step.
+/// File that a run writes into its folder before its first step.
 pub(super) const FILE: &str = "run.json";
 const SCHEMA: &str = "mmsmith.checkpoint/1";
-/// What that file begins with, and what stands between its checksum and all that the checksum is of.
+/// The beginning of that file, and the text between its checksum and all that the checksum is of.
 const BEFORE: &str = "{\"sha256\":\"";
 const AFTER: &str = "\",";
 
@@ -29,7 +29,7 @@ pub(super) struct Start {
     schema: String,
     /// The folder that the run was started in, to which the files of its arguments are relative.
     pub(super) folder: PathBuf,
-    /// What followed the program's name.
+    /// Arguments after the program's name.
     pub(super) arguments: Vec<String>,
 }
 

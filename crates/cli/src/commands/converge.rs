@@ -311,7 +311,7 @@ fn step(row: &Row, sweep: &Sweep) -> f64 {
     if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt }
 }
 
-/// What rounding alone may cause, case by case.
+/// Errors that rounding alone may cause, case by case.
 fn floors(model: &Model, base: &Case, sweep: &Sweep) -> Result<Vec<PerField<f64>>> {
     let cases = sweep.cases(base).into_iter();
     let floors =
@@ -373,7 +373,7 @@ fn unless_unjudged(judged: Verdicts, coarsest: Option<usize>) -> Verdicts {
     PerField::from_fn(|field| PerNorm::from_fn(|norm| settle(judged[field][norm].clone())))
 }
 
-/// What a table says of how a case ended, and of its errors of one field.
+/// Words of a table on how a case ended, and on its errors of one field.
 fn status(status: &Status, is_rounding: bool) -> String {
     match status {
         Status::Ok if is_rounding => "at rounding",
@@ -485,7 +485,7 @@ pub(super) fn tables(study: &Study, sweep: &Sweep, judged: &Verdicts) -> [(Field
     tables
 }
 
-/// The same for differences on one grid.
+/// As [`tables`], for differences on one grid.
 pub(super) fn difference_tables(temporal: &Temporal, judged: &Verdicts) -> [(Field, Table); 4] {
     let mut tables = Field::ALL.map(|field| {
         let header = ["dt", "CFL", "steps"].into_iter().chain(NORMS).chain(["status"]);
@@ -541,7 +541,7 @@ fn has_range(judged: &Verdicts) -> bool {
     judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| !one.asymptotic_rows.is_empty()))
 }
 
-/// What it means that a field has no asymptotic range, where one has none.
+/// Meaning of a missing asymptotic range, where a field has none.
 fn on_range(judged: &Verdicts, rows: usize) -> String {
     let is_open = |one: &OrderVerdict| one.behaviour == Behaviour::NotSettled;
     if !judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| is_open(one))) {
@@ -567,7 +567,7 @@ fn on_coarse(judged: &Verdicts, study: &Study) -> String {
     )
 }
 
-/// What each field and norm shows, a row each. `is_decisive` where the result of the study hangs on it.
+/// Verdict on each field and norm, a row each. `is_decisive` where the result of the study hangs on it.
 pub(super) fn verdict_table(judged: &Verdicts, step: &str, is_decisive: bool) -> Table {
     let header = ["field", "norm", "expected", "order", "leading term", "verdict"];
     let mut table = Table::new(2, header).sparing(4..5).flowing(37);
@@ -623,7 +623,7 @@ pub(super) fn stops(study: &Study) -> String {
         .collect()
 }
 
-/// What runs in place of the first case that stopped; nothing where none did.
+/// Settings that run in place of the first case that stopped; nothing where none did.
 fn advice(
     given: Given<'_>,
     model: &Model,
@@ -660,7 +660,7 @@ fn round_off(model: &Model, base: &Case, sweep: &Sweep) -> Result<f64> {
     Ok(largest)
 }
 
-/// What a picture says of its study.
+/// Words of a picture on its study.
 struct Told<'a> {
     title: &'a str,
     note: &'a str,

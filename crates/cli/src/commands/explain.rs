@@ -217,7 +217,7 @@ fn exact_elements(degree: Option<usize>) -> String {
     })
 }
 
-/// What runs of the usual scheme are predicted to take, or why there are none.
+/// Predicted costs of runs of the usual scheme, or why there are none.
 type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
 
 fn runs(predicted: &Predicted, choice: &str) -> String {

@@ -98,7 +98,7 @@ pub(super) struct Picture {
     stress: Stress,
     /// The moment in periods.
     at: f64,
-    /// Of several processes the first one has it.
+    /// The file; the first one of several processes has it.
     output: Option<Output>,
     snapshot: Snapshot,
 }

@@ -1,4 +1,4 @@
-//! What runs will take, before they are run.
+//! Costs of runs, before they are run.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ const LITTLE_WORK: f64 = 1e7;
 /// Calibration in seconds for each particle and step of the work, a small part of it; and its limits.
 const EFFORT: f64 = 5e-9;
 const EFFORTS: (f64, f64) = (0.05, 0.5);
-/// What `mms explain` spends on it: enough for some steps on its finest grid, where two dimensions are all.
+/// Calibration for `mms explain`: enough for some steps on its finest grid, where two dimensions are all.
 const BRIEF: Duration = Duration::from_millis(1500);
 
 /// The seconds that each of `cases`, of one scheme, will take; none for work so little that it is not worth calibrating for,
@@ -33,12 +33,12 @@ pub(super) fn seconds(model: &Model, cases: &[Case]) -> Option<Vec<f64>> {
     plans.iter().map(|plan| Some(learnt.predict(plan)?.total_s)).collect()
 }
 
-/// What is learnt from a few steps of a case's scheme, on grids up to its own.
+/// Cost model from a few steps of a case's scheme, on grids up to its own.
 pub(super) fn learn(model: &Model, case: &Case) -> Result<CostModel, mmsmith_verify::CaseError> {
     CostModel::calibrate(&model.exact, model.arithmetic(), case, BRIEF)
 }
 
-/// What the scheme of `base` takes on some grids; grids that do not fit the solution are left out.
+/// Costs of the scheme of `base` on some grids; grids that do not fit the solution are left out.
 pub(super) fn on_grids(
     model: &Model,
     base: &Case,

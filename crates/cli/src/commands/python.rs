@@ -212,7 +212,7 @@ fn kind(argument: &Arg) -> String {
     text.to_owned()
 }
 
-/// What an option means, with its default.
+/// Meaning of an option, with its default.
 fn described(argument: &Arg) -> String {
     // A dict is no option that is repeated, and there is no standard output.
     let help = match argument.get_long() {

@@ -12,7 +12,7 @@ use crate::arguments::{Precision, SchemeOptions, word};
 use crate::progress::Bar;
 use crate::{number, processes, table};
 
-/// What is known after a run that stopped, or whose errors exceed the motion.
+/// Advice after a run that stopped, or whose errors exceed the motion.
 pub(super) struct Advice {
     step: Option<OnPWaves>,
     tried: Option<Remedy>,
@@ -98,7 +98,7 @@ impl Advice {
         text
     }
 
-    /// The same for programs.
+    /// The advice for programs.
     pub(super) fn document(&self) -> Value {
         let attempts = self.tried.iter().flat_map(|tried| &tried.attempts).zip(&self.options);
         json!({

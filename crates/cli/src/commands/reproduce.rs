@@ -62,11 +62,11 @@ const SMALL_STEP: f64 = 0.05;
 /// The schemes whose differences on one grid are measured, and the CFL numbers.
 const DIFFERENCES: [(Shape, Stepping); 2] = [(Shape::Gimp, CD), (Shape::Gimp, Stepping::Usl)];
 const DIFFERENCE_CFLS: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
-/// The same with a small amplitude on a fine grid, where the order of centred differences shows.
+/// The gentle study: these differences with a small amplitude on a fine grid, where the order of centred differences shows.
 const GENTLE: f64 = 1e-3;
 const GENTLE_GRID: usize = 64;
 const GENTLE_CFLS: [f64; 4] = [0.6, 0.4, 0.2, 0.1];
-/// Of the gentle study, the CFL numbers down to which centred differences are claimed to be of second order.
+/// CFL number of the gentle study down to which centred differences are claimed to be of second order.
 const GENTLE_RANGE: f64 = 0.15;
 
 /// A study of one scheme.
@@ -166,7 +166,7 @@ fn studied(problem: &str, values: &[(&str, f64)]) -> Result<Selection> {
     Selection::new(problem, &study_parameters(values))
 }
 
-/// What runs of a problem take, from a few steps made just now.
+/// Cost of runs of a problem, from a few steps made just now.
 struct Pace {
     model: Model,
     learnt: Option<CostModel>,

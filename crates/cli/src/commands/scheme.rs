@@ -17,7 +17,8 @@ use crate::number;
 
 /// The default number of cells.
 const USUAL_CELLS: usize = 32;
-/// The same for a solid of three dimensions in a total Lagrangian formulation that was not asked for, whose cells have 64 particles each.
+/// The default for a solid of three dimensions in a total Lagrangian formulation that was not asked for, whose cells have 64 particles
+/// each.
 const USUAL_CELLS_OF_SOLIDS: usize = 16;
 /// Particles in a cell along each direction, but for Gauss points.
 const USUAL_PER_CELL: usize = 2;
@@ -31,7 +32,7 @@ pub(super) struct Settled {
     /// As many as was asked for.
     pub(super) threads: Option<usize>,
     pub(super) json: Option<PathBuf>,
-    /// What was chosen because the usual scheme would not do, and why.
+    /// The choice made because the usual scheme would not do, and its reason.
     pub(super) chosen: Option<Choice>,
     /// Conditions in whose place the traction of the exact motion acts.
     pub(super) loaded: Vec<Boundary>,
@@ -48,7 +49,7 @@ pub(super) struct Choice {
     cfl_is_chosen: bool,
 }
 
-/// What holds for a solution that the updated Lagrangian formulation models, with the given weights and integrator.
+/// Usual case of a solution that the updated Lagrangian formulation models, with the given weights and integrator.
 pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> Case {
     let scheme = Scheme::Updated(Updated { shape, stepping, ..Updated::default() });
     Case { scheme, cells, ..Case::default() }
@@ -360,7 +361,7 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
     })
 }
 
-/// What weights and integrator leave unsaid, in words; of the updated Lagrangian formulation what is not the usual.
+/// Settings beside weights and integrator, in words; of the updated Lagrangian formulation those that are not the usual ones.
 pub(super) fn words(scheme: &Scheme) -> String {
     let Parts { composition, mass, layout, grid, start, pose, .. } = scheme.parts();
     match scheme {

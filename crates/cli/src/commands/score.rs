@@ -99,7 +99,7 @@ fn scored(
     tell(options, selection, exact, &score, how, output)
 }
 
-/// The same with density one, which the recordings have and nobody has set.
+/// As [`scored`], with density one, which the recordings have and nobody has set.
 fn at_density_one(
     options: &ScoreOptions,
     selection: &Selection,

@@ -27,7 +27,7 @@ use crate::terminal;
 
 /// One point of a line or map: what is set, and the case that follows from it.
 struct Point {
-    /// What the varied settings are here, in their order.
+    /// The values of the varied settings here, in their order.
     values: Vec<String>,
     selection: Selection,
     /// With the number of cells that the point has.
@@ -171,7 +171,7 @@ impl Survey<'_> {
         text
     }
 
-    /// What 'unstable' means, in words.
+    /// Definition of 'unstable', in words.
     pub(super) fn definition(&self) -> String {
         definition(&self.search.criteria)
     }
@@ -180,7 +180,7 @@ impl Survey<'_> {
         table(&self.names(), &self.points, &self.rows)
     }
 
-    /// What the table cannot say.
+    /// Facts that the table cannot say.
     pub(super) fn notes(&self) -> String {
         notes(&self.names(), &self.points, &self.rows)
     }
@@ -305,7 +305,7 @@ fn without_threads(mut key: Value) -> Value {
     key
 }
 
-/// What 'unstable' means, in words.
+/// Definition of 'unstable', in words.
 fn definition(criteria: &Criteria) -> String {
     let Criteria { error_multiple, energy_rate } = criteria;
     format!(
@@ -315,7 +315,7 @@ fn definition(criteria: &Criteria) -> String {
     )
 }
 
-/// What the columns of the table are.
+/// Meanings of the table's columns.
 const LEGEND: &str = "\
 stable, unstable: CFL numbers on either side of the limit
 on P-waves: the stable number, on the speed of P-waves
@@ -385,7 +385,7 @@ fn table(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> Table {
     table
 }
 
-/// What the table cannot say.
+/// Facts that the table cannot say.
 fn notes(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> String {
     let mut text = String::new();
     for (point, row) in points.iter().zip(rows) {

@@ -35,14 +35,14 @@ const CFL: f64 = 0.4;
 const MOST_THREADS: usize = 64;
 /// Lines on what settings buy, of which there may be many more.
 const MAIN_EFFECTS: usize = 10;
-/// Of those, at most so many on single precision.
+/// Lines on single precision among these, at most.
 const OF_SINGLE_PRECISION: usize = 2;
 
 /// How errors are compared.
 struct Measure {
     field: Field,
     norm: Norm,
-    /// What errors are divided by, and its name.
+    /// The divisor of errors, and its name.
     scale: Option<(String, f64)>,
 }
 
@@ -61,7 +61,7 @@ impl Measure {
         error / self.scale.as_ref().map_or(1.0, |(_, scale)| *scale)
     }
 
-    /// What the errors are, in words.
+    /// The compared errors, in words.
     fn words(&self) -> String {
         let (field, norm) = (self.field, self.norm.caption());
         match &self.scale {
@@ -73,7 +73,7 @@ impl Measure {
     }
 }
 
-/// What runs settings for the sweep.
+/// Runner of settings for the sweep.
 struct Runner<'a> {
     exact: &'a Model,
     single: Option<&'a Model>,
@@ -107,7 +107,7 @@ impl Runner<'_> {
         self.pools.get(&setting.threads).context("no threads were started for this setting")
     }
 
-    /// What the case of a setting is known by.
+    /// Key of a setting's case.
     fn key(&self, setting: &Setting) -> Value {
         let mut key = words::document(setting);
         // Times are part of this result, and so are the threads.
@@ -304,7 +304,7 @@ fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<S
     Ok(Swept::All(Box::new(Report { options, selection, found, compared, threads, used_s })))
 }
 
-/// What was found, to be told.
+/// Result of a sweep, to be told.
 pub(super) struct Report<'a> {
     options: &'a TradeoffOptions,
     selection: Selection,
@@ -529,7 +529,7 @@ impl Report<'_> {
         format!("mms run {} {}{periods}{set}", self.options.name, words::options(setting))
     }
 
-    /// What the change of each setting did, a line each.
+    /// Effects of the change of each setting, a line each.
     fn effects(&self) -> Vec<String> {
         let mut lines: Vec<String> =
             self.found.effects.iter().map(|effect| self.effect(effect)).collect();

@@ -133,7 +133,7 @@ struct Named {
     shift: Option<f64>,
 }
 
-/// What was found.
+/// Result of the diagnosis.
 struct Told {
     passed: bool,
     right: BTreeMap<usize, Errors>,

@@ -15,7 +15,7 @@ use mmsmith_verify::{Input, Quantity, Resolution, ScoreOptions as Reading, score
 /// Errors of a run: the largest at any point, by field.
 pub(super) type Errors = BTreeMap<Quantity, f64>;
 
-/// What a solver is given: fields against a mistake.
+/// Trial of a solver: fields against a mistake.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trial {
     /// The mistake.
@@ -48,7 +48,7 @@ pub(super) struct Solver<'a> {
     pub(super) dt: BTreeMap<usize, f64>,
 }
 
-/// What a run left.
+/// Result of a run.
 pub(super) struct Run {
     /// The errors; infinite where the run failed.
     pub(super) errors: Errors,

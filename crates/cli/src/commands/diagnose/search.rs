@@ -30,7 +30,7 @@ const FIRST_SHIFT: f64 = 0.2;
 /// A solver that has a time step this small beside a cell is not at fault by it.
 const SMALLEST_SHIFT: f64 = 1e-4;
 
-/// What is expected of a solver.
+/// Orders that are expected of a solver, and their tolerance.
 pub(super) struct Expected {
     pub(super) orders: BTreeMap<Quantity, f64>,
     pub(super) tolerance: f64,
@@ -105,7 +105,7 @@ impl Search<'_> {
         self.solver.spec.boundaries.iter().any(|boundary| boundary.condition == condition)
     }
 
-    /// What can be tried without a fit.
+    /// Trials that need no fit.
     fn trials(&self) -> Vec<Trial> {
         let loaded = self.surfaces(Condition::PrescribedTraction);
         let admit = |cause: &&'static Cause| {

@@ -1,4 +1,4 @@
-//! What runs take beside what was predicted of them.
+//! Times of runs beside the predicted ones.
 
 use anyhow::Result;
 use mmsmith_verify::{

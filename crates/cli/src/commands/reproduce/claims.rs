@@ -1,4 +1,4 @@
-//! What the original study claims, held against what was measured.
+//! Claims of the original study, held against what was measured.
 
 use super::{
     CELLS, CFLS, Differences, GENTLE, GENTLE_CFLS, GENTLE_GRID, GENTLE_RANGE, GRID, Results,
@@ -10,9 +10,9 @@ use crate::table::Table;
 pub(super) struct Claim {
     /// The study's words, or close to them.
     pub(super) text: &'static str,
-    /// What counts as confirmed.
+    /// The criterion for a confirmed claim.
     pub(super) criterion: &'static str,
-    /// What the verdict depends on.
+    /// Conditions that the verdict depends on.
     pub(super) depends: &'static str,
     /// The numbers.
     pub(super) measured: String,

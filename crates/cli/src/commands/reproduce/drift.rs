@@ -1,4 +1,4 @@
-//! What the integrators gain and lose of energy over some periods.
+//! Energy that the integrators gain and lose over some periods.
 
 use std::path::Path;
 

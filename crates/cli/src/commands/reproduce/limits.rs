@@ -17,7 +17,7 @@ use crate::progress::Bar;
 const CELLS: usize = 16;
 const OVER: [&str; 2] = ["amplitude=1e-6,0.03,0.1,0.2", "nu=0,0.3,0.4,0.45"];
 
-/// What it will take: the runs of a search, of which those that are unstable end early.
+/// Time of the section: the runs of a search, of which those that are unstable end early.
 pub(super) fn seconds(pace: &Pace) -> f64 {
     /// Points of the map, and the runs that find the limit of one.
     const POINTS: f64 = 16.0;

@@ -212,7 +212,7 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     Ok(text)
 }
 
-/// What the library says of a problem.
+/// Description of a problem by the library.
 fn describe(problem: &str) -> Result<&'static Description> {
     let found = CATALOGUE.iter().copied().find(|known| known.name == problem);
     found.with_context(|| format!("the library has no solution '{problem}'"))

@@ -108,7 +108,7 @@ impl Section {
     }
 }
 
-/// What stands between backquotes as code.
+/// Sentence as HTML, with the parts between backquotes as code.
 fn code(sentence: &str) -> String {
     let mut text = String::new();
     for (index, part) in sentence.split('`').enumerate() {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::arguments::ScoreOptions;
 use crate::library::Selection;
 
-/// What every document of the command says.
+/// Entries that every document of the command has.
 pub(super) fn settings(selection: &Selection, options: &ScoreOptions) -> Value {
     let map: BTreeMap<_, _> = options.map.iter().map(|(role, name)| (role.name(), name)).collect();
     let mut document = json!({
@@ -45,7 +45,7 @@ pub(super) fn settings(selection: &Selection, options: &ScoreOptions) -> Value {
     document
 }
 
-/// What has to be known of each row.
+/// Findings on the rows.
 pub(super) fn findings<'a>(rows: impl Iterator<Item = (&'a String, &'a [Remark])>) -> Value {
     let mut all = vec![];
     for (index, (file, findings)) in rows.enumerate() {

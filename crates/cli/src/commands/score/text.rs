@@ -95,7 +95,7 @@ fn named(field: Quantity, units: Option<Units>) -> String {
     with_unit(&field.to_string(), units.and_then(|units| units.of_quantity(field)))
 }
 
-/// What was read, and what is to be said about it.
+/// Summary of a recording, and the findings on it.
 fn heading(row: &ScoreRow) -> String {
     let mut text = format!(
         "{}: {} particles, {} frame(s) from t = {:?} to {:?}, h = {}\n",

@@ -190,7 +190,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
     text
 }
 
-/// The same numbers on every machine.
+/// Random numbers, the same ones on every machine.
 struct Random(SplitMix64);
 
 impl Random {

@@ -7,7 +7,7 @@ use super::Point;
 use crate::arguments::{Precision, SchemeOptions, StabilityOptions, Start};
 use crate::library::Selection;
 
-/// What a point is made from, while settings are put into it.
+/// Draft of a point, while settings are put into it.
 struct Draft {
     selection: Selection,
     scheme: SchemeOptions,
@@ -97,8 +97,8 @@ fn word<V: ValueEnum>(text: &str) -> Result<V> {
     }
 }
 
-/// The same problem in other units: times are `2^power` as large, masses `2^(5 power)`, and lengths `2^power` where the
-/// length that a cell count divides is among the parameters, as L.
+/// The problem in other units: times are `2^power` as large, masses `2^(5 power)`, and lengths `2^power` where the length that a cell count
+/// divides is among the parameters, as L.
 fn in_units(selection: &Selection, power: i32) -> Result<Selection> {
     let units = selection.units();
     let length = if units.contains_key("L") { power } else { 0 };

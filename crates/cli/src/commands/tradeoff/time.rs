@@ -43,7 +43,7 @@ impl Time {
         }
     }
 
-    /// What a run takes once more, where that is known without it.
+    /// Times of one more run, where they are known without it.
     pub(super) fn repeated(&self, _setting: &Setting) -> Option<Repeat> {
         match self {
             Self::Real(_) => None,

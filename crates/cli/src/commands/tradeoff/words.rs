@@ -16,7 +16,7 @@ fn precision(setting: &Setting) -> &'static str {
     if setting.single { "f32" } else { "f64" }
 }
 
-/// What settings are drawn and tabulated alike: the weights, the formulation, and whether particles fit the body.
+/// Kind of a setting, by which it is drawn and tabulated: the weights, the formulation, and whether particles fit the body.
 pub(super) fn kind(setting: &Setting) -> String {
     let Parts { shape, layout, .. } = parts(setting);
     match setting.case.scheme {
@@ -124,7 +124,7 @@ pub(super) fn document(setting: &Setting) -> Value {
     })
 }
 
-/// What the change of a setting did.
+/// Effect of the change of a setting.
 pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
     let (a, b) = (&from.setting, &to.setting);
     let value = |setting: &Setting| match effect.setting {
