@@ -31,7 +31,7 @@ pub(crate) fn text(study: &Study) -> String {
     text
 }
 
-/// The same for differences on one grid.
+/// As [`text`], for differences on one grid.
 pub(crate) fn temporal(temporal: &Temporal) -> String {
     let mut text = "cells,h,dt,cfl,steps,status".to_owned();
     head(&mut text, &temporal.orders);

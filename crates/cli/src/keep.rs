@@ -27,7 +27,7 @@ pub(crate) struct Keep(Option<Place>);
 
 struct Place {
     store: Store,
-    /// What every result depends on beside its settings.
+    /// Origin of every result beside its settings.
     common: Value,
 }
 
@@ -47,7 +47,7 @@ pub(crate) enum Order {
 
 /// The results of a study.
 pub(crate) enum Found<T> {
-    /// Of all cases, in their order.
+    /// Results of all cases, in their order.
     All(Vec<T>),
     /// A shard has its own, and no table.
     Part(Part),
@@ -169,7 +169,7 @@ impl Keep {
         })
     }
 
-    /// What this process, if it is a shard, has of a study, when its `own` cases are finished.
+    /// Part of a study that this process has, if it is a shard, when its `own` cases are finished.
     pub(crate) fn part(&self, settings: &[Value], own: &[bool]) -> Option<Part> {
         let Some(Place { store: Store::Shard { shard, name }, .. }) = &self.0 else { return None };
         let is_known =
@@ -179,7 +179,7 @@ impl Keep {
         Some(Part { name: *name, own, known, all: settings.len() })
     }
 
-    /// What a case is known by.
+    /// Key of a case.
     fn key(&self, settings: &Value) -> Option<Value> {
         let Place { common, .. } = self.0.as_ref()?;
         Some(json!({ "settings": decisive(settings), "from": common }))
@@ -283,10 +283,10 @@ pub(crate) fn decisive(settings: &Value) -> Value {
     settings
 }
 
-/// What tells this build from all that may compute other bits: a checksum of its sources, compiler and target.
+/// Identity of this build among all that may compute other bits: a checksum of its sources, compiler and target.
 const BUILD: &str = env!("MMS_BUILD");
 
-/// What results depend on beside their settings: the build, and a specification file's text.
+/// Origin of results beside their settings: the build, and a specification file's text.
 pub(crate) fn origin(solution: &str) -> Result<Value> {
     // What was compiled in is part of the build.
     let specification = match locate(solution)? {
@@ -296,7 +296,7 @@ pub(crate) fn origin(solution: &str) -> Result<Value> {
     Ok(json!({ "build": BUILD, "specification": specification }))
 }
 
-/// What `work` makes of each of `cases`, in their order: on as many threads as there are here, each case on one.
+/// Results of `work` for each of `cases`, in their order: on as many threads as there are here, each case on one.
 fn at_once<R: Send>(cases: &[usize], work: impl Fn(usize) -> Result<R> + Sync) -> Result<Vec<R>> {
     let next = AtomicUsize::new(0);
     let failed = AtomicBool::new(false);

@@ -66,7 +66,7 @@ impl Origin {
         }
     }
 
-    /// What messages call the specification.
+    /// Name of the specification in messages.
     pub(crate) fn file(&self) -> String {
         match self {
             Self::BuiltIn(description) => format!("{}.toml", description.name),
@@ -272,7 +272,7 @@ impl Selection {
         Ok(selection)
     }
 
-    /// The same solution with other values of the parameters named; of two values for one name the later one holds.
+    /// This solution with other values of the parameters named; of two values for one name the later one holds.
     pub(crate) fn with(&self, values: &[(String, f64)]) -> Result<Self> {
         let mut changed = self.clone();
         changed.parameters.extend(values.iter().cloned());
@@ -389,7 +389,7 @@ pub(crate) struct Subject {
     /// With the parameters asked for.
     pub(crate) selection: Selection,
     pub(crate) spec: Spec,
-    /// What messages call the specification.
+    /// The name of the specification in messages.
     pub(crate) file: String,
     /// Where other files of the specification are, if it is a file itself.
     pub(crate) folder: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! What the program runs on.
+//! Processor that the program runs on.
 
 use std::time::Duration;
 

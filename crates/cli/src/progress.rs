@@ -150,7 +150,7 @@ impl Bar {
         Self { line: Arc::new(line), stretch: (0.0, 1.0) }
     }
 
-    /// The same bar for a part of its work, from one share of it to another.
+    /// This bar for a part of its work, from one share of it to another.
     pub(crate) fn part(&self, from: f64, to: f64) -> Self {
         Self { line: Arc::clone(&self.line), stretch: (self.at(from), self.at(to)) }
     }

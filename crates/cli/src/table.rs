@@ -46,7 +46,7 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The same with the unit of what the columns `named` hold, as `h [m]`, where it is known.
+    /// This table with the unit of the columns `named`, as `h [m]`, where it is known.
     pub(crate) fn with_unit<'a>(
         mut self,
         named: &[&str],

@@ -44,7 +44,7 @@ impl From<Color> for ColorChoice {
     }
 }
 
-/// What the command line says of messages.
+/// Options of the command line on messages.
 #[derive(Clone, Copy, Debug)]
 struct Manner {
     verbosity: Verbosity,

@@ -35,7 +35,7 @@ enum Place {
     Cells,
 }
 
-/// What components are called.
+/// Names of components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Naming {
     Vector(&'static str),
@@ -93,7 +93,7 @@ const ORDERS: [Order; 6] = [
 const CELLS: [usize; 2] = [6, 12];
 /// Layouts that are drawn.
 const DRAWN: u64 = 360;
-/// Of those that are told all, how many at least are to be read.
+/// Share that is to be read at least of the layouts that are told all.
 const READ: f64 = 0.9;
 
 /// Numbers that look random, always the same (SplitMix64).
@@ -272,7 +272,7 @@ fn named(layout: &Layout, values: &[SVector<f64, 2>]) -> Vec<Array> {
     }
 }
 
-/// What became of a layout.
+/// Result for a layout.
 #[derive(Debug, PartialEq)]
 enum Outcome {
     /// The order is two.

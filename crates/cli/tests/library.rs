@@ -9,7 +9,7 @@ use command::{mms, mms_with, read_json, refuses};
 use serde_json::Value;
 
 const RUN: &str = "--cells 4 --periods 0.25 --threads 1";
-/// What a changed file is met with.
+/// Message on a changed file.
 const DIFFERS: &str = "differs from the built-in axis-aligned-1d: its fields are interpreted";
 
 /// The text of a specification of the library.

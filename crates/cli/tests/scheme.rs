@@ -8,7 +8,7 @@ use command::{mms, read_json, refuses};
 use mmsmith_solutions::CATALOGUE;
 use std::fs;
 
-/// Those that the updated frame models, whose scheme stays the usual one.
+/// Solutions that the updated frame models, whose scheme stays the usual one.
 const UPDATED: [&str; 6] =
     ["axis-aligned-1d", "axis-aligned", "axis-aligned-3d", "bar", "ring", "swirl"];
 

@@ -18,7 +18,7 @@ fn data(kind: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/score").join(kind)
 }
 
-/// What is in a folder of the data, which must not be empty.
+/// Entries of a folder of the data, which must not be empty.
 fn entries(kind: &str) -> Vec<PathBuf> {
     let mut entries: Vec<_> =
         fs::read_dir(data(kind)).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -16,7 +16,7 @@ const RANDOM: &str =
     "stability axis-aligned --search random --samples 9 --cells 8 --cfl 0.4 --periods 0.1";
 const TRADEOFF: &str = "tradeoff bar --cells 8,16 --periods 0.05";
 
-/// What a document says that no machine changes.
+/// Entries of a document that no machine changes.
 fn lasting(document: &Value) -> Value {
     match document {
         Value::Object(members) => {

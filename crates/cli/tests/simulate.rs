@@ -150,7 +150,7 @@ fn grids_that_are_too_few_or_too_many_are_answered_with_the_command_that_was_mea
     assert_eq!(called.status, 0, "{}", called.stderr);
 }
 
-/// What a run and a study write is named, with the units of the solution in it.
+/// Files that a run and a study write are named, with the units of the solution in them.
 #[test]
 fn files_are_named_and_pictures_tell_units_and_scheme() {
     let place = tempfile::tempdir().unwrap();

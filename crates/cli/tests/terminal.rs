@@ -1,4 +1,4 @@
-//! What `mms` shows on a terminal: lines that fit it, whole words and numbers, colours.
+//! Output of `mms` on a terminal: lines that fit it, whole words and numbers, colours.
 #![cfg(unix)]
 
 mod command;
@@ -153,7 +153,7 @@ fn tables_fit_every_terminal() {
     }
 }
 
-/// What is found to be cheap, and the words for it, differ from run to run.
+/// Settings found to be cheap, and the words for them, differ from run to run.
 #[test]
 fn a_sweep_fits_every_terminal() {
     let place = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// What a sweep writes, however far it comes in its time; how far it must come is tested with a clock that counts work.
+/// A sweep writes its results, however far it comes in its time; how far it must come is tested with a clock that counts work.
 #[test]
 fn a_short_sweep_writes_what_it_measured() {
     let place = tempfile::tempdir().expect("a folder");

@@ -10,7 +10,7 @@ const RED: &str = "#cc0000";
 
 /// One measured setting.
 pub(crate) struct Point {
-    /// What is drawn alike.
+    /// The kind; points of one kind are drawn alike.
     pub(crate) kind: String,
     pub(crate) cost: f64,
     pub(crate) error: f64,

@@ -10,7 +10,7 @@ const TOP: f64 = 56.0;
 const CELL: (f64, f64) = (62.0, 38.0);
 /// The first line of a map, below its words.
 const MAP: f64 = 76.0;
-/// Of the line's frame.
+/// Height of the line's frame.
 const HEIGHT: f64 = 300.0;
 /// Eight steps of the map viridis from dark to light, which keep their order in black and white.
 const COLOURS: [&str; 8] =

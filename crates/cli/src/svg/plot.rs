@@ -40,9 +40,9 @@ const NEAR: f64 = 100.0;
 /// Curves of error against step.
 pub(crate) struct Plot<'a> {
     pub(crate) title: &'a str,
-    /// What the step is, with its unit.
+    /// The name of the step, with its unit.
     pub(crate) x: &'a str,
-    /// What the error is, with its unit.
+    /// The name of the error, with its unit.
     pub(crate) y: &'a str,
     pub(crate) curves: Vec<Curve>,
     /// Words below the legend, in as many lines as they need; none where it is empty.
@@ -86,12 +86,12 @@ impl Curve {
         curve
     }
 
-    /// The same with a triangle that shows an order.
+    /// This curve with a triangle that shows an order.
     pub(crate) fn with_triangle(self, order: i32) -> Self {
         Self { order: Some(order), ..self }
     }
 
-    /// What the legend says.
+    /// The curve's words in the legend.
     fn label(&self) -> String {
         let fit = self.fit.map_or_else(|| "no slope".to_owned(), |fit| format!("slope {fit:.2}"));
         match (self.points.len(), self.stopped) {

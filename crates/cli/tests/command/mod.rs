@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-/// What one call of `mms` gave.
+/// Result of one call of `mms`.
 pub(crate) struct Called {
     pub(crate) status: i32,
     pub(crate) stdout: String,
