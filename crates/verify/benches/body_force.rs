@@ -1,4 +1,4 @@
-//! What the exact body force costs a simulation: a step without it, a step with it, and the force alone.
+//! Cost of the exact body force in a simulation: a step without it, a step with it, and the force alone.
 //!
 //! Each sample advances the axis-aligned problem (a unit square of 256 x 256 cells, 2x2 particles a cell, four walls) by
 //! two steps on one thread; "items" are particle-steps.

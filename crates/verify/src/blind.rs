@@ -36,7 +36,7 @@ pub enum BlindSpot {
     NoBodyForce,
 }
 
-/// What is so, and the mistake that passes because of it.
+/// The property of the solution, and the mistake that passes because of it.
 impl fmt::Display for BlindSpot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

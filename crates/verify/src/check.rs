@@ -45,9 +45,9 @@ pub enum Verdict {
 /// One comparison over all points, told by its worst point.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was judged: a field, or a boundary condition with its surface.
+    /// The subject that was judged: a field, or a boundary condition with its surface.
     pub what: String,
-    /// What it was compared with.
+    /// The reference of the comparison.
     pub against: &'static str,
     /// The worst difference, in the field's unit.
     pub difference: f64,
@@ -63,7 +63,7 @@ pub struct Finding {
     pub t: f64,
     /// The outcome.
     pub verdict: Verdict,
-    /// Of several sets of parameters, the one that this is the worst of, counted from zero.
+    /// Number of the parameter set with this worst finding, from zero, where there are several sets.
     pub parameter_set: usize,
 }
 
@@ -98,7 +98,7 @@ pub struct CheckReport {
     pub points: usize,
     /// The comparisons of fields, then those of boundary conditions.
     pub findings: Vec<Finding>,
-    /// Of a motion that is not the same after its period: how much it is not. No failure, since a run may last any time.
+    /// Change of a motion that is not the same after its period. It is no failure, since a run may last any time.
     pub not_periodic: Option<Change>,
 }
 
@@ -107,9 +107,9 @@ pub struct CheckReport {
 pub struct Change {
     /// The period.
     pub period: f64,
-    /// Of the displacement, over its largest magnitude.
+    /// Change of the displacement, over its largest magnitude.
     pub u: f64,
-    /// Of the velocity, over its largest magnitude.
+    /// Change of the velocity, over its largest magnitude.
     pub v: f64,
 }
 

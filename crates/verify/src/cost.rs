@@ -1,4 +1,4 @@
-//! What a run will take, before it is run: calibrated on the spot by a few steps of the same scheme.
+//! Time that a run will take, predicted: calibrated on the spot by a few steps of the same scheme.
 //!
 //! Stored constants of a machine would be wrong on the next one, beside other work, and after every change of a kernel, and
 //! each scheme, solution and number of threads would need its own. A few steps on some grids take a tenth of a second
@@ -17,12 +17,12 @@ use crate::error::CaseError;
 use crate::plan::{Plan, Prepared, plan, prepare};
 use crate::precision::Precision;
 
-/// Of how many steps the times are kept.
+/// Number of first steps whose times are kept.
 const FIRST_STEPS: usize = 63;
-/// Of those, steps that touch memory for the first time, and wake threads.
+/// Number of cold ones among these first steps: they touch memory for the first time, and wake threads.
 const COLD_STEPS: usize = 2;
 
-/// What some steps of a case took, in seconds.
+/// Times of some steps of a case, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timing {
     /// Particles.
@@ -106,15 +106,15 @@ where
     Ok(Timing { particles, steps: done, complete, setup_s, wall_s, step_s, cpu_s, measure_s })
 }
 
-/// What a step takes in the course of a run: the median of those after the cold ones, or of all where there are no others; not
-/// a number where there are none at all.
+/// Time of a step in the course of a run: the median of the steps after the cold ones, or of all where there are no others; not
+/// a number where there are no steps.
 fn step_time(each: &mut [f64]) -> f64 {
     let warm = if each.len() > COLD_STEPS { &mut each[COLD_STEPS..] } else { each };
     warm.sort_by(f64::total_cmp);
     warm.get(warm.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// What one number of particles costs, in seconds.
+/// Times measured with one number of particles, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sample {
     particles: f64,
@@ -125,7 +125,7 @@ struct Sample {
     beside_s: f64,
 }
 
-/// What a run takes, in seconds.
+/// Time of a run, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// The steps alone, as a row states them.
@@ -207,7 +207,7 @@ impl CostModel {
         Ok(model)
     }
 
-    /// What a run that comes to `plan` takes; `None` where nothing was learnt.
+    /// Predicted time of a run with this `plan`; `None` where the model has no samples.
     #[must_use]
     pub fn predict(&self, plan: &Plan) -> Option<Cost> {
         self.of(plan, plan.steps)

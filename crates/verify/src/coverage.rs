@@ -29,9 +29,9 @@ pub enum Part {
     ShearStress(usize, usize),
     /// `rho0 b`.
     BodyForce,
-    /// What the first Lame constant, or the factor of `ln J`, adds to the stress.
+    /// The part of the stress from the first Lame constant, or from the factor of `ln J`.
     Lambda,
-    /// What the stress differs by from that of linear elasticity, which grows with rotation.
+    /// The difference of the stress from that of linear elasticity, which grows with rotation.
     NonlinearStress,
     /// `J - 1`, in units of `H`.
     VolumeChange,

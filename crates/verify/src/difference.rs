@@ -41,7 +41,7 @@ pub(crate) fn derivative<const R: usize, const C: usize>(
     derivative_of_sum(f, x, reach, 0.0)
 }
 
-/// The same for a sum of terms as large as `terms` that may nearly cancel: its rounding is that of the terms.
+/// The [`derivative`] of a sum of terms as large as `terms` that may nearly cancel: the sum's rounding is that of the terms.
 pub(crate) fn derivative_of_sum<const R: usize, const C: usize>(
     f: impl Fn(f64) -> SMatrix<f64, R, C>,
     x: f64,

@@ -35,9 +35,9 @@ pub(crate) struct Stepped<'a, T, const D: usize> {
     /// The time of positions and deformation gradients.
     pub(crate) time: f64,
     pub(crate) solver: &'a mut (dyn Solver<T, D> + 'a),
-    /// What the step alone took, in seconds.
+    /// Wall-clock time of the step alone, in seconds.
     pub(crate) wall_s: f64,
-    /// The same on all threads' processors.
+    /// Processor time of the step on all threads, in seconds.
     pub(crate) cpu_s: f64,
     /// Whether stepping ends here because it was asked to.
     pub(crate) is_interrupted: bool,
@@ -98,7 +98,7 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
     ///
     /// # Errors
     ///
-    /// Those of the observer, and [`CaseError::Interrupted`]; a solver that gives up is an outcome.
+    /// Errors of the observer, and [`CaseError::Interrupted`]; a solver that gives up is an outcome.
     pub(crate) fn advance<R>(
         &mut self,
         steps: RangeInclusive<u64>,
@@ -152,7 +152,7 @@ struct ExactBodyForce<'a, T: Real, const D: usize> {
     planted: Planted,
     /// Where several processes hold the particles, whether all of them make a lattice.
     is_lattice: Option<bool>,
-    /// Of the arrangement that is kept.
+    /// Version of the arrangement that the kept body force is for.
     version: Option<u64>,
 }
 
@@ -170,8 +170,8 @@ impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
         Self { kept, model, planted, is_lattice, version: None }
     }
 
-    /// What is kept of particles that started at `X`. Those of one process may make a lattice where all do not, and the other way
-    /// round; the bits have to be those of all.
+    /// The body force kept for particles that started at `X`. The particles of one process may make a lattice where all do not, and
+    /// the other way round; the bits have to be those of all.
     fn keep(
         model: &'a dyn Solution<T, D>,
         X: &[SVector<T, D>],

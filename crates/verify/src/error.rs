@@ -20,7 +20,7 @@ pub enum CaseError {
         setting: &'static str,
         /// Its value.
         value: String,
-        /// What would be right.
+        /// The admissible values.
         admissible: &'static str,
     },
     /// More steps than anybody can wait for.
@@ -94,9 +94,9 @@ pub enum SceneError {
     Unmodelled {
         /// Where.
         surface: Surface,
-        /// What.
+        /// The condition.
         condition: Condition,
-        /// What would model it, from a separator on; empty where nothing does.
+        /// The formulation that models the condition, from a separator on; empty where none does.
         instead: &'static str,
     },
     /// Surfaces of the body without a boundary condition.
@@ -142,7 +142,7 @@ fn list(surfaces: &[Surface]) -> String {
     surfaces.iter().map(Surface::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// What a specification says of surfaces that move as the solution does.
+/// Lines of a specification for surfaces that move as the solution does.
 fn lines(surfaces: &[Surface]) -> String {
     let one = |surface: &Surface| {
         let condition = Condition::PrescribedMotion;

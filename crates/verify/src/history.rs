@@ -31,7 +31,7 @@ pub struct Moment {
     pub u: PerNorm<f64>,
     /// The solver's sums.
     pub computed: Sums,
-    /// The same of the exact solution, at the same particles and times.
+    /// Sums of the exact solution, at the same particles and times.
     pub exact: Sums,
 }
 
@@ -75,7 +75,7 @@ pub(crate) struct Totals<const D: usize> {
     pub(crate) exact_momenta: f64,
 }
 
-/// What a motion has.
+/// Energies and momentum of a motion.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<const D: usize> {
     kinetic: f64,
@@ -108,13 +108,13 @@ impl<const D: usize> From<Motion<D>> for Sums {
 }
 
 impl<const D: usize> Totals<D> {
-    /// Those of no particles, the first of which is to be `worst`.
+    /// Totals of no particles yet, the first of which is to be `worst`.
     fn of_none(worst: usize) -> Self {
         let (computed, exact) = (Motion::NONE, Motion::NONE);
         Self { error: 0.0, worst, computed, exact, exact_momenta: 0.0 }
     }
 
-    /// Those of all particles at `time`, with velocities of `velocity_time`.
+    /// Totals of all particles at `time`, with velocities of `velocity_time`.
     pub(crate) fn of<T: Real>(
         particles: &Particles<T, D>,
         law: &Law<f64, D>,
@@ -264,7 +264,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         *self.moments = moments;
     }
 
-    /// What was taken down so far.
+    /// Moments taken down so far.
     pub(crate) fn moments(&self) -> &[Moment] {
         self.moments
     }

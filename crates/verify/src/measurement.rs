@@ -10,7 +10,7 @@ use mmsmith_runtime::Solution;
 
 use crate::precision::Precision;
 
-/// What particles are compared with.
+/// Comparison of particles with the exact solution.
 pub(crate) struct Measurement<'a, const D: usize> {
     exact: &'a dyn Solution<f64, D>,
     comparison: Comparison<'a, D>,

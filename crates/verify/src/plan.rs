@@ -1,4 +1,4 @@
-//! What a case comes to, judged before it is run: its steps, its size.
+//! Steps and size of a case, judged before the run.
 
 use mmsmith_measure::norms::PerField;
 use mmsmith_runtime::{AnySolution, Solution};
@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::scheme::Scheme;
 use crate::updated;
 
-/// What a case comes to, known without running it.
+/// Steps, particles and memory of a case, known without a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Number of steps.
@@ -185,7 +185,7 @@ pub(crate) fn steps_to(end: f64, dt: f64) -> Result<u64, CaseError> {
 mod tests {
     use super::*;
 
-    /// What is kept of each particle counts: four numbers for the body force and as many for the state.
+    /// Values kept of each particle count: four numbers for the body force and as many for the state.
     #[test]
     fn ten_million_particles_fit_into_four_gibibytes() {
         let exact = mmsmith_solutions::build::<f64>("axis-aligned", &[]).unwrap().unwrap();

@@ -1,6 +1,6 @@
 //! Rows as they are kept on disk, to be read back to the bit.
 //!
-//! What people read has a status in words, and `null` for numbers that JSON does not know. A record has every field of
+//! Output for people has a status in words, and `null` for numbers that JSON does not know. A record has every field of
 //! the status by itself, and the bits of such numbers.
 
 use mmsmith_measure::norms::{Field, PerField, PerNorm};

@@ -37,7 +37,7 @@ pub struct Progress {
     pub share: f64,
 }
 
-/// What a run tells and writes on its way.
+/// Reports and files of a run on its way.
 pub struct Outputs<'a> {
     /// Called after every step.
     pub progress: &'a mut dyn FnMut(Progress),
@@ -45,7 +45,7 @@ pub struct Outputs<'a> {
     pub frames: Option<&'a FrameOutput>,
     /// A moment whose particles are kept, if one is wanted.
     pub snapshot: Option<&'a mut Snapshot>,
-    /// What a run that is killed goes on from, if that is wanted.
+    /// Checkpoints that a killed run goes on from, if they are wanted.
     pub checkpoints: Option<&'a Checkpoints>,
     /// Where errors, energies and momentum go at up to [`MOST_MOMENTS`](crate::MOST_MOMENTS) evenly spread steps, first and
     /// last state included; what is there before the run is removed. A run that goes on from a checkpoint has those before it, if it was written with
@@ -76,7 +76,7 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// What one of several processes sent to the others, from the first step to the last one.
+/// Messages that one of several processes sent to the others, from the first step to the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunTraffic {
     /// In the steps: nodes that bands of two processes share, and particles that go to another process.
@@ -99,7 +99,7 @@ impl Sub for RunTraffic {
     }
 }
 
-/// What this process has sent, by what for.
+/// Messages that this process has sent, by purpose.
 struct Counters {
     stepping: Arc<Traffic>,
     measuring: Arc<Traffic>,
@@ -216,7 +216,7 @@ impl Serialize for Status {
     }
 }
 
-/// What one simulation gave.
+/// Results of one simulation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Number of cells along the cell length.
@@ -306,7 +306,7 @@ where
     Ok(row)
 }
 
-/// What rounding does to positions, in lengths.
+/// Rounding error of positions, a length.
 #[derive(Clone, Copy)]
 struct Rounding {
     /// Half a unit in the last place.

@@ -150,7 +150,7 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) spacing: f64,
     pub(crate) cells: [usize; D],
     pub(crate) walls: [[bool; 2]; D],
-    /// What holds on the two sides along each axis of a box, or on the inner and the outer rim of an annulus, first.
+    /// Conditions on the two sides along each axis of a box; for an annulus the first pair, on the inner and the outer rim.
     pub(crate) sides: [[Condition; 2]; D],
     pub(crate) domain: Domain<f64, D>,
     /// Cosine and sine of the angle of the grid's axes against those of the body; the grid is given in its own.
@@ -451,7 +451,7 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// What models given motions and tractions on the sides of a body.
+/// The formulation that models given motions and tractions on the sides of a body, in words.
 fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
     match domain {
         Domain::Box { .. } => {

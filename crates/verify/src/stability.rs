@@ -111,7 +111,7 @@ pub struct SearchProgress {
     pub share: f64,
 }
 
-/// What was unstable.
+/// The kind of an instability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FailureKind {
@@ -132,7 +132,7 @@ pub enum FailureKind {
 /// When and where a run became unstable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// What.
+    /// The kind.
     pub kind: FailureKind,
     /// The step, from 1.
     pub step: u64,
@@ -142,11 +142,11 @@ pub struct Failure {
     pub particle: Option<usize>,
     /// The value that gave it away; none where it is not a finite number.
     pub value: Option<f64>,
-    /// What that value was held against.
+    /// The limit of that value.
     pub limit: Option<f64>,
 }
 
-/// What one run showed until its end, or until it became unstable.
+/// Observations of one run until its end, or until it became unstable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observed {
     /// The CFL number.
@@ -324,11 +324,11 @@ struct Bench<'a> {
     p_wave_limit: f64,
     /// The length of a run.
     end: f64,
-    /// What rounding may do to `u`.
+    /// The error of `u` that rounding may cause.
     floor: f64,
 }
 
-/// What a run is held against.
+/// Limits that a run is held against.
 struct Limits {
     error: f64,
     energy_rate: f64,

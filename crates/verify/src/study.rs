@@ -11,7 +11,7 @@ use crate::order::Order;
 use crate::plan::plan;
 use crate::run::{Outputs, Progress, Row, Status, run};
 
-/// What changes from row to row.
+/// The setting that changes from row to row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sweep {
     /// The cell count, at a fixed CFL number; orders are with respect to `h`.
@@ -141,7 +141,7 @@ pub(crate) fn orders_of(
     each_norm(&values, |_, _, errors| Order::of(&steps, errors))
 }
 
-/// What `judge` makes of the series of values of every field and norm.
+/// Results of `judge` for the series of values of every field and norm.
 pub(crate) fn each_norm<R>(
     values: &[Option<&PerField<PerNorm<f64>>>],
     judge: impl Fn(Field, Norm, &[Option<f64>]) -> R,

@@ -187,7 +187,7 @@ fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
         && exact.boundaries().iter().all(|boundary| is_wall(boundary.condition))
 }
 
-/// What holds at the end of an axis.
+/// The kind of end that a condition gives an axis.
 fn end(condition: Condition) -> End {
     match condition {
         Condition::Sliding | Condition::Symmetry => End::Wall,

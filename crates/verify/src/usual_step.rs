@@ -84,9 +84,9 @@ pub(crate) fn stable_cfl(
 /// A time step as CFL numbers on P-waves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnPWaves {
-    /// Of the undeformed solid.
+    /// CFL number on the P-waves of the undeformed solid.
     pub at_rest: f64,
-    /// The fastest of the motion.
+    /// CFL number on the fastest P-waves of the motion.
     pub fastest: f64,
 }
 
