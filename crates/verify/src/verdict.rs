@@ -1,4 +1,4 @@
-//! What a series of errors shows: its order on the finest grids, from where on that order holds, and whether it is
+//! Verdict on a series of errors: its order on the finest grids, from where on that order holds, and whether it is
 //! the expected one.
 
 use mmsmith_galerkin::{Layout, MassMatrix};
@@ -21,7 +21,7 @@ const SAMPLES: usize = 64;
 /// Orders that theory promises, field by field and norm by norm; `None` where it promises nothing.
 pub type Expected = PerField<PerNorm<Option<f64>>>;
 
-/// What the errors do as the step becomes smaller.
+/// Behaviour of the errors as the step becomes smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Behaviour {
@@ -43,7 +43,7 @@ pub enum Behaviour {
     NoOrder,
 }
 
-/// What one error norm shows.
+/// Verdict on one error norm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
     /// The order that was expected, if any.
@@ -52,7 +52,7 @@ pub struct Verdict {
     pub tolerance: f64,
     /// The order on the finest pair of cases.
     pub finest: Option<f64>,
-    /// What the errors do.
+    /// Behaviour of the errors.
     pub behaviour: Behaviour,
     /// The rows inside the asymptotic range, numbered from 0, in the order of the rows; empty where there is none.
     pub asymptotic_rows: Vec<usize>,
@@ -78,7 +78,7 @@ impl Verdict {
         Self::above(steps, errors, &[], expected, tolerance)
     }
 
-    /// The same, where errors below `floors`, row by row, may be rounding and judge nothing.
+    /// Judges errors as [`of`](Self::of), where those below `floors`, row by row, may be rounding and judge nothing.
     #[must_use]
     pub fn above(
         steps: &[f64],
@@ -167,7 +167,7 @@ const FEWEST_CELLS: usize = 8;
 const HIDDEN: f64 = 0.125;
 
 impl Verdict {
-    /// The same, but without a failure where the coarsest grid has fewer than eight cells and the order is short of the expected
+    /// This verdict, but without a failure where the coarsest grid has fewer than eight cells and the order is short of the expected
     /// one by no more than an eighth of it: such grids may lie before the asymptotic range.
     #[must_use]
     pub fn sparing_coarse_grids(self, coarsest: usize) -> Self {
@@ -190,7 +190,7 @@ pub struct Values<'a> {
     pub steps: &'a [f64],
     /// The errors; `None` where a case failed, not numbers where it has none to judge.
     pub errors: &'a [Option<&'a PerField<PerNorm<f64>>>],
-    /// What rounding alone may cause, row by row ([`round_off`](crate::round_off)); empty where that does not count.
+    /// Errors that rounding alone may cause, row by row ([`round_off`](crate::round_off)); empty where rounding does not count.
     pub floors: &'a [PerField<f64>],
 }
 
@@ -205,7 +205,7 @@ pub fn verdicts(
     verdicts_above(&Values { steps, errors: values, floors: &[] }, expected, tolerance)
 }
 
-/// The same for errors that are above what rounding alone may cause.
+/// Judges every field and norm by the errors that are above those that rounding alone may cause.
 #[must_use]
 pub fn verdicts_above(
     values: &Values<'_>,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-/// What the name of a temporary file has between that of the file and its random part, and after that part.
+/// Parts of a temporary file's name: between the name of the file and the random characters, and after these.
 const MARK: &str = ".mms-";
 const END: &str = ".tmp";
 /// Random characters in the name of a temporary file.

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::ScoreError;
 use super::findings::Remarks;
 
-/// What an array of a file can be to a comparison.
+/// Role of a file's array in a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {

@@ -18,7 +18,7 @@ const MASS: f64 = 0.02;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Balance {
     places: f64,
-    /// Of density times J over that at rest, and of its square.
+    /// Sums of density times J over the density at rest, and of the square of this ratio.
     ratio: f64,
     squared: f64,
     mass: Option<f64>,

@@ -27,9 +27,9 @@ const SAME_RATIO: f64 = 1e-3;
 /// A recording compared with the next one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DifferenceRow {
-    /// What was read.
+    /// Path of the recording.
     pub file: String,
-    /// What it was compared with.
+    /// Path of the next recording, which it was compared with.
     pub other: String,
     /// The time step of the first of them, in the solution's unit of time.
     pub dt: f64,
@@ -42,7 +42,7 @@ pub struct DifferenceRow {
     /// Norms of the difference over the particles, the largest over the frames, of the fields that both hold; in the unit of
     /// the field.
     pub differences: BTreeMap<Quantity, PerNorm<f64>>,
-    /// What has to be known besides; problems first.
+    /// Further remarks; problems first.
     #[serde(skip)]
     pub findings: Vec<Remark>,
 }

@@ -2,12 +2,12 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// What the polynomials of an element are made of.
+/// Polynomials of an element.
 #[derive(Clone, Copy)]
 enum Polynomials {
-    /// Of this degree altogether.
+    /// Polynomials of this total degree.
     Simplex(u8),
-    /// Of this degree in each variable.
+    /// Polynomials of this degree in each variable.
     Tensor(u8),
     /// Quadratic in one variable at most.
     Serendipity,

@@ -21,7 +21,7 @@ pub enum ScoreError {
     NoArray {
         /// The file.
         path: PathBuf,
-        /// What it should be.
+        /// The role that the array should have.
         role: Role,
         /// The name.
         name: String,
@@ -33,7 +33,7 @@ pub enum ScoreError {
     Components {
         /// The file.
         path: PathBuf,
-        /// What it should be.
+        /// The role that the array should have.
         role: Role,
         /// The array.
         name: String,
@@ -93,7 +93,7 @@ pub enum ScoreError {
         path: PathBuf,
         /// Its particles.
         found: usize,
-        /// Those of the first frame.
+        /// Particles of the first frame.
         expected: usize,
     },
     /// A frame does not tell its time.
@@ -214,11 +214,11 @@ pub enum ScoreError {
     /// A number that makes no sense.
     #[error("{what} = {value:?}: it must be {admissible}")]
     Setting {
-        /// What.
+        /// The name of the setting.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What would be right.
+        /// The admissible values.
         admissible: &'static str,
     },
 }

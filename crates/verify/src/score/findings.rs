@@ -1,11 +1,11 @@
-//! What is to be said about a recording besides its errors.
+//! Remarks on a recording besides its errors.
 
 use serde::Serialize;
 
 /// Something that a reader of the errors has to know.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remark {
-    /// What it is about, such as `not-finite` or `single-precision`.
+    /// The subject, such as `not-finite` or `single-precision`.
     pub kind: &'static str,
     /// Whether the errors are not those of the whole recording, or of nothing sensible. Such a row has no part in
     /// orders, unless the problem is the size of its errors alone.
@@ -28,7 +28,7 @@ pub(super) struct Remarks {
 struct Key {
     kind: &'static str,
     is_problem: bool,
-    /// What was met, in the words that follow the count.
+    /// The things that were met, in the words that follow the count.
     what: String,
 }
 

@@ -1,4 +1,4 @@
-//! What one frame gives for the comparison.
+//! Data of one frame for the comparison.
 
 use std::collections::HashSet;
 
@@ -39,7 +39,7 @@ pub(super) struct Identities {
     across: Vec<f64>,
 }
 
-/// What a frame gives for the comparison.
+/// Data of one frame for the comparison.
 pub(super) struct FrameData<const D: usize> {
     pub(super) ids: Option<Vec<i64>>,
     pub(super) X: Vec<SVector<f64, D>>,
@@ -56,7 +56,7 @@ pub(super) struct FrameData<const D: usize> {
 pub(super) struct FrameErrors {
     /// In the order of [`Quantity::ALL`]; zero for what the frame lacks.
     pub(super) errors: [PerNorm<f64>; 8],
-    /// Those of F and P if they were transposed.
+    /// Errors of F and P if they were transposed.
     pub(super) transposed: [PerNorm<f64>; 2],
     /// The difference of the given density from that at rest.
     pub(super) density_from_rest: PerNorm<f64>,

@@ -34,14 +34,14 @@ impl Integrated {
 /// The orders of integrated errors with respect to `h`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntegratedOrders {
-    /// Of u.
+    /// Order of u.
     pub l2: Order,
-    /// Of its gradient.
+    /// Order of the gradient of u.
     pub h1: Order,
 }
 
 impl IntegratedOrders {
-    /// Those of rows, each a step and its errors; nothing for a single one, or where none is of a mesh.
+    /// Orders over rows, each a step and its errors; `None` for a single row, or where no row is of a mesh.
     pub(super) fn of(rows: &[(f64, Option<Integrated>)]) -> Option<Self> {
         let steps: Vec<_> = rows.iter().map(|(step, _)| *step).collect();
         let order = |of: fn(Integrated) -> f64| {
@@ -95,8 +95,8 @@ pub(super) struct Elements<const D: usize> {
 }
 
 impl<const D: usize> Elements<D> {
-    /// Those of `cells` that fill space, each a number of VTK's and its nodes; nothing where there are none, or an element that is
-    /// not known is among them.
+    /// Elements from the `cells` that fill space, each a number of VTK's and its nodes; `None` where there are none, or where one is
+    /// not known or has wrong nodes.
     pub(super) fn new<'a>(
         cells: impl Iterator<Item = (u8, &'a [usize])>,
         nodes: usize,
@@ -125,7 +125,7 @@ impl<const D: usize> Elements<D> {
         (!found.cells.is_empty()).then_some(found)
     }
 
-    /// Of how many frames one is integrated.
+    /// Stride of integration: one of so many frames is integrated.
     pub(super) fn stride(&self, frames: usize) -> usize {
         self.points.saturating_mul(frames).div_ceil(MOST_POINTS).max(1)
     }

@@ -45,11 +45,11 @@ pub struct Judgement {
     pub message: String,
     /// The fields that do not converge.
     pub not_converging: Vec<Quantity>,
-    /// What each norm of each recorded field shows.
+    /// Verdict on each norm of each recorded field.
     pub fields: BTreeMap<Quantity, PerNorm<Verdict>>,
 }
 
-/// What the L2 errors of a field show.
+/// Convergence that the L2 errors of a field show.
 enum Shown {
     Order(f64),
     None(f64),
@@ -258,7 +258,7 @@ impl Series<'_> {
         of_u.or_else(of_H)
     }
 
-    /// What the L2 errors of a field show.
+    /// Convergence that the L2 errors of a field show.
     fn shown(&self, field: Quantity, verdict: &Verdict) -> Shown {
         let unknown = |why: String| Shown::Unknown(why);
         match (verdict.behaviour, verdict.finest) {

@@ -55,7 +55,7 @@ use crate::dimension::in_dimension;
 use crate::order::Order;
 use crate::precision::Precision;
 
-/// What all recordings gave.
+/// Results of all recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Score {
     /// One row for each recording, in order.

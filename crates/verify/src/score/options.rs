@@ -10,7 +10,7 @@ use super::arrays::Role;
 use super::quantity::Quantity;
 use crate::verdict::ORDER_TOLERANCE;
 
-/// What the points of the files are.
+/// Meaning of the points of the files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Points {
     /// Reference positions if they stay where they are while displacements change, else current positions.
@@ -39,7 +39,7 @@ pub enum Times {
 pub struct ScoreOptions {
     /// The names of arrays that have no usual name.
     pub map: BTreeMap<Role, String>,
-    /// What the points are.
+    /// The meaning of the points.
     pub points: Points,
     /// The times of the frames.
     pub times: Times,
@@ -78,7 +78,7 @@ impl Default for ScoreOptions {
 pub enum Exchange {
     /// Two components of the displacement.
     Displacement(usize, usize),
-    /// The same of the displacement and of the velocity.
+    /// Two components of the displacement, and of the velocity as well.
     Motion(usize, usize),
     /// One component of the reference position and of the displacement.
     Component(usize),
@@ -89,7 +89,7 @@ pub enum Exchange {
 /// Where and in which units the files have the body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placing {
-    /// What is subtracted from positions, in the solution's unit of length; empty for nothing.
+    /// Vector that is subtracted from positions, in the solution's unit of length; empty for none.
     pub origin: Vec<f64>,
     /// The unit of positions and displacements, in the solution's.
     pub length_unit: f64,
@@ -139,7 +139,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// What messages call it.
+    /// Path by which messages name the recording.
     pub(super) fn path(&self) -> &Path {
         self.paths.first().map_or(Path::new(""), PathBuf::as_path)
     }

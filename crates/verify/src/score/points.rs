@@ -28,7 +28,7 @@ const MOST_MEASURED: usize = 20_000;
 pub(super) struct Taken {
     /// Whether they are reference positions.
     pub(super) at_rest: bool,
-    /// What is to be said of it.
+    /// The remark on this choice, if any.
     pub(super) told: Option<Remark>,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Decision {
     pub(super) other: Option<Points>,
 }
 
-/// What a recording tells of its points.
+/// Evidence of a recording about its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Evidence {
     /// Reference positions or displacements do not come from points and displacements together.
@@ -62,7 +62,7 @@ struct Measured {
     current: f64,
     /// Whether the frame has cells that are not single points.
     is_mesh: bool,
-    /// What the body tells: none of its points lies outside of it one way, and some do the other way.
+    /// The choice that leaves no point outside of the body, where the other choice leaves some outside.
     by_body: Option<Points>,
 }
 
@@ -71,7 +71,7 @@ impl Measured {
         self.reference.min(self.current)
     }
 
-    /// What the errors decide, if they do.
+    /// The choice that the errors decide, or else the body, if one of them does.
     fn decided(self) -> Option<Points> {
         if self.current > FAR_LARGER * self.reference {
             Some(Points::Reference)
@@ -87,7 +87,7 @@ impl Measured {
         apart.is_nan() || self.least().is_nan() || apart <= ALIKE * self.least()
     }
 
-    /// What is taken where errors do not decide.
+    /// The choice where errors do not decide.
     fn usual(self) -> Points {
         if self.is_mesh { Points::Reference } else { Points::Current }
     }

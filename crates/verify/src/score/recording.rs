@@ -157,7 +157,7 @@ const AS_LARGE: f64 = 0.99;
 struct Totals {
     /// In the order of [`Quantity::ALL`].
     errors: [PerNorm<f64>; 8],
-    /// Those of F and P if they were transposed.
+    /// Errors of F and P if they were transposed.
     transposed: [PerNorm<f64>; 2],
     density_from_rest: PerNorm<f64>,
     displacement: PerNorm<f64>,

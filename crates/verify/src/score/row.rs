@@ -1,4 +1,4 @@
-//! What a recording gave.
+//! Results of one recording.
 
 use std::collections::BTreeMap;
 
@@ -41,10 +41,10 @@ impl Source {
     }
 }
 
-/// What one recording gave.
+/// Results of one recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScoreRow {
-    /// What was read.
+    /// Path of the recording.
     pub file: String,
     /// Cells along the cell length, where they were told.
     pub cells: Option<usize>,
@@ -71,7 +71,7 @@ pub struct ScoreRow {
     pub errors: BTreeMap<Quantity, PerNorm<f64>>,
     /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
     pub exact_displacement: f64,
-    /// Of a mesh, the errors of u and its gradient integrated over the elements, the largest over the frames.
+    /// Errors of u and its gradient integrated over the elements of a mesh, the largest over the frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrated: Option<Integrated>,
     /// Recorded stresses, J and density against the law at the recorded deformation.

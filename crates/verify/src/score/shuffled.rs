@@ -62,7 +62,7 @@ fn apart_in_order<const D: usize>(
     found.iter().zip(&right).map(|(one, other)| (one - other).powi(2)).sum()
 }
 
-/// What is to be said of a recording whose particles are in another order in some frame.
+/// Message on a recording whose particles are in another order in some frame.
 pub(super) fn told(found: &Found) -> Result<String, ScoreError> {
     let remedy = match identity(found)? {
         Some(name) => format!("--map id={name} takes its array `{name}` for their identities"),

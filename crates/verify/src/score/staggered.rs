@@ -8,7 +8,7 @@ use super::row::ScoreRow;
 const LEFT: f64 = 0.3;
 /// The order of v from which on nothing has to be explained.
 const ENOUGH: f64 = 1.5;
-/// What is to be said where a lag that becomes smaller with the grid explains the errors of v in all recordings; `order` is that of v.
+/// Message where a lag that becomes smaller with the grid explains the errors of v in all recordings; `order` is that of v.
 pub(super) fn told(rows: &[ScoreRow], order: Option<f64>) -> Option<String> {
     order.filter(|order| *order < ENOUGH)?;
     let lags: Vec<Lag> = rows.iter().map(|row| row.lag).collect::<Option<_>>()?;

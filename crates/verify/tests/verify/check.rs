@@ -42,7 +42,7 @@ fn a_motionless_body_passes() {
     assert!(report.passed(), "{report:#?}");
 }
 
-/// What is wrong with the shear below.
+/// Fault of the shear below.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     AccelerationSign,

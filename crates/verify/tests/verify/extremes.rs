@@ -1,4 +1,4 @@
-//! What the schemes promise at the extremes.
+//! Promises of the schemes at the extremes.
 
 use mmsmith_solutions::{AnySolution, CATALOGUE, Precision, build};
 use mmsmith_verify::{

@@ -1,4 +1,4 @@
-//! What a recorded stress may be in place of the right one: rows of a table.
+//! Stresses that a recording may hold in place of the right one: rows of a table.
 
 use nalgebra::SMatrix;
 
@@ -183,7 +183,7 @@ where
     }
 }
 
-/// What a mistake of form makes of the right stress.
+/// The stress that a mistake of form makes of the right one.
 fn form<const D: usize>(kind: &str, at: &At<D>) -> Option<SMatrix<f64, D, D>>
 where
     f64: Precision<D>,

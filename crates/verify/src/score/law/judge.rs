@@ -9,7 +9,7 @@ const RIGHT: f64 = 1e-5;
 /// No rounding explains more than this.
 const MOST_ROUNDING: f64 = 1e-4;
 
-/// What was found.
+/// Outcome of [`judge`].
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Judged {
     /// The numbers are the right ones; with the places of others that give the same.

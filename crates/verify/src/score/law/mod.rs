@@ -38,14 +38,14 @@ pub struct LawRow {
     pub from: Deformation,
     /// Particles that were compared, over all frames.
     pub places: usize,
-    /// What came out.
+    /// The outcome.
     pub verdict: LawVerdict,
     /// The name of what the file holds: `right`, another one's, or nothing where none fits.
     pub hypothesis: Option<&'static str>,
     /// The root of the mean square of the difference from that, over the root of the mean square of the field; of the right one where
     /// none fits.
     pub error: f64,
-    /// The same of the right one.
+    /// The error, computed likewise, of the hypothesis `right`.
     pub right: f64,
     /// Names that the file cannot tell from `hypothesis`.
     pub alike: Vec<&'static str>,
@@ -60,7 +60,7 @@ pub enum Deformation {
     F,
 }
 
-/// What came out of a comparison with the law.
+/// Outcome of a comparison with the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LawVerdict {
@@ -77,7 +77,7 @@ pub(super) fn has_lateral_stress(declared: Law<f64>) -> bool {
     Known::<2>::new(declared).and_then(|known| known.lame).is_some_and(|lame| lame.lambda != 0.0)
 }
 
-/// What a file has at one particle.
+/// Fields of a file at one particle.
 struct Place<const D: usize> {
     X: SVector<f64, D>,
     time: f64,

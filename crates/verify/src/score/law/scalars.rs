@@ -22,7 +22,7 @@ const fn number(kind: &'static str, words: &'static str, value: Value) -> Number
 /// A number from `J`, `tr H` and the density at rest.
 type Value = fn([f64; 3]) -> f64;
 
-/// What may stand for `J`.
+/// Numbers that a file may hold in place of `J`.
 const VOLUME_RATIOS: &[Number] = &[
     number("law-over-j", "1/det F", |[J, ..]| 1.0 / J),
     number("law-volume-change", "det F - 1", |[J, ..]| J - 1.0),
@@ -32,7 +32,7 @@ const VOLUME_RATIOS: &[Number] = &[
     number("law-j-squared", "(det F)^2", |[J, ..]| J * J),
 ];
 
-/// What may stand for the density.
+/// Numbers that a file may hold in place of the density.
 const DENSITIES: &[Number] = &[
     number("law-reference-density", "rho0, that at rest", |[.., density]| density),
     number("law-times-j", "rho0 det F", |[J, _, density]| density * J),

@@ -45,7 +45,7 @@ fn recorded<const D: usize>(
 
 const TIME: f64 = 0.004;
 
-/// What is found of files that hold these fields.
+/// Rows and remarks for files that hold these fields.
 fn found<const D: usize>(
     exact: &dyn Solution<f64, D>,
     X: &[SVector<f64, D>],
