@@ -141,7 +141,7 @@ pub(crate) struct Program<'a> {
     lines: &'a [Line],
     output: usize,
     needed: Vec<bool>,
-    /// Of each line, in units of 2^-53: its own error, and that of its value wherever one is known beforehand.
+    /// Errors of each line, in units of 2^-53: its own, and that of its value wherever one is known beforehand.
     own: Vec<f64>,
     all: Vec<f64>,
 }
@@ -434,8 +434,8 @@ impl Part<'_> {
         terms.into_iter().for_each(|(powers, c)| *errors.entry(powers).or_default() += c);
     }
 
-    /// What is left of the errors, when each has taken what it needs of what is allowed: of the same powers first, then
-    /// of others that are not much smaller.
+    /// Remainder of the errors, when each has taken its need from the allowed terms: from those of the same powers first, then
+    /// from others that are not much smaller.
     fn left(
         &self,
         errors: BTreeMap<Powers, f64>,

@@ -30,7 +30,7 @@ pub const LEAST_ROUNDINGS: [(&str, f64); 5] = [
     ("logarithm", 3.0),
 ];
 
-/// What a certificate proves.
+/// The bound that a certificate proves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
     /// The solution that it names.
@@ -57,7 +57,7 @@ pub enum Refusal {
         field: String,
         /// The entry, row by row from 0.
         entry: usize,
-        /// What the leaf claims.
+        /// The bound that the leaf claims.
         claimed: f64,
         /// The ranges of the inputs.
         place: String,

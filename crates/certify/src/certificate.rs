@@ -1,4 +1,4 @@
-//! What a proof leaves behind, to be checked by others.
+//! Certificates that proofs leave behind, to be checked by others.
 
 use crate::propagate::{Judgement, REMAINDER};
 use crate::search::{Limits, Proof, prove};
@@ -48,7 +48,7 @@ pub struct Certificate {
     pub solution: String,
     /// The factor that is proved for all fields.
     pub factor: f64,
-    /// What is left over, in units of `2^-53` and of the field where all scales are one.
+    /// The remainder that is left over, in units of `2^-53` and of the field where all scales are one.
     pub remainder: f64,
     /// Letters of the trees stand for factors of so many parts of one.
     pub steps_of_factor: f64,
@@ -84,7 +84,7 @@ impl Certificate {
     ///
     /// # Errors
     ///
-    /// What differs, in words.
+    /// The difference, in words.
     pub fn matches(&self, subject: &Subject) -> Result<(), String> {
         let lines = listing::lines(&subject.program);
         if self.solution != subject.solution {

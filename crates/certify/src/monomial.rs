@@ -53,7 +53,7 @@ impl Monomial {
         self.common(other) == self
     }
 
-    /// What is left of it beside a divisor.
+    /// The quotient by a divisor.
     pub(crate) fn beside(self, divisor: Self) -> Self {
         self.each(divisor, |own, divisor| own - divisor)
     }

@@ -29,7 +29,7 @@ use crate::rounding::UNIT;
 use crate::{CertifyError, Roundings};
 use mmsmith_expr::{Function, Operation, Program, Slot, nearest_f64};
 
-/// What may be left of the error side, in units of `2^-53` and of the field where all scales are one: a product of two
+/// Remainder that may be left of the error side, in units of `2^-53` and of the field where all scales are one: a product of two
 /// rounding errors, such as that of two sines next to their zeros, which no sensitivity accounts for.
 pub const REMAINDER: f64 = 1e-10;
 
@@ -315,7 +315,7 @@ impl Wave {
     }
 }
 
-/// What is kept apart on one box.
+/// Factors that are kept apart on one box.
 #[derive(Default)]
 struct Factors {
     /// The range of each factor.
@@ -429,7 +429,7 @@ impl Sides {
         self.error.iter().map(size).sum::<f64>() * (1.0 + SLACK)
     }
 
-    /// What `s + |g|` is at least, anywhere in the box.
+    /// A lower bound of `s + |g|`, anywhere in the box.
     #[must_use]
     pub fn least_allowed(&self) -> f64 {
         let size = |(m, c): &(Monomial, f64)| c * m.range(&self.ranges).mignitude();

@@ -1,4 +1,4 @@
-//! What each operation of a program loses, in units of `2^-53` of its result.
+//! Rounding error of each operation of a program, in units of `2^-53` of its result.
 
 use crate::CertifyError;
 use mmsmith_expr::{Function, Operation, Program, Rational, nearest_f64};
@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 /// Sums, products, quotients and square roots are rounded once, and sums and products that are exact count as such.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Roundings {
-    /// Of a sum, a difference, a product, a quotient, a square root, and a number that is no double.
+    /// Error of a sum, a difference, a product, a quotient, a square root, and a number that is no double.
     pub arithmetic: f64,
-    /// Of the circle number: `|fl(pi) - pi|/(2^-53 pi)` is 0.351.
+    /// Error of the circle number: `|fl(pi) - pi|/(2^-53 pi)` is 0.351.
     pub pi: f64,
-    /// Of `sin(pi x)` and `cos(pi x)` in generated code, which are within one unit in the last place (2).
+    /// Error of `sin(pi x)` and `cos(pi x)` in generated code, which are within one unit in the last place (2).
     pub trigonometric_pi: f64,
-    /// Of `sin(x)`, `cos(x)` of the system's library, which is held to one unit in the last place.
+    /// Error of `sin(x)`, `cos(x)` of the system's library, which is held to one unit in the last place.
     pub trigonometric: f64,
-    /// Of `ln(1 + x)` in generated code, which is within one and a half units in the last place.
+    /// Error of `ln(1 + x)` in generated code, which is within one and a half units in the last place.
     pub logarithm: f64,
 }
 

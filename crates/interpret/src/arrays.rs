@@ -26,7 +26,7 @@ pub struct Arrays {
     state: FromKept,
 }
 
-/// What is computed at points.
+/// A quantity to compute at points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// A field.
@@ -149,7 +149,7 @@ impl Arrays {
         });
     }
 
-    /// What the fields keep of the points `X`, which are copied.
+    /// The fields at the points `X`, which are copied.
     #[must_use]
     pub fn at(self: &Arc<Self>, X: &[f64]) -> ArraysAtPoints {
         let (body_force, state) = (OnceLock::new(), OnceLock::new());

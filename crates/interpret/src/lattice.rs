@@ -22,7 +22,7 @@ struct LayerStage {
 }
 
 impl LatticeStages {
-    /// Of the form that `lattice` says.
+    /// Stages of the form that `lattice` states.
     pub(crate) fn new(program: &Program, lattice: &stage::Lattice) -> Self {
         let layers = lattice.layers();
         let layer = |(axis, stages): (usize, &stage::Stages)| {

@@ -168,7 +168,7 @@ struct Interpreted<T: Interpretable, const D: usize> {
     body_force_stages: PointStages<1>,
     /// The body force at the points of a lattice, where that has a form of its own.
     lattice_stages: Option<LatticeStages>,
-    /// Of `u`, `F` and `P`, and of `v`.
+    /// Stages of `u`, `F` and `P`, and of `v`.
     state_stages: PointStages<2>,
     domain: Domain<T, D>,
     boundaries: Vec<Boundary>,

@@ -82,7 +82,7 @@ impl<const N: usize> PointStages<N> {
     }
 }
 
-/// What is kept of points.
+/// Values kept of points.
 pub(crate) struct Points<'a, T, const N: usize> {
     stages: &'a PointStages<N>,
     parameters: &'a [T],

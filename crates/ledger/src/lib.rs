@@ -54,7 +54,7 @@ pub struct Ledger {
     state: Mutex<State>,
 }
 
-/// What is known of the file, and the handles to it.
+/// Contents known of the case file, and the handles to the file.
 struct State {
     /// Held by whoever reads or writes the case file.
     lock: File,
@@ -64,7 +64,7 @@ struct State {
     line: usize,
     /// Values by the text of their keys.
     values: HashMap<String, Value>,
-    /// The same of the shards' files.
+    /// Values from the shards' files, likewise.
     shards: HashMap<String, Value>,
     damaged: Vec<Damage>,
 }
@@ -76,13 +76,13 @@ pub struct Damage {
     pub file: PathBuf,
     /// Its number, from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// The fault of the line.
     pub problem: &'static str,
     /// The file that it was moved to; none where it stays, as in the file of a shard.
     pub moved_to: Option<PathBuf>,
 }
 
-/// What a case is to the process that asks for it.
+/// State of a case for the process that asks for it.
 #[derive(Debug)]
 pub enum Claim<'a> {
     /// It is finished, with this value.
@@ -111,7 +111,7 @@ pub enum LedgerError {
     // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
     #[error("cannot {action} {}: {cause}", path.display())]
     System {
-        /// What was tried.
+        /// The operation that was tried.
         action: &'static str,
         /// The file or folder.
         path: PathBuf,

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// What comes before the checksum, and between it and what it is the sum of.
+/// Text before the checksum, and text between the checksum and the content that it is the sum of.
 const BEFORE: &str = "{\"sha256\":\"";
 const AFTER: &str = "\",";
 /// Hexadecimal digits of the checksum; one damaged line in 10^19 passes for a whole one.

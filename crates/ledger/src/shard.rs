@@ -166,7 +166,7 @@ impl fmt::Debug for Shard {
 /// The key under which a shard's file states its origin.
 const ORIGIN: &str = "origin";
 
-/// What the files of all shards have.
+/// Contents of the files of all shards.
 #[derive(Default)]
 pub(crate) struct Found {
     pub(crate) values: HashMap<String, Value>,

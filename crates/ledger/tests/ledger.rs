@@ -15,7 +15,7 @@ const FOLDER: &str = "MMSMITH_LEDGER_FOLDER";
 const GATE: &str = "gate";
 /// Where this is set, a child that has done its work waits to be killed.
 const KILLED: &str = "MMSMITH_LEDGER_KILLED";
-/// What such a child says before it waits.
+/// Message of such a child before it waits.
 const IDLE: &str = "nothing is left";
 /// Cases of the children's study.
 const CASES: u64 = 400;

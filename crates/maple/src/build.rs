@@ -14,7 +14,7 @@ const MOST_BITS: u64 = 4096;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{message}")]
 pub struct BuildError {
-    /// What is wrong, and what would be right.
+    /// The mistake, and its correction.
     pub message: String,
     /// Where, in bytes from the start of the listing.
     pub span: Range<usize>,

@@ -15,12 +15,12 @@ const MOST_DIGITS: f64 = SETTLED_DIGITS as f64;
 /// Agreement to this many digits at every point verifies a component.
 const VERIFIED_DIGITS: f64 = 40.0;
 
-/// What is compared.
+/// A listing, and the derived expressions to compare it with.
 #[derive(Clone, Copy, Debug)]
 pub struct CrossCheck<'a> {
     /// The graph of the derived expressions.
     pub graph: &'a Graph,
-    /// What further symbols mean, such as the polar radius.
+    /// Definitions of further symbols, such as the polar radius.
     pub definitions: &'a [(Expr, Expr)],
     /// The listing.
     pub listing: &'a Listing,
@@ -50,7 +50,7 @@ pub enum CrossCheckError {
     Missing {
         /// The entry.
         entry: String,
-        /// What it assigns, temporaries left out where there are entries with indices.
+        /// The names that the listing assigns, temporaries left out where there are entries with indices.
         assigned: String,
     },
     /// One side has no value at a point.
@@ -71,7 +71,7 @@ pub enum CrossCheckError {
     NoPoints,
 }
 
-/// What came out, component by component.
+/// Results, component by component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// One for each target, in order.

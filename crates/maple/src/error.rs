@@ -8,13 +8,13 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{problem}")]
 pub struct ListingError {
-    /// What is wrong, and what would be right.
+    /// The mistake, and its correction.
     pub problem: Problem,
     /// Where, in bytes from the start of the text.
     pub span: Range<usize>,
 }
 
-/// What may be wrong with a listing.
+/// Mistakes that a listing may have.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Problem {
     /// Two numbers, or a name and what may be the rest of it, with nothing but a line break between them.
@@ -44,15 +44,15 @@ pub enum Problem {
     /// An assignment follows where the one before has not ended.
     #[error("';' is missing before '{before}'")]
     SemicolonMissing {
-        /// What the next assignment starts with.
+        /// The start of the next assignment.
         before: String,
     },
     /// Something else than what the grammar asks for.
     #[error("{wanted} is expected here, not {found}")]
     Expected {
-        /// What would be right.
+        /// The part that the grammar asks for.
         wanted: &'static str,
-        /// What stands there.
+        /// The text found there.
         found: String,
     },
     /// A temporary or an entry is used that is assigned further down, or in this very statement.

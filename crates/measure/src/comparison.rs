@@ -207,7 +207,7 @@ pub trait Compared<const D: usize>: Real + Stressed<D> {
         times: (f64, f64),
     ) -> PerField<PerNorm<f64>>;
 
-    /// The same of the particles of all processes.
+    /// The errors of the particles of all processes, as [`errors`](Self::errors).
     fn errors_of_all(
         comparison: &Comparison<'_, D>,
         homes: &Homes,
@@ -274,7 +274,7 @@ impl<T: Real, const D: usize> Room<T, D> {
 /// One number for each particle of a run.
 pub type Row<T> = [T; BLOCK];
 
-/// What is compared of `BLOCK` particles, side by side.
+/// Fields of `BLOCK` particles to compare, side by side.
 struct Run<T, const D: usize> {
     X: [Row<T>; D],
     x: [Row<T>; D],
@@ -406,7 +406,7 @@ fn backwards(count: usize, runs: usize) -> impl Fn(usize) -> usize {
     }
 }
 
-/// What `group` makes of each number below `count`, on the threads of the pool; through a reference, so that their
+/// Results of `group` for each number below `count`, on the threads of the pool; through a reference, so that the threads'
 /// machinery is compiled once for each kind of result.
 pub fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
     (0..count).into_par_iter().map(group).collect()

@@ -84,8 +84,8 @@ impl Homes {
         place.checked_sub(self.own).map_or(Holder::Here(place), Holder::Other)
     }
 
-    /// What other processes say of the particles at home here, where `say` tells it of this process's that have their home elsewhere, by
-    /// their places; a call of all.
+    /// Values from other processes for the particles at home here, where `say` gives those of this process's particles that have their
+    /// home elsewhere, by their places; a call of all.
     pub fn hear<E: Pod>(&self, say: impl Fn(Range<usize>) -> Vec<E>) -> Vec<E> {
         let rank = self.ranks.rank();
         let of = |to: usize| if to == rank { Vec::new() } else { say(self.out[to].clone()) };
@@ -95,8 +95,8 @@ impl Homes {
         exchange(&*self.ranks, &out, &counts)
     }
 
-    /// What all processes say of the particles at home here in the order of their numbers, where `own` says it of this process's; a call
-    /// of all.
+    /// Values from all processes for the particles at home here, in the order of the particles' numbers; `own` has the values of this
+    /// process's particles. A call of all.
     pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
         let others = self.hear(|places| own[places].to_vec());
         let of = |place| match self.holder(place) {

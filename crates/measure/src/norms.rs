@@ -239,7 +239,7 @@ impl Tally {
         }
     }
 
-    /// The same with magnitudes divided by another power of two.
+    /// These sums with magnitudes divided by another power of two.
     fn at(&self, scale: f64) -> Self {
         let ratio = self.scale / scale;
         Self {
