@@ -84,7 +84,7 @@ pub struct Worst {
     pub found: Found,
     /// Whether the point is outside of the body.
     pub outside: bool,
-    /// What the code gave.
+    /// The result of the code.
     pub result: f64,
     /// The exact value, to 20 digits.
     pub exact: String,
@@ -127,7 +127,7 @@ pub struct Accuracy<'a> {
     sensitivity: Sensitivity,
     quick_sensitivity: Program,
     quick_truth: QuickTruth,
-    /// What positive parts are taken of, and the products of [`Sensitivity`] for it with their number.
+    /// Arguments of positive parts, and the products of [`Sensitivity`] for them with their number.
     switches: (Program, Program, Vec<usize>),
     /// How many products [`Sensitivity`] has for each expression.
     products: Vec<usize>,
@@ -452,7 +452,7 @@ impl<'a> Accuracy<'a> {
         })
     }
 
-    /// What points are drawn from.
+    /// The sampler that points are drawn from.
     pub(crate) fn sampler(&self) -> &Sampler<'a> {
         &self.sampler
     }
@@ -529,7 +529,7 @@ impl<'a> Accuracy<'a> {
         })
     }
 
-    /// What the code under test gives, in the order of the fields and of the size that they have.
+    /// Results of the code under test, in the order of the fields and of the size that they have.
     pub(crate) fn results(
         &self,
         inputs: &[f64],

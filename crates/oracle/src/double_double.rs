@@ -60,7 +60,7 @@ fn sum(a: f64, b: f64) -> DoubleDouble {
     DoubleDouble { high, low: (a - (high - b_in_sum)) + (b - b_in_sum) }
 }
 
-/// The same where `|a| >= |b|`.
+/// As [`sum`], where `|a| >= |b|`.
 fn ordered_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     DoubleDouble { high, low: b - (high - a) }

@@ -21,7 +21,7 @@ const ROUNDING: RoundingMode = RoundingMode::ToEven;
 pub struct Point<'a> {
     /// The graph that all expressions belong to.
     pub graph: &'a Graph,
-    /// What further symbols mean, such as the polar radius.
+    /// Definitions of further symbols, such as the polar radius.
     pub definitions: &'a [(Expr, Expr)],
     /// The inputs with their exact values.
     pub values: &'a [(Expr, Rational)],
@@ -43,7 +43,7 @@ pub enum OracleError {
     /// A precision that is not offered.
     #[error("a precision of {bits} bits; {least} to {most} are offered")]
     Precision {
-        /// What was asked for.
+        /// The precision asked for.
         bits: usize,
         /// The least.
         least: usize,

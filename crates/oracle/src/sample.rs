@@ -74,7 +74,7 @@ const NEAREST_TO_BOUND: f64 = 1e-8;
 /// An amplitude counts as tiny below this share of its default, and has this share at least.
 const TINY: f64 = 1.4e-4;
 const TINIEST: f64 = 1e-201;
-/// What is next to the boundary is within this share of the body's size.
+/// Points next to the boundary are within this share of the body's size.
 const NEXT_TO: f64 = 1e-9;
 /// Late times end at so many periods.
 const MOST_PERIODS: f64 = 1e6;
@@ -86,7 +86,7 @@ const INNERMOST: f64 = 0.5;
 /// The smallest stretches of bodies that count as near inversion.
 const NEAR_INVERSION: std::ops::RangeInclusive<f64> = 0.5e-8..=2e-2;
 
-/// The same numbers on every machine.
+/// Random numbers that are the same on every machine.
 pub(crate) struct Random(SplitMix64);
 
 impl Random {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 const PLACES: usize = 64;
 /// Points next to each other that are evaluated at a place: rounding is rough, and one point says little of a place.
 const NEIGHBOURS: usize = 8;
-/// Of the places so many are drawn anew; the others are changes of a known one.
+/// Places that each round draws anew; the others are changes of a known one.
 const DRAWN: usize = 8;
 /// The evaluations of one round in one class.
 pub const ROUND: u64 = (PLACES * NEIGHBOURS) as u64;
@@ -19,7 +19,7 @@ pub const ROUND: u64 = (PLACES * NEIGHBOURS) as u64;
 const KNOWN: usize = 4;
 /// After so many rounds without progress a place other than the worst makes room for a new one.
 const PATIENCE: u64 = 24;
-/// Of the places in a round that quick arithmetic finds doubtful, so many of each field are asked the oracle about.
+/// Limit of places of each field in a round that quick arithmetic finds doubtful and that the oracle is asked about.
 const MOST_DOUBTED: usize = 2;
 /// Draws of a search are none of those that [`Accuracy::measure`] judges.
 const FIRST_DRAW: u64 = 1 << 40;
@@ -67,7 +67,7 @@ pub struct Search {
     classes: Vec<ClassSearch>,
 }
 
-/// What was found at one place: the worst neighbour for each field.
+/// Findings at one place: the worst neighbour for each field.
 struct Place {
     /// Field and number of the known place that was changed; `None` for a draw.
     origin: Option<(usize, usize)>,

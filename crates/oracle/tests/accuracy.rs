@@ -18,7 +18,7 @@ const POINTS_OF_FURTHER: usize = 6;
 struct Extent<'a> {
     classes: &'a [Class],
     points: usize,
-    /// Of a search that begins at the worst of the points.
+    /// Rounds of a search that begins at the worst of the points.
     rounds: usize,
 }
 
@@ -67,7 +67,7 @@ fn judge(
     }
 }
 
-/// What goes beyond the bound in one specification of the library.
+/// Failures beyond the bound in one specification of the library.
 fn in_every_class(file: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(file).unwrap();
     let spec = match Spec::parse(&text, &file.display().to_string()) {
@@ -131,7 +131,7 @@ fn sums_of_coordinates_keep_their_digits_far_from_the_body() {
 /// sheared plane, of which the law takes the logarithm by the ratio of both.
 const OPEN: [(&str, Class); 1] = [("tube-hencky", Class::NearInversion)];
 
-/// What goes beyond the bound in the specifications of a folder, by the programs alone.
+/// Failures beyond the bound in the specifications of a folder, by the programs alone.
 fn by_programs(folder: &str, classes: &[Class], rounds: usize) -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/specs").join(folder);
     let mut files: Vec<_> = std::fs::read_dir(&folder)
@@ -217,7 +217,7 @@ fn the_vortex_keeps_its_digits_next_to_incompressibility() {
     }
 }
 
-/// What is computed once a point and once a step leaves the digits that a single call has: over one denominator `K` was 1365 where two
+/// Values computed once a point and once a step leave the digits that a single call has: over one denominator `K` was 1365 where two
 /// stretches are negative, and 16 to 27 in a body that is as large.
 #[test]
 fn staged_body_forces_keep_the_digits_of_single_ones() {
@@ -396,7 +396,7 @@ fn a_search_goes_on_where_it_was() {
     assert!(!whole.suits(&other));
 }
 
-/// What loses digits in one corner of the body only, which draws do not meet.
+/// Code that loses digits in one corner of the body only, which draws do not meet.
 #[test]
 fn a_search_finds_what_draws_do_not() {
     let text = include_str!("../../../mms-specs/bar.toml");

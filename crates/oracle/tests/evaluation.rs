@@ -1,4 +1,4 @@
-//! What the oracle computes where care is needed, and what it refuses.
+//! Values that the oracle computes where care is needed, and inputs that it refuses.
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Ast, Expr, Function, Graph, Rational};

@@ -101,7 +101,7 @@ fn parse(description: &Description) -> Spec {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What goes beyond the bound in any class.
+/// Failures beyond the bound in any class.
 fn beyond(
     field: &Field,
     way: &str,

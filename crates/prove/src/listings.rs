@@ -23,7 +23,7 @@ pub struct Published<'a> {
     listing: Listing,
     /// The text that the listing was read from.
     text: String,
-    /// What messages call the specification.
+    /// The specification's name in messages.
     spec_file: String,
     /// The listing's file, where it has one of its own.
     own_file: Option<String>,
@@ -115,7 +115,7 @@ impl<'a> Published<'a> {
         })
     }
 
-    /// What the listing should assign: every component of each field of which it assigns one.
+    /// Targets of the listing: every component of each field of which it assigns one.
     fn targets(&self, fields: &Fields) -> Result<Vec<Target>, Diagnostic> {
         let n = self.spec.dimension;
         let assigned: BTreeSet<&str> =

@@ -8,7 +8,7 @@ use mmsmith_spec::{Domain, Fields, Parameter, Spec, Surface};
 use num_traits::One;
 use thiserror::Error;
 
-/// Of so many draws one has its parameters near their defaults, the others anywhere in the admissible range.
+/// One draw in so many has its parameters near their defaults, the others anywhere in the admissible range.
 const NEAR: usize = 4;
 /// Draws for each point that is wanted.
 const DRAWS: usize = 50;

@@ -1,4 +1,4 @@
-//! What boundary conditions say about a solution: proved in symbols, verified in high precision, or refuted.
+//! Claims of boundary conditions about a solution: proved in symbols, verified in high precision, or refuted.
 
 use crate::points::{PointsError, Values, points};
 use mmsmith_expr::{Expr, Graph, Rational, nearest_f64};
@@ -12,12 +12,12 @@ const POINTS: usize = 20;
 /// A quantity that is smaller than its scale by this many digits at every point is zero.
 const VERIFIED_DIGITS: f64 = 40.0;
 
-/// What became of a claim about a surface.
+/// Finding on a claim about a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceFinding {
     /// Which surface.
     pub surface: Surface,
-    /// What is said to be zero there.
+    /// The quantity claimed to be zero there.
     pub claim: ClaimKind,
     /// The outcome.
     pub outcome: Outcome,

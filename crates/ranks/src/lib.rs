@@ -37,7 +37,7 @@ pub trait Ranks: Send + Sync {
     fn largest(&self, value: u64) -> u64;
 }
 
-/// What each rank sent to this one, where `out` has what this one sends to each: a call of all.
+/// Elements that each rank sent to this one, where `out` has those that this one sends to each: a call of all.
 ///
 /// Empty messages are not sent. `counts` says how many elements each rank sends here.
 pub fn exchange<E: NoUninit + AnyBitPattern>(

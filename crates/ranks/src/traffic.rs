@@ -14,7 +14,7 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// What was sent until now.
+    /// Messages and bytes sent until now.
     pub fn sent(&self) -> Sent {
         Sent {
             messages: self.messages.load(Ordering::Relaxed),
@@ -45,7 +45,7 @@ struct Counted {
     traffic: Arc<Traffic>,
 }
 
-/// The same rank, with a count of what it sends.
+/// The given rank, with a count of the messages that it sends.
 pub fn counted(ranks: Arc<dyn Ranks>) -> (Arc<dyn Ranks>, Arc<Traffic>) {
     let traffic = Arc::new(Traffic::default());
     (Arc::new(Counted { ranks, traffic: traffic.clone() }), traffic)

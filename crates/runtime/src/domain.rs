@@ -27,7 +27,7 @@ pub enum Domain<T: Real, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Domain<T, D> {
-    /// The same shape with `change` applied to each length.
+    /// This shape with `change` applied to each length.
     #[must_use]
     pub fn map<U: Real>(&self, change: impl Fn(T) -> U) -> Domain<U, D> {
         match self {
@@ -82,7 +82,7 @@ impl fmt::Display for Surface {
     }
 }
 
-/// What holds on a surface.
+/// Condition on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
     /// No displacement along the normal, no shear traction.
@@ -115,6 +115,6 @@ impl fmt::Display for Condition {
 pub struct Boundary {
     /// Where.
     pub surface: Surface,
-    /// What.
+    /// The condition.
     pub condition: Condition,
 }

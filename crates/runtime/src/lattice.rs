@@ -103,18 +103,18 @@ pub trait BodyForceOnLattice<
     const LAYER: usize,
 >: Solution<T, D>
 {
-    /// What depends on the time alone.
+    /// Values that depend on the time alone.
     fn lattice_time(&self, t: T) -> [T; TIME];
-    /// What depends on one coordinate of `X` alone, that of the axis.
+    /// Values that depend on one coordinate of `X` alone, that of the axis.
     fn lattice_coordinate(&self, axis: usize, X: &SVector<T, D>) -> [T; POINT];
-    /// What depends on the time and on one coordinate.
+    /// Values that depend on the time and on one coordinate.
     fn lattice_layer(&self, axis: usize, time: &[T; TIME], point: &[T; POINT]) -> [T; LAYER];
     /// The body force per unit mass, from the values of one time and of a point's layers: equal to
     /// [`Solution::body_force`] but for rounding, or not a number.
     fn lattice_body_force(&self, time: &[T; TIME], layers: [&[T; LAYER]; D]) -> SVector<T, D>;
 }
 
-/// What the body force of a generated solution keeps of the points of a lattice.
+/// Values that the body force of a generated solution keeps of the points of a lattice.
 pub struct LatticePoints<
     S,
     T,

@@ -1,4 +1,4 @@
-//! What manufactured solutions need at run time: the trait that they implement, the body that they belong to, their parameters, and the
+//! Run time of manufactured solutions: the trait that they implement, the body that they belong to, their parameters, and the
 //! evaluation at many points.
 //!
 //! A manufactured solution is a displacement field `u(X, t)`, chosen freely, together with the body force `b`

@@ -1,4 +1,4 @@
-//! What can be set: names, defaults and admissible values of a solution's parameters.
+//! Names, defaults and admissible values of a solution's parameters.
 
 use thiserror::Error;
 
@@ -13,11 +13,11 @@ pub struct Parameter {
     pub unit: &'static str,
     /// The admissible values, as the specification states them; empty where every finite number is admissible.
     pub admissible: &'static str,
-    /// What it means.
+    /// The meaning of the parameter.
     pub description: &'static str,
 }
 
-/// What a generated module says of its solution.
+/// Description of a solution by its generated module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Description {
     /// The name, which is also that of the specification file.
@@ -60,7 +60,7 @@ pub enum ParameterError {
         name: String,
         /// The value given.
         value: f64,
-        /// What would be right.
+        /// The admissible values.
         admissible: String,
     },
     /// Values that are admissible one by one but not together.

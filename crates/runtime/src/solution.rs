@@ -1,4 +1,4 @@
-//! What every manufactured solution can do.
+//! Functions of every manufactured solution.
 
 use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
@@ -71,7 +71,7 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn has_form_on_lattice(&self) -> bool {
         false
     }
-    /// What a simulation is compared with at many fixed points, prepared as [`Solution::body_force_at`] prepares the body
+    /// The exact state at many fixed points, to compare a simulation with, prepared as [`Solution::body_force_at`] prepares the body
     /// force: displacement, deformation gradient and stress at one time, and the velocity at another.
     fn state_at(&self, X: &[SVector<T, D>]) -> Box<dyn StateAtPoints<T, D> + '_> {
         Box::new(PlainPoints { solution: self, X: X.to_vec() })

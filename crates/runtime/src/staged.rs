@@ -1,9 +1,9 @@
 //! Fields at points that stay while time goes on.
 //!
 //! A solver samples `b` at the same reference positions in every step, and is compared with `u`, `v`, `F` and `P` there.
-//! What depends on the position alone, such as the sines of `pi X` or the profile of a displacement over the radius, is
-//! computed once and kept; what depends on the time alone is computed once a call; what is left for each point and time
-//! is short, and many points go through it at once.
+//! Values that depend on the position alone, such as the sines of `pi X` or the profile of a displacement over the radius, are
+//! computed once and kept; values that depend on the time alone are computed once a call; the work left for each point and
+//! time is short, and many points go through it at once.
 
 use crate::{Real, Solution};
 use nalgebra::{SMatrix, SVector};
@@ -46,7 +46,7 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     fn bytes_per_point(&self) -> usize;
 }
 
-/// What a simulation is compared with at many fixed points, as [`Solution::state_at`] prepares it.
+/// The exact state at many fixed points, to compare a simulation with, as [`Solution::state_at`] prepares it.
 pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
     /// Writes `u`, `F` and `P` at time `t`, and `v` at `velocity_time`, of the points from `BLOCK first` on. What a last run
     /// has to spare repeats the last point.
@@ -62,7 +62,7 @@ pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
     fn bytes_per_point(&self) -> usize;
 }
 
-/// What a simulation is compared with, at one point.
+/// The exact state at one point, to compare a simulation with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<T: Real, const D: usize> {
     /// Displacement, a length.
@@ -97,7 +97,7 @@ impl<T: Real, const D: usize> StateRun<T, D> {
         Self { u: vector, v: vector, F: matrix, P: matrix }
     }
 
-    /// The same run with `change` applied to each component.
+    /// This run with `change` applied to each component.
     #[must_use]
     pub fn map<U>(self, change: impl Fn(T) -> U) -> StateRun<U, D> {
         let row = |row: [T; BLOCK]| row.map(&change);
@@ -149,9 +149,9 @@ impl<T: Real, const D: usize> StateRun<T, D> {
 pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POINT: usize>:
     Solution<T, D>
 {
-    /// What depends on the time alone.
+    /// Values that depend on the time alone.
     fn body_force_time(&self, t: T) -> [T; TIME];
-    /// What depends on the reference position alone.
+    /// Values that depend on the reference position alone.
     fn body_force_point(&self, X: &SVector<T, D>) -> [T; POINT];
     /// The body force per unit mass, from the values of one time and of one point; equal to
     /// [`Solution::body_force`] but for rounding.
@@ -165,9 +165,9 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     ) -> SVector<T, D>;
 }
 
-/// What a simulation is compared with, in stages: what `TIME` values it needs of the time alone, what `VELOCITY_TIME` values
-/// the velocity needs of its own time, what `POINT` values they need of the point alone, and how they follow from these.
-/// Every generated solution has them.
+/// The exact state in stages, to compare a simulation with: the `TIME` values of the time alone, the `VELOCITY_TIME` values of the
+/// velocity's own time, the `POINT` values of the point alone, and how the state follows from these. Every generated solution has
+/// these stages.
 pub trait StateStages<
     T: Real,
     const D: usize,
@@ -176,11 +176,11 @@ pub trait StateStages<
     const POINT: usize,
 >: Solution<T, D>
 {
-    /// What displacement, deformation gradient and stress need of the time alone.
+    /// Values of the time alone for displacement, deformation gradient and stress.
     fn state_time(&self, t: T) -> [T; TIME];
-    /// What the velocity needs of the time alone.
+    /// Values of the time alone for the velocity.
     fn velocity_time(&self, t: T) -> [T; VELOCITY_TIME];
-    /// What depends on the reference position alone.
+    /// Values that depend on the reference position alone.
     fn state_point(&self, X: &SVector<T, D>) -> [T; POINT];
     /// The fields from the values of their times and of one point; those of [`Solution`]'s functions, to the last bit.
     /// `NEAR` is as in [`BodyForceStages::body_force_staged`].
@@ -204,7 +204,7 @@ const RUN: usize = 4 * BLOCK;
 /// spare repeats its last point.
 type Blocks<T, const POINT: usize> = Vec<[[T; BLOCK]; POINT]>;
 
-/// What `values` gives for each of the points `X`.
+/// Results of `values` for each of the points `X`.
 fn blocks<T: Real, const D: usize, const POINT: usize>(
     X: &[SVector<T, D>],
     values: impl Fn(&SVector<T, D>) -> [T; POINT],
@@ -223,7 +223,7 @@ fn blocks<T: Real, const D: usize, const POINT: usize>(
     X.chunks(BLOCK).map(block).collect()
 }
 
-/// What the body force of a generated solution keeps of points.
+/// Values that the body force of a generated solution keeps of points.
 pub struct StagedPoints<S, T, const TIME: usize, const POINT: usize> {
     solution: S,
     /// For each value an array over all points, so that a run of points may begin anywhere. The last point is repeated for
@@ -252,7 +252,7 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     }
 }
 
-/// What the states of a generated solution keep of points.
+/// Values that the states of a generated solution keep of points.
 pub struct StagedStates<S, T, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize> {
     solution: S,
     blocks: Blocks<T, POINT>,

@@ -13,7 +13,7 @@ use crate::encode::{
 };
 use crate::{Array, Error, Frame, Provenance, Values};
 
-/// What introduces an array in the file.
+/// Text that introduces an array in the file.
 const ARRAY: &str = "<DataArray";
 
 /// The arrays of every file that are not quantities over the particles: time, step, points and three for the cells. The

@@ -1,4 +1,4 @@
-//! What can go wrong between a frame and its file.
+//! Errors between a frame and its file.
 
 use std::io;
 use std::path::PathBuf;
@@ -87,13 +87,13 @@ pub enum Error {
     /// The frame could not be laid out as XML.
     #[error("the frame cannot be laid out as a .vtu file: {cause}")]
     Encode {
-        /// What was met.
+        /// The obstacle that was met.
         cause: String,
     },
     /// The file system refused.
     #[error("cannot {action} {}: {cause}", path.display())]
     FileSystem {
-        /// What was tried, such as `write`.
+        /// The operation that was tried, such as `write`.
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
@@ -105,7 +105,7 @@ pub enum Error {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What was expected or met.
+        /// The content that was expected or met.
         cause: String,
     },
 }

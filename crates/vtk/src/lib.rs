@@ -7,7 +7,7 @@
 //!
 //! [`foreign`] reads the particles and nodes that other programs write, in whatever variant.
 //!
-//! Of the many variants of the format the files use the one that all three readers understand without loss: version
+//! The files use one of the format's many variants, which all three readers understand without loss: version
 //! 1.0, little endian, inline base64, no compression. The same frame always gives the same bytes.
 //!
 //! ```

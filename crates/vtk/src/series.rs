@@ -42,7 +42,7 @@ impl Series {
         Ok(series)
     }
 
-    /// The same series for a process that writes [pieces](Self::write_piece) to it: another one starts it.
+    /// The series for a process that writes [pieces](Self::write_piece) to it: another process starts the series.
     ///
     /// # Errors
     ///

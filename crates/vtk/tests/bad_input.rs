@@ -1,4 +1,4 @@
-//! What cannot become a whole file is refused by name, and nothing is overwritten.
+//! Frames that cannot become a whole file are refused by name, and nothing is overwritten.
 
 use std::fs;
 use std::path::Path;

@@ -80,7 +80,7 @@ fn a_frame_that_does_not_fit_replaces_nothing() {
     }
 }
 
-/// The same with the frame that does not fit as the last word of the process.
+/// A child with the frame that does not fit as the last word of the process.
 #[test]
 #[ignore = "is started by the other test, in a process of its own"]
 fn child_that_stops() {

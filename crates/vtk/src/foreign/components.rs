@@ -41,7 +41,7 @@ enum Component {
 
 /// Beginnings of names behind which a component may stand without a sign between: `u1`, `ux`, `dispx`.
 const VECTORS: [&str; 9] = ["u", "v", "U", "V", "disp", "displacement", "vel", "velocity", "coord"];
-/// The same for tensors: `F11`, `S12`, `sigmaxx`.
+/// Beginnings of names of tensors, likewise: `F11`, `S12`, `sigmaxx`.
 const TENSORS: [&str; 10] = ["F", "P", "S", "s", "H", "sigma", "tau", "stress", "cauchy", "pk1"];
 /// Names of vectors whose components are coordinates of the points.
 const POSITIONS: [&str; 7] =

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::numbers::{Base64, ByteOrder, Kind, MOST_NUMBERS, Number, Packing, decode, parse};
 
-/// What a file holds, as places in its bytes.
+/// Contents of a file, as places in its bytes.
 #[derive(Debug)]
 pub(super) struct Contents {
     pub(super) packing: Packing,

@@ -106,7 +106,7 @@ pub enum ReadError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         cause: String,
     },
     /// An array cannot be decoded.
@@ -116,7 +116,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The array.
         array: String,
-        /// What is wrong.
+        /// The fault.
         cause: String,
     },
 }
@@ -135,7 +135,7 @@ fn converted(path: &Path) -> String {
     }
 }
 
-/// What begins every file that is not CSV.
+/// Beginnings of all files that are not CSV.
 const XML_BEGINNINGS: [&[u8]; 2] = [b"<?xml", b"<VTKFile"];
 
 /// Reads a file whose beginning promises what its name does.

@@ -79,7 +79,7 @@ pub(super) enum ByteOrder {
     Big,
 }
 
-/// What numbers are wanted as: whole numbers keep all their digits as `i64`.
+/// A type that numbers are wanted as: whole numbers keep all their digits as `i64`.
 pub(super) trait Number: Sized + Copy {
     fn decode(kind: Kind, order: ByteOrder, bytes: &[u8]) -> Result<Self, String>;
     fn parse(text: &str) -> Result<Self, String>;

@@ -48,7 +48,7 @@ impl Tag {
     }
 }
 
-/// What encloses an array.
+/// The section that encloses an array.
 #[derive(Clone, Copy, PartialEq)]
 enum Section {
     Field,
