@@ -325,7 +325,9 @@ impl Lowering<'_> {
                     .to_integer()
                     .to_i32()
                     .filter(|n| n.abs() <= LARGEST_POWER_OF_PI)?;
-                Some(num_traits::Pow::pow(&square_root(value)?, power))
+                let root = square_root(value)?;
+                let is_defined = power >= 0 || !root.is_zero();
+                is_defined.then(|| num_traits::Pow::pow(&root, power))
             }
             _ => None,
         }
@@ -377,6 +379,7 @@ mod tests {
     use super::*;
     use crate::{Ast, Graph, Program};
     use mmsmith_scalar_functions::ScalarFunctions;
+    use std::collections::BTreeMap;
 
     /// The operations for `text` of X, Y (place), t (time) and k (parameter), and its value at the place.
     fn lowered(text: &str, at: [f64; 4]) -> (Vec<Operation>, f64) {
@@ -461,6 +464,21 @@ mod tests {
         ("sinh(Y + X/10^6)", 4.424546671737787e42),
         ("cosh(X/10^6 - k)", 1.4423823122947754e41),
     ];
+
+    /// A symbol below a fraction line may be replaced by zero.
+    #[test]
+    fn a_division_by_zero_is_left_to_the_program() {
+        for text in ["sin(X/k + 7*X)", "cos(3*X/sqrt(k))", "exp((X - t)/k^2)"] {
+            let mut graph = Graph::new();
+            let place = Dependence { position: true, time: false };
+            let inputs = ["X", "t"].map(|name| (graph.symbol(name), place));
+            let expr = graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name)));
+            let k = graph.symbol("k");
+            let divided = graph.replace(expr.unwrap(), &BTreeMap::from([(k, Graph::ZERO)]));
+            let program = Program::lower(&mut graph, &inputs, &[], &[divided]);
+            assert!(!program.evaluate(&[0.3, 0.2])[0].is_normal(), "{text}");
+        }
+    }
 
     /// Values beyond the largest number are infinite, whatever the sum has lost.
     #[test]
