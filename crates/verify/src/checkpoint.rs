@@ -91,7 +91,7 @@ pub struct Checkpoints {
     pub folder: CheckpointFolder,
     /// After how many steps a checkpoint is written, each time.
     pub every: u64,
-    /// What tells this run from others: a checkpoint of another one is refused.
+    /// Identity of this run: a checkpoint of another run is refused.
     pub identity: [u8; 32],
     /// Whether to go on from the folder's checkpoint; without one the run starts from its beginning.
     pub resume: bool,
@@ -104,7 +104,7 @@ pub enum CheckpointError {
     // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
     #[error("{path}: cannot {action} the checkpoint: {cause}", path = path.display())]
     FileSystem {
-        /// What was tried.
+        /// The operation that was tried.
         action: &'static str,
         /// The file.
         path: PathBuf,
@@ -128,7 +128,7 @@ pub enum CheckpointError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         what: &'static str,
     },
     /// The solver cannot go on from it.
@@ -190,7 +190,7 @@ impl Reached {
     }
 }
 
-/// What a run has come to: how far it is, its history until then, and the parts of the solver's state that this process has read.
+/// State of a run that goes on: how far it is, its history until then, and the parts of the solver's state that this process has read.
 #[derive(Debug)]
 pub(crate) struct TakenUp {
     pub(crate) reached: Reached,

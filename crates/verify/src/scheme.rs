@@ -1,4 +1,4 @@
-//! What a scheme is: how particles and grid exchange, and how a run goes on in time.
+//! Schemes: how particles and grid exchange, and how a run goes on in time.
 
 use std::fmt;
 
@@ -101,7 +101,7 @@ pub struct Total {
     pub composition: Composition,
     /// Where the particles lie in a cell.
     pub layout: Layout,
-    /// What the grid's coordinates mean.
+    /// Meaning of the grid's coordinates.
     pub coordinates: Coordinates,
 }
 

@@ -52,7 +52,7 @@ const MOST_PAIRS: usize = 3;
 /// Effects below this factor are not worth telling.
 const LEAST_EFFECT: f64 = 1.1;
 
-/// What is run: a case, its precision, and its threads.
+/// A setting to run: a case, its precision, and its threads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// Scheme, grid and time step.
@@ -66,7 +66,7 @@ pub struct Setting {
 /// One measured setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// What was run.
+    /// The setting that was run.
     pub setting: Setting,
     /// Its errors; the times are medians of the repeats.
     pub row: Row,
@@ -80,7 +80,7 @@ pub struct Entry {
     pub bytes: f64,
 }
 
-/// What a setting costs.
+/// A cost of a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Against {
     /// Wall-clock time of the steps.
@@ -113,7 +113,7 @@ pub enum Skip {
     Refused,
 }
 
-/// What is wanted.
+/// Goal of a search for settings.
 #[derive(Clone, Copy)]
 pub struct Goal<'a> {
     /// Seconds for everything.
@@ -130,7 +130,7 @@ pub struct Goal<'a> {
     pub most_bytes: f64,
 }
 
-/// What the steps of a run took, in seconds.
+/// Times of the steps of a run, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repeat {
     /// Wall-clock time.
@@ -145,9 +145,9 @@ pub type RepeatOutcome<E> = Result<Option<Repeat>, E>;
 /// A row, none where the solver refuses the setting, or why the study cannot go on.
 pub type RunOutcome<E> = Result<Option<Row>, E>;
 
-/// What runs the settings.
+/// The machine that runs the settings.
 pub struct Machine<'a, E> {
-    /// What a setting comes to; none where it does not fit the solution.
+    /// Plan of a setting; none where the setting does not fit the solution.
     pub plan: &'a dyn Fn(&Setting) -> Option<Plan>,
     /// Runs a setting and measures its errors, for at most so many seconds; none where the solver refuses it.
     pub run: &'a (dyn Fn(&Setting, f64) -> RunOutcome<E> + 'a),
@@ -174,7 +174,7 @@ pub struct Cheapest {
 pub struct Chosen {
     /// The entry.
     pub entry: usize,
-    /// What its setting gave when it was run once more.
+    /// Results of its setting when it was run once more.
     pub proof: Row,
 }
 
@@ -208,7 +208,7 @@ impl Range {
     }
 }
 
-/// What a change does to the time.
+/// Effect of a change on the time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimeEffect {
@@ -253,7 +253,7 @@ fn lasts(walls: &[f64]) -> bool {
     median(walls) >= LEAST_TIMED_S
 }
 
-/// What the change of one setting does, the others being equal.
+/// Effect of the change of one setting, the others being equal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effect {
     /// Which.
@@ -264,7 +264,7 @@ pub struct Effect {
     pub to: usize,
     /// How many pairs of runs this is told of.
     pub pairs: usize,
-    /// What it does to the wall-clock time.
+    /// Effect of the change on the wall-clock time.
     pub time: TimeEffect,
     /// The factor of the error.
     pub error: Range,
@@ -295,7 +295,7 @@ pub fn leading(effects: &[Effect], count: usize) -> Vec<&Effect> {
     chosen
 }
 
-/// What can be set.
+/// Name of a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SettingName {
@@ -334,9 +334,9 @@ pub struct Tradeoff {
     pub for_tolerance: Option<Chosen>,
     /// The most accurate setting within the time asked for, if one is within it.
     pub for_time: Option<Chosen>,
-    /// What the change of each setting does.
+    /// Effects of the change of each setting.
     pub effects: Vec<Effect>,
-    /// What was not run, with its reason and how many grids that were.
+    /// Number of grids that were not run, by reason.
     pub skipped: BTreeMap<Skip, usize>,
     /// Families that were tried.
     pub families: usize,
@@ -518,7 +518,7 @@ pub fn differences(a: &Setting, b: &Setting) -> Vec<SettingName> {
 
 struct Family {
     setting: Setting,
-    /// What each rung of the ladder comes to at the setting's own CFL number.
+    /// Plan of each rung of the ladder at the setting's own CFL number.
     plans: Vec<Option<Plan>>,
     cost: CostModel,
 }
@@ -669,7 +669,7 @@ impl<'a, E> Sweep<'a, E> {
         }
     }
 
-    /// What follows from all that was run.
+    /// Conclusions from all that was run.
     fn conclude(mut self, progress: &mut dyn FnMut(&Setting)) -> Result<Tradeoff, E> {
         self.found.for_tolerance = self.prove(self.cheapest_for_tolerance(), progress)?;
         self.found.for_time = self.prove(self.best_in_time(), progress)?;
@@ -1093,7 +1093,7 @@ impl<E> Sweep<'_, E> {
         Ok(proof.map(|proof| Chosen { entry, proof }))
     }
 
-    /// What the proofs will take.
+    /// Time that the proofs will take.
     fn proofs_s(&self) -> f64 {
         let chosen = [self.cheapest_for_tolerance(), self.best_in_time()];
         chosen.into_iter().flatten().map(|entry| self.found.entries[entry].total_s).sum()
@@ -1119,7 +1119,7 @@ impl<E> Sweep<'_, E> {
         }
     }
 
-    /// What the change of each setting did: of all pairs of runs that differ in it alone, the finest few whose time says
+    /// Effects of the change of each setting: of all pairs of runs that differ in it alone, the finest few whose time says
     /// something, or else the finest few, for each pair of values.
     fn effects(&self) -> Vec<Effect> {
         let entries = &self.found.entries;
