@@ -205,3 +205,51 @@ fn the_passes_over_a_program_are_called_from_one_place() {
     }
     assert_eq!(found, ["crates/stage/src/staged.rs"]);
 }
+
+/// Doc comments that may begin with a pronoun; the list only shrinks.
+const PRONOUNS_FIRST: [(&str, &str); 3] = [
+    ("crates/cli/src/arguments/scheme.rs", "Those of the updated Lagrangian formulation"),
+    ("crates/cli/src/arguments/score.rs", "What the points of files are."),
+    ("crates/codegen/src/rust/mod.rs", "What depends on the parameters only."),
+];
+
+/// A reader whose first language is another one finds the subject at the start of a doc comment.
+#[test]
+fn doc_comments_name_their_subject_first() {
+    fn comments(folder: &Path, found: &mut Vec<(String, String)>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let shown = path.strip_prefix(workspace()).unwrap().display().to_string();
+            if path.is_dir() && !path.ends_with("generated") && !path.ends_with("target") {
+                comments(&path, found);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                // The first line of each comment.
+                let mut before = "";
+                for line in text.lines().map(str::trim_start) {
+                    let comment = ["/// ", "//! "].iter().find_map(|mark| line.strip_prefix(mark));
+                    if let Some(comment) = comment.filter(|_| !before.starts_with("//")) {
+                        found.push((shown.clone(), comment.to_owned()));
+                    }
+                    before = line;
+                }
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for folder in ["crates", "xtask/src", "tests/src", "tests/tests", "python/src"] {
+        comments(&workspace().join(folder), &mut found);
+    }
+    assert!(found.len() > 3000, "{}", found.len());
+    let is_pronoun =
+        |text: &str| ["What ", "Those ", "The same ", "Of "].iter().any(|w| text.starts_with(w));
+    let is_exempt = |(file, text): &(String, String)| {
+        PRONOUNS_FIRST.iter().any(|(f, t)| file == f && text.starts_with(t))
+    };
+    let wrong: Vec<_> = found.iter().filter(|c| is_pronoun(&c.1) && !is_exempt(c)).collect();
+    assert!(wrong.is_empty(), "begin with a noun or a verb: {wrong:#?}");
+    for (file, text) in PRONOUNS_FIRST {
+        let is_there = found.iter().any(|(f, t)| f == file && t.starts_with(text));
+        assert!(is_there, "no exception is needed any more: {file}: {text}");
+    }
+}
