@@ -231,8 +231,6 @@ impl Geometry {
         if self.angles.is_empty() {
             return expr;
         }
-        let symbols: Vec<Expr> = self.angles.iter().map(|angle| angle.symbol).collect();
-        let expr = graph.with_half_angles(expr, &symbols);
         let mut known = BTreeMap::new();
         for call in graph.reachable(&[expr]) {
             let Node::Call(function @ (Function::Cos | Function::Sin | Function::Tan), arguments) =

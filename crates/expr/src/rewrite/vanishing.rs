@@ -9,26 +9,6 @@ use num_traits::{One, Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Graph {
-    /// `expr` with `1 - cos(a)` and the like as squares, for angles in which one of `symbols` occurs.
-    pub fn with_half_angles(&mut self, expr: Expr, symbols: &[Expr]) -> Expr {
-        let mut known = BTreeMap::new();
-        for sum in self.reachable(&[expr]) {
-            let Node::Sum { constant, terms } = self.node(sum) else { continue };
-            let [(term, coefficient)] = &**terms else { continue };
-            if constant.is_zero() {
-                continue;
-            }
-            let (constant, term, coefficient) = (constant.clone(), *term, coefficient.clone());
-            let inside = self.symbols_in(&[term]);
-            if symbols.iter().any(|symbol| inside.contains(symbol))
-                && let Some(square) = self.square_of_half(&constant, term, &coefficient)
-            {
-                known.insert(sum, square);
-            }
-        }
-        self.replace(expr, &known)
-    }
-
     /// `constant + coefficient * term` as a product, where there is one.
     pub(crate) fn constant_and_term(
         &mut self,
