@@ -6,7 +6,7 @@
 //!
 //! The libraries under it, in the order in which a specification meets them: [`mmsmith_spec`] reads and derives it,
 //! [`mmsmith_expr`] holds its expressions, [`mmsmith_stage`] decides what is computed when, [`mmsmith_codegen`] writes code, [`mmsmith_solutions`] holds that code,
-//! [`mmsmith_interpret`] does without it, [`mmsmith_prove`] and [`mmsmith_oracle`] judge both, `mmsmith-mpm` simulates,
+//! [`mmsmith_interpret`] does without it, [`mmsmith_claims`] and [`mmsmith_oracle`] judge both, `mmsmith-mpm` simulates,
 //! [`mmsmith_verify`] measures, [`mmsmith_vtk`] and [`mmsmith_ledger`] read and write files. The book in `docs/` has a guide, a
 //! reference and a map of the code.
 

@@ -13,8 +13,8 @@ use std::path::{Component, Path, PathBuf, is_separator};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
+use mmsmith_claims::admissible_value;
 use mmsmith_interpret::{interpret_staged, interpret_staged_single};
-use mmsmith_prove::admissible_value;
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
 use mmsmith_spec::{Parameter, Spec, nearest};
 use mmsmith_stage::Staged;

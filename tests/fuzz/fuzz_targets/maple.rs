@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use mmsmith_expr::Graph;
-use mmsmith_maple::Listing;
+use mmsmith_claims::maple::Listing;
 
 const NAMES: [&str; 9] = ["R", "H", "T", "E", "rho", "c1", "c2", "c3", "x"];
 

@@ -1,10 +1,10 @@
 //! `mms check`: is the field code right?
 
 use anyhow::{Result, bail};
-use mmsmith_expr::nearest_f64;
-use mmsmith_prove::{
+use mmsmith_claims::{
     Equality, Outcome, Published, Report, SurfaceFinding, surfaces as judge_surfaces,
 };
+use mmsmith_expr::nearest_f64;
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
     BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,

@@ -1,6 +1,6 @@
 //! Text to tokens.
 
-use crate::error::{ListingError, Problem};
+use crate::maple::error::{ListingError, Problem};
 use std::ops::Range;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

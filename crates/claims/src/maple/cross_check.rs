@@ -1,6 +1,6 @@
 //! Entries of a listing against derived expressions, in high precision.
 
-use crate::{BuildError, Listing};
+use crate::maple::{BuildError, Listing};
 use mmsmith_expr::{Expr, Graph, Rational, nearest_f64};
 use mmsmith_oracle::{Oracle, OracleError, Point, scientific};
 use num_traits::{Signed, Zero};

@@ -1,7 +1,7 @@
 //! Tokens to assignments.
 
-use crate::error::{ListingError, OPERATIONS, Problem};
-use crate::token::{Placed, Token, tokens};
+use crate::maple::error::{ListingError, OPERATIONS, Problem};
+use crate::maple::token::{Placed, Token, tokens};
 use mmsmith_expr::{Ast, AstKind, Function};
 use std::collections::BTreeMap;
 use std::ops::Range;

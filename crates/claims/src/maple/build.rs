@@ -1,6 +1,6 @@
 //! Assignments to expressions of a graph.
 
-use crate::Listing;
+use crate::maple::Listing;
 use mmsmith_expr::{Expr, Graph, Node, Rational};
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Reading of listings: what is accepted, and what each mistake is called.
 #![allow(clippy::unwrap_used)]
 
+use mmsmith_claims::maple::Listing;
 use mmsmith_expr::{Function, Graph};
-use mmsmith_maple::Listing;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! Published listings against the derived fields.
 
+use crate::maple::{CrossCheckError, Listing, Problem, Report, Target, cross_check};
 use crate::points::points;
 use mmsmith_expr::{Ast, AstKind, Expr, Graph};
-use mmsmith_maple::{CrossCheckError, Listing, Problem, Report, Target, cross_check};
 use mmsmith_spec::{CrossCheck, Diagnostic, Fields, LONGEST_FILE, ListingText, Spec, read_text};
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -99,7 +99,7 @@ impl<'a> Published<'a> {
         let derived: Vec<Expr> = targets.iter().map(|target| target.derived).collect();
         let points = points(self.spec, fields, &derived, None, POINTS)
             .map_err(|error| self.diagnostic(error.to_string(), &self.first_entry()))?;
-        let check = mmsmith_maple::CrossCheck {
+        let check = crate::maple::CrossCheck {
             graph: &fields.graph,
             definitions: &fields.definitions,
             listing: &self.listing,

@@ -1,8 +1,8 @@
 //! Reproducible points in the body and on its surfaces, for random admissible parameters.
 
+use crate::maple::sample;
 use crate::parameters::{VARIATION, admissible_value, near};
 use mmsmith_expr::{Dependence, Expr, Graph, Program, Rational, nearest_f64};
-use mmsmith_maple::sample;
 use mmsmith_oracle::{Oracle, Point, exact};
 use mmsmith_spec::{Domain, Fields, Parameter, Spec, Surface};
 use num_traits::One;

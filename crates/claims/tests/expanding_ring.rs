@@ -1,10 +1,10 @@
 //! The published listing of the ring's body force against the derived one, and against itself with errors planted.
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_expr::{Ast, Expr, Rational};
-use mmsmith_maple::{
+use mmsmith_claims::maple::{
     CrossCheck, CrossCheckError, Listing, Report, Target, Verdict, cross_check, sample,
 };
+use mmsmith_expr::{Ast, Expr, Rational};
 use mmsmith_spec::{Fields, Spec};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -16,7 +16,7 @@
 //!
 //! ```
 //! use mmsmith_expr::{Ast, Graph};
-//! use mmsmith_maple::{CrossCheck, Listing, Target, cross_check, sample};
+//! use mmsmith_claims::maple::{CrossCheck, Listing, Target, cross_check, sample};
 //! use std::collections::BTreeMap;
 //!
 //! let mut graph = Graph::new();
@@ -53,7 +53,7 @@
 //! `F[n*i + j]`. The check reports a line for each component, [`Component`]'s `Display`: `b[1] verified to 60 digits at 20 points`, or
 //! `b[1] differs at X = ..., t = ...: the listing gives ..., the derivation ...`; a refuted component makes the check
 //! fail. The call is [`cross_check`] with the names built by the specification's scope and the field's entries as
-//! targets, made by the crate `mmsmith-prove`.
+//! targets, made by this crate.
 
 mod build;
 mod cross_check;
