@@ -25,7 +25,7 @@ sys.path += [str(HERE), str(HERE.parent / "scikit-fem")]
 
 import plane  # noqa: E402
 
-BEGIN, END = "<!-- planted mistakes -->\n", "<!-- end of planted mistakes -->"
+HEAD = "| solver | mistake planted | named | order with the opposite |\n|---|---|---|---:|\n"
 #: The mistakes that are planted in each change.
 QUICK = {
     "NumPy": ["", "P transposed", "rho0 b for b", "b at t + dt", "boundary held", "starts at rest"],
@@ -173,20 +173,15 @@ def fortran(mms, folder, wanted):
 
 def merged(page, outcomes):
     """The page with the rows of these outcomes; rows of others stay."""
-    before, _, rest = page.partition(BEGIN)
-    inside, _, after = rest.partition(END)
+    before, _, rest = page.partition(HEAD)
+    inside, gap, after = rest.partition("\n\n")
     key = lambda row: row.split("|")[1:3]  # noqa: E731
-    rows = [row for row in inside.splitlines() if row.startswith("|")][2:]
+    rows = inside.splitlines()
     for outcome in outcomes:
         row = outcome.row()
         places = [index for index, known in enumerate(rows) if key(known) == key(row)]
         rows = [row if index in places else known for index, known in enumerate(rows)] + ([] if places else [row])
-    return before + BEGIN + "\n" + table(rows) + "\n" + END + after
-
-
-def table(rows):
-    head = ["| solver | mistake planted | named | order with the opposite |", "|---|---|---|---:|"]
-    return "\n".join([*head, *rows]) + "\n"
+    return before + HEAD + "\n".join(rows) + (gap + after if gap else "\n")
 
 
 def main():

@@ -124,9 +124,14 @@ impl Workplace {
     /// Runs a script in the folder.
     pub(crate) fn run(&self, script: &str) -> anyhow::Result<Printed> {
         let start = Instant::now();
+        // Scripts that a block calls find the program as well.
+        let own = self.mms.parent().map(Path::to_path_buf);
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let path = std::env::join_paths(own.into_iter().chain(std::env::split_paths(&path)))?;
         let output = Command::new("sh")
             .args(["-c", &format!("{PRELUDE}{script}")])
             .current_dir(&self.folder)
+            .env("PATH", path)
             .env("MMS", &self.mms)
             .env("REPOSITORY", &self.repository)
             .env("NO_COLOR", "1")
