@@ -62,7 +62,7 @@ class Orders:
 
     def to_pandas(self) -> Any:
         """The table as a `pandas.DataFrame` over the steps."""
-        import pandas
+        import pandas  # type: ignore[import-untyped, import-not-found, unused-ignore]
 
         columns: dict[str, tuple[float, ...]] = {}
         for field, errors in self.errors.items():

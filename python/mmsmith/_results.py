@@ -68,7 +68,7 @@ class Result(dict[str, Any]):
     def to_pandas(self, part: str | None = None) -> Any:
         """The rows as a `pandas.DataFrame`, a column for each number; or another part of the result, such as the `history` of a run."""
         try:
-            import pandas
+            import pandas  # type: ignore[import-untyped, import-not-found, unused-ignore]
         except ImportError:
             raise ImportError("to_pandas() needs pandas: pip install pandas. Without it there is records()") from None
         return pandas.DataFrame(self.records() if part is None else self[part])
