@@ -11,6 +11,7 @@ Exit status: 0 where all do, 1 where one does not.
 """
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +25,7 @@ LEAST_ORDER = 1.8
 
 
 def main(mms, folder, cells, *schemes):
+    os.environ["MMS"] = mms
     failed = False
     for scheme in schemes or FORCE_AT:
         recordings = []

@@ -8,6 +8,7 @@ Exit status: 0 where all do, 1 where one does not.
 """
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ ORDERS = {"u": 3.0, "F": 2.0, "P": 2.0}
 
 
 def main(mms, folder, cells):
+    os.environ["MMS"] = mms
     recordings = [Path(folder) / count for count in cells.split(",")]
     for count, recording in zip(cells.split(","), recordings):
         steps, points, seconds = run(int(count), recording, amplitude=AMPLITUDE)
