@@ -106,15 +106,30 @@ pub fn outcome(command: &mut Command) -> (Option<i32>, String, String) {
     (status.code(), text(stdout), text(stderr))
 }
 
-/// Runs `mms` with the arguments and `--json`, and returns what it wrote.
+/// Runs `mms` with the arguments and `--json`, and returns what it wrote; the run has to be a success.
 #[must_use]
 pub fn json(arguments: &[&str]) -> Value {
+    let (status, value, errors) = with_json(arguments);
+    assert_eq!(status, Some(0), "mms {}\n{errors}", arguments.join(" "));
+    value
+}
+
+/// As [`json`] where a run may fail: the exit status has to be 1 where the result says `"passed": false`, and 0 else.
+#[must_use]
+pub fn json_as_judged(arguments: &[&str]) -> Value {
+    let (status, value, errors) = with_json(arguments);
+    let expected = i32::from(value["passed"] == false);
+    assert_eq!(status, Some(expected), "mms {}\n{errors}", arguments.join(" "));
+    value
+}
+
+fn with_json(arguments: &[&str]) -> (Option<i32>, Value, String) {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let file = folder.path().join("out.json");
-    let (status, _, stderr) = outcome(mms().args(arguments).arg("--json").arg(&file));
-    assert_eq!(status, Some(0), "mms {}\n{stderr}", arguments.join(" "));
-    let text = std::fs::read_to_string(&file).expect("the file was written");
-    serde_json::from_str(&text).expect("the file is JSON")
+    let (status, _, errors) = outcome(mms().args(arguments).arg("--json").arg(&file));
+    let text = std::fs::read_to_string(&file);
+    let text = text.unwrap_or_else(|_| panic!("mms {}\n{errors}", arguments.join(" ")));
+    (status, serde_json::from_str(&text).expect("the file is JSON"), errors)
 }
 
 /// The numbers at `path` in each row of a result.

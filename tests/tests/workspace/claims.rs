@@ -6,21 +6,21 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_tests::{at, column, json, mms, outcome};
+use mmsmith_tests::{at, column, json, json_as_judged, mms, outcome};
 use mmsmith_vtk::Values;
 use serde_json::{Value, json};
 
 /// L_inf of the displacement over cell counts; infinite where the case did not reach the end.
 fn errors(name: &str, shape: &str, integrator: &str, cells: &str) -> Vec<f64> {
     let options = ["--shape", shape, "--integrator", integrator, "--cells", cells];
-    finished(&json(&[&["converge", name][..], &options].concat()))
+    finished(&json_as_judged(&[&["converge", name][..], &options].concat()))
 }
 
 /// [`errors`] over CFL numbers on one grid.
 fn errors_over_time_steps(name: &str, shape: &str, integrator: &str, cfls: &str) -> Vec<f64> {
     let grid = ["--cells", "32", "--cfls", cfls];
     let options = ["--shape", shape, "--integrator", integrator];
-    finished(&json(&[&["converge", name][..], &grid, &options].concat()))
+    finished(&json_as_judged(&[&["converge", name][..], &grid, &options].concat()))
 }
 
 fn finished(result: &Value) -> Vec<f64> {
@@ -186,11 +186,11 @@ fn stability_is_lost_below_cfl_one() {
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn rows_and_columns_stay_straight_only_with_the_right_answer() {
     // The spread of u_x along columns of particles that share X, largest over columns and frames.
-    let spread = |shape: &str| {
+    let spread = |shape: &str, expected: i32| {
         let folder = tempfile::tempdir().unwrap();
         let options = ["run", "axis-aligned", "--cells", "32", "--frames", "5", "--shape", shape];
         let (status, _, errors) = outcome(mms().args(options).arg("--vtk").arg(folder.path()));
-        assert_eq!(status, Some(0), "{errors}");
+        assert_eq!(status, Some(expected), "{errors}");
         let mut largest = 0.0_f64;
         let mut frames = 0;
         for entry in std::fs::read_dir(folder.path()).unwrap() {
@@ -214,7 +214,8 @@ fn rows_and_columns_stay_straight_only_with_the_right_answer() {
         assert!(frames >= 5);
         largest
     };
-    let (gimp, linear) = (spread("gimp"), spread("linear"));
+    // The errors of hat functions exceed the motion.
+    let (gimp, linear) = (spread("gimp", 0), spread("linear", 1));
     let cell = 1.0 / 32.0;
     assert!(gimp < 0.05 * cell, "{gimp:e}");
     assert!(linear > 0.5 * cell, "{linear:e}");
@@ -262,7 +263,7 @@ fn on_the_ring_a_smaller_time_step_gains_little() {
 #[test]
 #[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
 fn plain_mpm_stops_on_the_ring_with_an_inverted_surface_particle() {
-    let result = json(&["run", "ring", "--shape", "linear", "--cells", "16"]);
+    let result = json_as_judged(&["run", "ring", "--shape", "linear", "--cells", "16"]);
     let status = result["result"]["status"].as_str().unwrap();
     assert!(status.contains("J ") && status.contains("particle"), "{status}");
 }
