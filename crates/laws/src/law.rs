@@ -7,7 +7,7 @@ use mmsmith_lanes::tensor::{product, real};
 use mmsmith_vocabulary::{Material, Moduli, Term};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
-use super::memory::{AtRest, InternalVariable, LawWithMemory};
+use super::memory::{AtRest, InternalVariable, LawWithMemory, set};
 use super::{BLOCK, SIDE_BY_SIDE, Stressed, jacobian};
 
 /// The stress of a law that the caller brings, for particles in blocks.
@@ -379,13 +379,7 @@ impl<T: RealField + Copy, const D: usize> BlockOfStresses<T, D> {
     /// Sets the deformation gradient of particle `n` of the block. Laws are asked for deformations alone.
     #[inline(always)]
     pub fn set(&mut self, n: usize, F: &SMatrix<T, D, D>) {
-        self.is_deformation[n] = jacobian(F).is_some();
-        for i in 0..D {
-            for j in 0..D {
-                let rest = if i == j { T::one() } else { T::zero() };
-                self.F[i][j][n] = if self.is_deformation[n] { F[(i, j)] } else { rest };
-            }
-        }
+        self.is_deformation[n] = set(&mut self.F, n, F);
     }
 
     /// Computes the stresses of the block.

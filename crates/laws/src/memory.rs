@@ -137,7 +137,8 @@ impl<T: RealField + Copy, const D: usize> BlockWithMemory<T, D> {
 }
 
 /// Sets the deformation gradient of particle `n`; at rest where it is none, as laws are asked for deformations alone. Whether it is one.
-fn set<T: RealField + Copy, const D: usize>(
+#[inline(always)]
+pub(crate) fn set<T: RealField + Copy, const D: usize>(
     all: &mut [[[T; BLOCK]; D]; D],
     n: usize,
     F: &SMatrix<T, D, D>,

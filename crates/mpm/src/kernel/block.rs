@@ -182,11 +182,21 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
             block.set(n, F);
         }
         block.evaluate(self.0.as_ref());
-        for (n, F) in F.iter().enumerate() {
-            let tau = product(&block.stress(n), &F.transpose());
-            let tau = c.planted.stress_in_forces(tau, F);
-            contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
-        }
+        set_fluxes(c, F, |n| block.stress(n), contributions);
+    }
+}
+
+/// Sets the stress fluxes of a block whose first Piola-Kirchhoff stresses `P` gives, particle by particle.
+fn set_fluxes<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    F: &[SMatrix<T, D, D>; BLOCK],
+    P: impl Fn(usize) -> SMatrix<T, D, D>,
+    contributions: &mut Contributions<T, D, BLOCK>,
+) {
+    for (n, F) in F.iter().enumerate() {
+        let tau = product(&P(n), &F.transpose());
+        let tau = c.planted.stress_in_forces(tau, F);
+        contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
     }
 }
 
@@ -215,11 +225,7 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
     ) {
         let mut block = BlockWithMemory::at_rest(&self.variables);
         let stress = block.stresses(self.law.as_ref(), F, internal);
-        for (n, F) in F.iter().enumerate() {
-            let tau = product(&stress(n), &F.transpose());
-            let tau = c.planted.stress_in_forces(tau, F);
-            contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
-        }
+        set_fluxes(c, F, stress, contributions);
     }
 
     fn at_rest(&self) -> &[T] {
