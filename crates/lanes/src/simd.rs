@@ -14,9 +14,6 @@ use crate::tensor::real;
 
 /// A loop for vector instructions. `run` and all functions that it calls have to be `#[inline(always)]`.
 pub trait Loop {
-    /// Whether it has an instance for registers of 512 bits. On a line, where no run takes long, those of 256 bits do.
-    const WIDE: bool;
-
     /// The loop, with the operations of the registers.
     fn run<V: Vectors>(self, vectors: V);
 }
@@ -26,7 +23,7 @@ pub trait Loop {
 #[repr(C, align(32))]
 pub struct Lane4<T>(pub [T; 4]);
 
-/// Eight numbers in the lanes of one register, or of two where registers are shorter.
+/// Eight numbers in the lanes of one register in single precision, of two in double precision.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Lane8<T>(pub [T; 8]);
@@ -257,10 +254,7 @@ impl<T: Lanes, V: Vectors> Number for Eight<T, V> {
 /// The operations are functions of the number's type, not questions for it: a kernel calls them some thousand times, and each
 /// question would have to be answered for each call before anything else is compiled.
 #[cfg(target_arch = "x86_64")]
-pub trait Lanes:
-    RealField + Pod + x86::Instructions<pulp::x86::V3> + x86::Instructions<pulp::x86::V4>
-{
-}
+pub trait Lanes: RealField + Pod + x86::Instructions {}
 
 /// A number that registers hold several of: `f64` or `f32`.
 #[cfg(not(target_arch = "x86_64"))]
@@ -273,33 +267,32 @@ impl Lanes for f32 {}
 mod x86 {
     use super::{Lane4, Lane8, Lanes, Vectors};
     use bytemuck::{bytes_of, must_cast, pod_read_unaligned};
-    use pulp::x86::{V3, V4};
-    use std::arch::x86_64::{__m128, __m256, __m256d, __m512d, _MM_HINT_T0};
+    use pulp::x86::V3;
+    use std::arch::x86_64::{__m128, __m256, __m256d, _MM_HINT_T0};
 
     /// Bytes that pass from memory at once.
     const CACHE_LINE: usize = 64;
 
-    /// The instructions for an operation on four numbers and for one on eight, in double and in single precision. Registers of 512 bits
-    /// hold eight numbers in double precision, others half of them.
+    /// The instructions for an operation on four numbers and for one on eight, in double and in single precision.
     macro_rules! instructions {
         (
             $(fn $four:ident($vectors:ident, $($a:ident),*) { $double:expr, $single:expr })*
             eight:
             $(fn $eight:ident($vectors8:ident, $($a8:ident),*) {
-                $wide:expr, each half $half:expr, $single8:expr
+                each half $half:expr, $single8:expr
             })*
         ) => {
-            /// The operations of [`Vectors`] in the registers `V`.
-            pub trait Instructions<V>: Sized {
-                $(fn $four(vectors: V, $($a: Lane4<Self>),*) -> Lane4<Self>;)*
-                $(fn $eight(vectors: V, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
-                fn splat(vectors: V, value: Self) -> Lane4<Self>;
-                fn splat8(vectors: V, value: Self) -> Lane8<Self>;
-                fn load(vectors: V, values: &[Self; 4]) -> Lane4<Self>;
-                fn load8(vectors: V, values: &[Self; 8]) -> Lane8<Self>;
+            /// The operations of [`Vectors`] in registers of 256 bits.
+            pub trait Instructions: Sized {
+                $(fn $four(vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self>;)*
+                $(fn $eight(vectors: V3, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
+                fn splat(vectors: V3, value: Self) -> Lane4<Self>;
+                fn splat8(vectors: V3, value: Self) -> Lane8<Self>;
+                fn load(vectors: V3, values: &[Self; 4]) -> Lane4<Self>;
+                fn load8(vectors: V3, values: &[Self; 8]) -> Lane8<Self>;
             }
 
-            impl Instructions<V3> for f64 {
+            impl Instructions for f64 {
                 $(#[inline(always)]
                 fn $four($vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self> {
                     $(let $a: __m256d = must_cast($a.0);)*
@@ -341,7 +334,7 @@ mod x86 {
                 }
             }
 
-            impl Instructions<V3> for f32 {
+            impl Instructions for f32 {
                 $(#[inline(always)]
                 fn $four($vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self> {
                     $(let $a: __m128 = must_cast($a.0);)*
@@ -375,107 +368,35 @@ mod x86 {
                 }
             }
 
-            impl Instructions<V4> for f64 {
-                $(#[inline(always)]
-                fn $four(vectors: V4, $($a: Lane4<Self>),*) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::$four(*vectors, $($a),*)
-                })*
-
-                $(#[inline(always)]
-                fn $eight($vectors8: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
-                    $(let $a8: __m512d = must_cast($a8.0);)*
-                    Lane8(must_cast($wide))
-                })*
-
-                #[inline(always)]
-                fn splat(vectors: V4, value: Self) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::splat(*vectors, value)
-                }
-
-                #[inline(always)]
-                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
-                    Lane8(must_cast(vectors.avx512f._mm512_set1_pd(value)))
-                }
-
-                #[inline(always)]
-                fn load(vectors: V4, values: &[Self; 4]) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::load(*vectors, values)
-                }
-
-                #[inline(always)]
-                fn load8(_: V4, values: &[Self; 8]) -> Lane8<Self> {
-                    Lane8(must_cast(pod_read_unaligned::<__m512d>(bytes_of(values))))
-                }
-            }
-
-            impl Instructions<V4> for f32 {
-                $(#[inline(always)]
-                fn $four(vectors: V4, $($a: Lane4<Self>),*) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::$four(*vectors, $($a),*)
-                })*
-
-                $(#[inline(always)]
-                fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
-                    <Self as Instructions<V3>>::$eight(*vectors, $($a8),*)
-                })*
-
-                #[inline(always)]
-                fn splat(vectors: V4, value: Self) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::splat(*vectors, value)
-                }
-
-                #[inline(always)]
-                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
-                    <Self as Instructions<V3>>::splat8(*vectors, value)
-                }
-
-                #[inline(always)]
-                fn load(vectors: V4, values: &[Self; 4]) -> Lane4<Self> {
-                    <Self as Instructions<V3>>::load(*vectors, values)
-                }
-
-                #[inline(always)]
-                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self> {
-                    <Self as Instructions<V3>>::load8(*vectors, values)
-                }
-            }
-
-            instructions!(vectors V3: [$($four($($a),*))*] eight: [$($eight($($a8),*))*]);
-            instructions!(vectors V4: [$($four($($a),*))*] eight: [$($eight($($a8),*))*]);
-        };
-
-        (
-            vectors $V:ident: [$($four:ident($($a:ident),*))*] eight: [$($eight:ident($($a8:ident),*))*]
-        ) => {
-            impl Vectors for $V {
+            impl Vectors for V3 {
                 $(#[inline(always)]
                 fn $four<T: Lanes>(self, $($a: Lane4<T>),*) -> Lane4<T> {
-                    <T as Instructions<$V>>::$four(self, $($a),*)
+                    <T as Instructions>::$four(self, $($a),*)
                 })*
 
                 $(#[inline(always)]
                 fn $eight<T: Lanes>(self, $($a8: Lane8<T>),*) -> Lane8<T> {
-                    <T as Instructions<$V>>::$eight(self, $($a8),*)
+                    <T as Instructions>::$eight(self, $($a8),*)
                 })*
 
                 #[inline(always)]
                 fn splat<T: Lanes>(self, value: T) -> Lane4<T> {
-                    <T as Instructions<$V>>::splat(self, value)
+                    <T as Instructions>::splat(self, value)
                 }
 
                 #[inline(always)]
                 fn splat8<T: Lanes>(self, value: T) -> Lane8<T> {
-                    <T as Instructions<$V>>::splat8(self, value)
+                    <T as Instructions>::splat8(self, value)
                 }
 
                 #[inline(always)]
                 fn load<T: Lanes>(self, values: &[T; 4]) -> Lane4<T> {
-                    <T as Instructions<$V>>::load(self, values)
+                    <T as Instructions>::load(self, values)
                 }
 
                 #[inline(always)]
                 fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
-                    <T as Instructions<$V>>::load8(self, values)
+                    <T as Instructions>::load8(self, values)
                 }
 
                 #[inline(always)]
@@ -517,37 +438,30 @@ mod x86 {
         }
         eight:
         fn add8(vectors, a, b) {
-            vectors.avx512f._mm512_add_pd(a, b),
             each half vectors.avx._mm256_add_pd(a, b),
             vectors.avx._mm256_add_ps(a, b)
         }
         fn mul8(vectors, a, b) {
-            vectors.avx512f._mm512_mul_pd(a, b),
             each half vectors.avx._mm256_mul_pd(a, b),
             vectors.avx._mm256_mul_ps(a, b)
         }
         fn sub8(vectors, a, b) {
-            vectors.avx512f._mm512_sub_pd(a, b),
             each half vectors.avx._mm256_sub_pd(a, b),
             vectors.avx._mm256_sub_ps(a, b)
         }
         fn div8(vectors, a, b) {
-            vectors.avx512f._mm512_div_pd(a, b),
             each half vectors.avx._mm256_div_pd(a, b),
             vectors.avx._mm256_div_ps(a, b)
         }
         fn min8(vectors, a, b) {
-            vectors.avx512f._mm512_min_pd(a, b),
             each half vectors.avx._mm256_min_pd(a, b),
             vectors.avx._mm256_min_ps(a, b)
         }
         fn max8(vectors, a, b) {
-            vectors.avx512f._mm512_max_pd(a, b),
             each half vectors.avx._mm256_max_pd(a, b),
             vectors.avx._mm256_max_ps(a, b)
         }
         fn mul_add8(vectors, a, b, c) {
-            vectors.avx512f._mm512_fmadd_pd(a, b, c),
             each half vectors.fma._mm256_fmadd_pd(a, b, c),
             vectors.fma._mm256_fmadd_ps(a, b, c)
         }
@@ -573,21 +487,17 @@ pub enum Registers {
     Scalar,
     /// Registers of four doubles (AVX2 with fused multiply-adds).
     Avx2,
-    /// Registers of eight doubles (AVX-512).
-    Avx512,
 }
 
 /// The widest registers that kernels may use.
-static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx512 as u8);
+static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx2 as u8);
 
 impl Registers {
     /// The registers that this processor has.
     pub fn present() -> Vec<Self> {
         match Arch::new() {
             #[cfg(target_arch = "x86_64")]
-            Arch::V4(_) => vec![Self::Scalar, Self::Avx2, Self::Avx512],
-            #[cfg(target_arch = "x86_64")]
-            Arch::V3(_) => vec![Self::Scalar, Self::Avx2],
+            Arch::V3(_) | Arch::V4(_) => vec![Self::Scalar, Self::Avx2],
             _ => vec![Self::Scalar],
         }
     }
@@ -604,12 +514,6 @@ pub fn dispatch<L: Loop>(work: L) {
     #[cfg(target_arch = "x86_64")]
     {
         let (arch, widest) = (Arch::new(), WIDEST.load(Ordering::Relaxed));
-        if L::WIDE
-            && let Arch::V4(simd) = arch
-            && widest > Registers::Avx2 as u8
-        {
-            return Simd::vectorize(simd, Instance(work, simd));
-        }
         let avx2 = match arch {
             Arch::V4(simd) => Some(*simd),
             Arch::V3(simd) => Some(simd),
@@ -687,6 +591,5 @@ mod tests {
     #[test]
     fn instructions_do_what_is_written_out_for_processors_without_them() {
         pulp::x86::V3::try_new().into_iter().for_each(check);
-        pulp::x86::V4::try_new().into_iter().for_each(check);
     }
 }

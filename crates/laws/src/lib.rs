@@ -207,8 +207,6 @@ struct SideBySide<'a, T, L, const D: usize> {
 }
 
 impl<T: RealField + Copy, L: LibraryLaw<T>, const D: usize> Loop for SideBySide<'_, T, L, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { law, F, P } = self;

@@ -252,8 +252,6 @@ struct Stress<'a, T, L, const D: usize> {
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { F, c, law, contributions } = self;

@@ -214,8 +214,6 @@ struct Compute<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for Compute<'_, T, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { own, c, half_edges, ids, kinematics } = self;
@@ -394,8 +392,6 @@ struct P2gOfBlock<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let P2gOfBlock { own, weights, strides, band, first, contributions, count } = self.0;
@@ -469,8 +465,6 @@ struct G2pOfBlock<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let G2pOfBlock { own, strides, nodes, receiver } = self.0;

@@ -82,8 +82,6 @@ pub(crate) struct ToGrid<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { c, corners, sums, affine_sums, band, first, ids } = self;
@@ -199,8 +197,6 @@ pub(crate) struct FromGrid<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { c, corners, nodes, first, values, moments } = self;

@@ -296,8 +296,6 @@ where
     T: Lanes,
     R: ShapeFunction<W>,
 {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, l: reference, .. } = self;
@@ -422,8 +420,6 @@ struct P2gOfBlock<'a, T, const D: usize> {
 impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     for P2g<'_, T, D, W, AFFINE>
 {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
@@ -475,8 +471,6 @@ where
     T: Lanes,
     A: Receive<T, D>,
 {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(G2pOfBlock { weights, strides, nodes, count, mut receiver }) = self;

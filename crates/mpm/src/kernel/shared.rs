@@ -90,8 +90,6 @@ struct MeasureNext<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for MeasureNext<'_, '_, T, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, particles: (first, count), have_volume } = self;
@@ -231,8 +229,6 @@ impl<T: Lanes, const D: usize> Giving<T, D> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D, AFFINE> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let ToCorners { c, corners, at, shares, particles, contributions, sums, affine_sums } =
@@ -380,8 +376,6 @@ impl<T: Lanes, const D: usize> Over<T, D> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T, D, AFFINE> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let FromCorners { c, corners, shares, values, first, receiver } = self.0;

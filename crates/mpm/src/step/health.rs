@@ -197,8 +197,6 @@ struct CheckBoxes<'a, 'b, T, const D: usize, const STRETCHING: bool> {
 impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
     for CheckBoxes<'_, '_, T, D, STRETCHING>
 {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
@@ -249,8 +247,6 @@ struct CheckParallelograms<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
-    const WIDE: bool = D > 1;
-
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, half_edges, ids, all_valid } = self;

@@ -81,5 +81,5 @@ fn all_registers_and_numbers_of_threads_give_the_same_bits() {
     check::<f32, 1>();
     check::<f32, 2>();
     check::<f32, 3>();
-    Registers::Avx512.use_at_most();
+    Registers::Avx2.use_at_most();
 }
