@@ -151,6 +151,7 @@ mod domain;
 mod error;
 mod grid;
 mod kernel;
+mod named;
 mod parallel;
 mod particles;
 mod processes;
@@ -160,6 +161,7 @@ mod simulation;
 mod solver;
 mod step;
 
+pub use domain::Shape;
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
 pub use mmsmith_lanes::simd::Registers;
@@ -169,6 +171,7 @@ pub use mmsmith_laws::{
     BLOCK, ConstitutiveLaw, Increment, InternalVariable, Law, LawCheck, LawWithMemory, Material,
     SIDE_BY_SIDE, Stressed, Volumetric,
 };
+pub use named::UnknownName;
 #[doc(hidden)]
 pub use parallel::chunks::{each, each_chunk};
 pub use particles::Particles;
@@ -177,7 +180,7 @@ pub use particles::clip::{Clip, Facet, Side};
 pub use particles::mesh::{Faces, Interpolation, Load, Mesh, Numbers};
 pub use processes::decomposition::{Arrangement, Share};
 pub use processes::saved_state::{SavedState, SavedStateError, replace_whole};
-pub use scheme::{Integrator, Settings, Shape, Transfer, UnknownName};
+pub use scheme::{Integrator, Settings, Transfer};
 pub use simulation::{Simulated, Simulation};
 pub use solver::{Scalar, Solver};
 pub use step::body_force::{AtTime, BodyForce, NoBodyForce};

@@ -3,97 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Enums whose values have names that options, files and captions share, and a line about each: the first of its documentation.
-macro_rules! named {
-    ($(
-        $(#[$of_enum:meta])*
-        pub enum $Enum:ident {
-            $(#[doc = $about:literal] $(#[doc = $more:literal])* $Value:ident = $name:literal,)+
-        }
-    )+) => {$(
-        $(#[$of_enum])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum $Enum {
-            $(#[doc = $about] $(#[doc = $more])* $Value,)+
-        }
-
-        impl $Enum {
-            /// All there are.
-            pub const ALL: [Self; [$(Self::$Value),+].len()] = [$(Self::$Value),+];
-
-            /// The name that the field has for it.
-            #[must_use]
-            pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$Value => $name,)+
-                }
-            }
-
-            /// A line about it.
-            #[must_use]
-            pub fn about(self) -> &'static str {
-                match self {
-                    $(Self::$Value => $about.trim_ascii(),)+
-                }
-            }
-        }
-
-        impl fmt::Display for $Enum {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.pad(self.name())
-            }
-        }
-
-        impl FromStr for $Enum {
-            type Err = UnknownName;
-
-            fn from_str(name: &str) -> Result<Self, UnknownName> {
-                let known = || Self::ALL.map(Self::name).join(", ");
-                Self::ALL
-                    .into_iter()
-                    .find(|value| value.name() == name)
-                    .ok_or_else(|| UnknownName { known: known() })
-            }
-        }
-    )+};
-}
+use crate::domain::Shape;
+use crate::named::{UnknownName, named};
 
 named! {
-    /// Shape functions, whose values at particles are the weights of P2G and G2P.
-    pub enum Shape {
-        /// Hat functions at the particle's point
-        Linear = "linear",
-        /// GIMP weights of fixed size
-        Ugimp = "ugimp",
-        /// GIMP weights that follow the particle's stretch
-        ///
-        /// The boxes stretch with the diagonal of F.
-        Gimp = "gimp",
-        /// Quadratic splines
-        ///
-        /// B-splines about the nodes, at the particle's centre. Splines beyond a wall are folded on their mirror images, the
-        /// component across the wall with the opposite sign. The weights so add up to one in every cell, and fields that are
-        /// linear and vanish across the wall on it are reproduced: of linear fields these are all that a frictionless wall
-        /// admits. Beyond an open face the nodes go on, and all linear fields are reproduced there. (Steffen, Kirby & Berzins,
-        /// IJNME 76 (2008) 922-948, change the splines at the boundary instead. With lumped mass that costs an order there:
-        /// the changed spline's centre of mass is not where its coefficient is.)
-        Bspline2 = "bspline2",
-        /// Cubic splines
-        ///
-        /// Walls as for `Bspline2`.
-        Bspline3 = "bspline3",
-        /// Parallelograms that deform with the particle
-        ///
-        /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
-        /// & Burghardt, IJNME 86 (2011) 1435-1456); segments, parallelograms, parallelepipeds.
-        Cpdi = "cpdi",
-        /// Quadrilaterals (in space hexahedra) whose corners neighbours share
-        ///
-        /// `Cpdi` on segments, quadrilaterals and hexahedra whose corners are points of the body, which move with
-        /// the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
-        Cpdi2 = "cpdi2",
-    }
-
     /// Time integration.
     pub enum Integrator {
         /// Update stress first
@@ -119,21 +32,6 @@ named! {
         Cd = "cd",
     }
 }
-
-/// A name that nothing has.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnknownName {
-    /// The names that there are.
-    known: String,
-}
-
-impl fmt::Display for UnknownName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it must be one of {}", self.known)
-    }
-}
-
-impl std::error::Error for UnknownName {}
 
 impl Integrator {
     /// The share of a step by which F is updated before the forces.
@@ -238,8 +136,8 @@ impl FromStr for Transfer {
             .into_iter()
             .chain(filtered())
             .find(|transfer| transfer.to_string() == name)
-            .ok_or_else(|| UnknownName {
-                known: format!("flip, pic, apic, xpic1 to xpic{}", Self::HIGHEST_ORDER),
+            .ok_or_else(|| {
+                UnknownName::among(format!("flip, pic, apic, xpic1 to xpic{}", Self::HIGHEST_ORDER))
             })
     }
 }

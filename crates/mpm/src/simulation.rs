@@ -8,9 +8,11 @@ use mmsmith_laws::fault::Fault;
 use mmsmith_laws::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog, Stressed};
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_exchange::Exchange;
 use crate::domain::corner_exchange::invalidity_of_corner;
+use crate::domain::corners::Corners;
+use crate::domain::of_particles::axis_too_large;
+use crate::domain::shared_corners::SharedCorners;
+use crate::domain::{self, Shape};
 use crate::error::{SetupError, StepError};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
@@ -23,7 +25,7 @@ use crate::particles::body::Body;
 use crate::particles::columns::Shares;
 use crate::particles::mesh::{Interpolation, Mesh};
 use crate::processes::decomposition::{Arrangement, Part, Share, admit};
-use crate::scheme::{Settings, Shape, Taken};
+use crate::scheme::{Settings, Taken};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome};
@@ -149,18 +151,14 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         check(&grid, &body, &settings, share.as_ref())?;
         let mut state = allocate(&grid, body, of_blocks(&law), &settings, share)?;
-        let Particles { x, F, .. } = &state.particles;
-        let worst = (0..x.len()).filter_map(|p| {
-            Some((state.support.invalidity(&state.constants, p, &x[p], &F[p])?, p))
+        let of_particles =
+            (0..state.particles.x.len()).filter_map(|p| Some((state.invalidity(p)?, p)));
+        let corners = state.corners.as_deref().map(|Corners { shared, .. }| shared);
+        let of_corners = corners.into_iter().flat_map(|corners| {
+            let all = 0..corners.count();
+            all.filter_map(|corner| invalidity_of_corner(&state.constants, corners, corner))
         });
-        let worst = match &state.support {
-            Support::Mesh(corners) => {
-                let of_corners = (0..corners.count())
-                    .filter_map(|corner| invalidity_of_corner(&state.constants, corners, corner));
-                worst.chain(of_corners).min()
-            }
-            _ => worst.min(),
-        };
+        let worst = of_particles.chain(of_corners).min();
         let outcome = state.agree(Outcome { failure: worst, resort: false });
         if let Some((invalid, particle)) = outcome.failure {
             return Err(SetupError::InitialState(tell(&state, invalid, particle, 0, T::zero())));
@@ -223,10 +221,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// The domains of the particles at the current time, where they share corners.
     pub fn mesh(&self) -> Option<&Mesh<T, D>> {
-        match &self.state.support {
-            Support::Mesh(corners) => Some(&corners.mesh),
-            _ => None,
-        }
+        self.state.corners.as_ref().map(|corners| &corners.shared.mesh)
     }
 
     /// Number of completed steps.
@@ -408,17 +403,19 @@ fn check<T: Lanes, const D: usize>(
 /// Reserves all memory of a run.
 fn allocate<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
-    mut body: Body<T, D>,
+    body: Body<T, D>,
     law: Box<dyn BlockLaw<T, D>>,
     settings: &Settings<T>,
     share: Option<Share>,
 ) -> Result<State<T, D>, SetupError> {
     let Settings { shape, integrator, transfer, .. } = *settings;
-    let count = body.particles.x.len();
-    if shape == Shape::Cpdi && body.half_edges.is_empty() {
-        body.half_edges = vec![SMatrix::from_diagonal(&body.particles.half_size); count];
-    }
-    let (support, mut particles) = Support::new(shape, body, grid.spacing);
+    let Body { mut particles, half_edges, mesh } = body;
+    let count = particles.x.len();
+    let domain = domain::new(shape, half_edges, &particles.half_size, grid.spacing);
+    let corners = mesh.and_then(|mesh| {
+        let at_corner = domain::at_corners(shape, &mesh)?;
+        Some(SharedCorners::new(mesh, at_corner))
+    });
     let at_rest = law.at_rest();
     let (found, expected) = (particles.internal.len(), count * at_rest.len());
     if found == 0 {
@@ -434,15 +431,12 @@ fn allocate<T: Lanes, const D: usize>(
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
     // Sums for the next step are on a grid of their own, unless they are at corners.
-    let ahead = filtered || (fused && !matches!(support, Support::Mesh(_)));
+    let ahead = filtered || (fused && corners.is_none());
     let grids = 1 + usize::from(reprojects) + usize::from(ahead);
     let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
     let mut layout = Layout::new(grid, bytes_per_node)?;
-    let points = match &support {
-        Support::Mesh(corners) => corners.count(),
-        _ => count,
-    };
+    let points = corners.as_ref().map_or(count, SharedCorners::count);
     let mut bins = Bins::new(&layout, points);
     let part = share.map(Part::new);
     if let Some(part) = &part {
@@ -491,16 +485,14 @@ fn allocate<T: Lanes, const D: usize>(
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
         buffers: BufferPool::new(),
-        exchange: Exchange::new(
-            &support,
-            mass_of_cell,
-            transfer.is_affine(),
-            integrator.reprojects(),
-        ),
+        corners: corners.map(|corners| {
+            let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
+            Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
+        }),
         of_time: Vec::new(),
         shares,
         particles,
-        support,
+        domain,
         law,
         transfer,
         layout,
@@ -530,14 +522,15 @@ fn describe<T: Lanes, const D: usize>(
     step: usize,
     time: T,
 ) -> StepError {
-    let State { constants: c, support, particles, .. } = state;
+    let State { constants: c, domain, particles, .. } = state;
+    let corners = state.corners.as_deref().map(|Corners { shared, .. }| shared);
     let (x, F) = (&particles.x[particle], &particles.F[particle]);
     let position = x.iter().map(|&x| figure(x)).collect();
     let (time, J) = (figure(time), figure(determinant(F)));
     match invalid {
         // It may be the domain between the corners that is inverted.
         Invalid::Inverted if J > 0.0 => {
-            let volume = support.volume(particle).map_or(J, figure);
+            let volume = corners.map_or(J, |corners| figure(corners.volume(particle)));
             let J = volume / figure(particles.volume[particle]);
             StepError::Inverted { step, time, particle, J }
         }
@@ -545,14 +538,10 @@ fn describe<T: Lanes, const D: usize>(
         Invalid::NotFinite => StepError::NotFinite { step, time, particle, position, J },
         Invalid::LeftGrid => {
             // It may be a corner of its domain that is beyond the grid.
-            let corner = match support {
-                Support::Mesh(corners) if c.axis_outside(x).is_none() => {
-                    let own = corners.mesh.of_particle(particle).iter();
-                    own.map(|&corner| corners.at(corner as usize))
-                        .find(|x| c.axis_beyond(x).is_some())
-                }
-                _ => None,
-            };
+            let corner = corners.filter(|_| c.axis_outside(x).is_none()).and_then(|corners| {
+                let own = corners.mesh.of_particle(particle).iter();
+                own.map(|&corner| corners.at(corner as usize)).find(|x| c.axis_beyond(x).is_some())
+            });
             let x = corner.as_ref().unwrap_or(x);
             let position = x.iter().map(|&x| figure(x)).collect();
             let axis = c.axis_outside(x).unwrap_or(0);
@@ -561,8 +550,8 @@ fn describe<T: Lanes, const D: usize>(
             StepError::LeftGrid { step, time, particle, position, axis, lower, upper }
         }
         Invalid::TooLarge => {
-            let l = support.half_size(c, particle, F);
-            let axis = support.axis_too_large(&l).unwrap_or(0);
+            let l = domain.half_size(c, particle, F);
+            let axis = axis_too_large(&l).unwrap_or(0);
             let spacing = figure(c.spacing());
             let (half_size, limit) = (figure(l[axis]) * spacing, spacing * HALF_SIZE_LIMIT);
             StepError::TooLarge { step, time, particle, axis, half_size, limit }

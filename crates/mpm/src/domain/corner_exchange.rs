@@ -11,8 +11,8 @@
 use mmsmith_lanes::simd::{Lane4, Lanes, dispatch};
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_values::{AlongAxes, CornerValues, Seen};
+use crate::domain::corner_values::{AlongAxes, CornerValues};
+use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::{CHUNK, Chunk, SharedCorners};
 use crate::grid::extension::Extension;
 use crate::grid::geometry::Constants;
@@ -23,36 +23,25 @@ use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
 use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
-use crate::particles::mesh::Mesh;
-use crate::shape::one_axis::{OnAxis, ProductShape};
+use crate::shape::one_axis::OnAxis;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome, SharedOutcome};
 
 /// The source of the tractions on the boundary, and the time.
 pub(crate) type Loading<'a, T, const D: usize> = Option<(&'a dyn BodyForce<T, D>, T)>;
 
-/// Buffers of the exchange in two stages: sums of particles at corners, and values of the grid at corners.
+/// Buffers of the exchange in two stages: the sums of particles at corners, and blocks of corners.
 pub(crate) struct Exchange<T, const D: usize> {
     /// Sums of the particles of each chunk at each corner, see [`SharedCorners::chunks`].
     sums: Vec<Node<T, D>>,
-    /// Whether there are affine momenta.
-    has_affine: bool,
-    /// Whether they count in the sums at hand.
+    /// Whether affine momenta count in the sums at hand.
     is_affine: bool,
     /// APIC: the same of affine momenta; else empty.
     affine_sums: Vec<AlongAxes<T, D>>,
-    /// The values of the grid at each corner here.
-    pub(crate) values: CornerValues<T, D>,
-    /// Whether velocities are projected again.
-    reprojects: bool,
-    /// The values of the projected velocities at each corner, where there are any.
-    pub(crate) reprojected: CornerValues<T, D>,
     /// The light nodes that a clipped body reaches.
     extension: Option<Extension<T, D>>,
     /// The Cauchy stress at each loaded point.
     stresses: Vec<SMatrix<T, D, D>>,
-    /// The weights of corners at nodes.
-    at_nodes: Support<T, D>,
     /// Buffers for blocks of corners.
     buffers: BufferPool<T, D>,
 }
@@ -72,53 +61,27 @@ impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
 }
 
 impl<T: Lanes, const D: usize> Exchange<T, D> {
-    /// For grid cells that have the mass `mass_of_cell` inside of the body. Reserves all memory that a support needs for it: none where
-    /// particles share no corners that pass on what they give.
-    pub(crate) fn new(
-        support: &Support<T, D>,
-        mass_of_cell: T,
-        is_affine: bool,
-        reprojects: bool,
-    ) -> Self {
-        let none = ProductShape { on_axis: OnAxis::Hat, l: SVector::zeros() };
-        let mut own = Self {
+    /// For grid cells that have the mass `mass_of_cell` inside of the body.
+    pub(crate) fn new(corners: &SharedCorners<T, D>, mass_of_cell: T) -> Self {
+        let is_extended = !corners.mesh.is_of_cells() && corners.at_corner.on_axis == OnAxis::Hat;
+        Self {
             sums: Vec::new(),
-            has_affine: is_affine,
-            is_affine,
+            is_affine: false,
             affine_sums: Vec::new(),
-            values: CornerValues::none(),
-            reprojects,
-            reprojected: CornerValues::none(),
-            extension: None,
+            extension: is_extended.then(|| Extension::new(mass_of_cell)),
             stresses: Vec::new(),
-            at_nodes: Support::Product(none),
             buffers: BufferPool::new(),
-        };
-        if let Support::Mesh(corners) = support {
-            own.at_nodes = Support::Product(corners.at_corner);
-            let is_extended =
-                !corners.mesh.is_of_cells() && corners.at_corner.on_axis == OnAxis::Hat;
-            own.extension = is_extended.then(|| Extension::new(mass_of_cell));
-            own.fit(corners);
         }
-        own
     }
 
-    /// Makes room for these corners and their particles.
-    pub(crate) fn fit(&mut self, corners: &SharedCorners<T, D>) {
-        let Mesh { loads, .. } = &corners.mesh;
-        let has_moments = self.has_affine && corners.mesh.is_of_cells();
-        let (zero, none) = (Node::zero(), SMatrix::zeros());
-        self.sums.resize(corners.sums(), zero);
-        if self.has_affine {
+    /// Makes room for the sums at these corners, of affine momenta too where there are any, and for the loads.
+    pub(crate) fn fit(&mut self, corners: &SharedCorners<T, D>, has_affine: bool) {
+        self.sums.resize(corners.sums(), Node::zero());
+        if has_affine {
             self.affine_sums.resize(corners.sums(), [Lane4::zero(); D]);
         }
-        self.values.fit(corners.count(), has_moments);
-        if self.reprojects {
-            self.reprojected.fit(corners.count(), has_moments);
-        }
         self.stresses.clear();
-        self.stresses.resize(loads.len(), none);
+        self.stresses.resize(corners.mesh.loads.len(), SMatrix::zeros());
     }
 
     /// Adds the loads to what particles give at corners.
@@ -178,15 +141,15 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         (band, first): (&mut [Node<T, D>], usize),
         ids: &[u32],
     ) {
-        let Self { sums, is_affine, at_nodes, .. } = self;
+        let Self { sums, is_affine, .. } = self;
         let affine_sums = if *is_affine { &self.affine_sums[..] } else { &[] };
         if corners.at_corner.on_axis == OnAxis::Hat {
             return dispatch(ToGrid { c, corners, sums, affine_sums, band, first, ids });
         }
         let mut copies = Copies::new();
-        let mut buffers = self.buffers.take(at_nodes, *is_affine);
+        let mut buffers = self.buffers.take(&corners.at_corner, *is_affine);
         for ids in ids.chunks(BLOCK) {
-            let Buffers { block, contributions, .. } = &mut *buffers;
+            let Buffers { weights, contributions, .. } = &mut *buffers;
             contributions.without_stress();
             for (k, &corner) in ids.iter().enumerate() {
                 copies.x[k] = corners.at(corner as usize);
@@ -200,32 +163,23 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
                     contributions.affine[k] = SMatrix::from_fn(|i, a| along[a].0[i]);
                 }
             }
-            block.compute_weights(c, at_nodes, ids, copies.kinematics());
-            block.p2g(&c.strides, band, first, contributions, ids.len());
+            weights.compute(c, ids, copies.kinematics());
+            weights.p2g(&c.strides, band, first, contributions, ids.len());
         }
         self.buffers.give_back(buffers);
     }
 
-    /// Interpolates the values of nodes at all corners.
+    /// Interpolates the values of nodes at all corners, and writes where the corners are after a step with these; `next` may be empty.
     pub(crate) fn interpolate(
-        &mut self,
+        &self,
         c: &Constants<T, D>,
         corners: &SharedCorners<T, D>,
         nodes: &[Node<T, D>],
-    ) {
-        self.interpolate_and_follow(c, corners, nodes, &mut []);
-    }
-
-    /// As [`interpolate`](Self::interpolate), and the corners follow these values in a step, for their `next` positions; unless these are empty.
-    pub(crate) fn interpolate_and_follow(
-        &mut self,
-        c: &Constants<T, D>,
-        corners: &SharedCorners<T, D>,
-        nodes: &[Node<T, D>],
+        at_corners: &mut CornerValues<T, D>,
         next: &mut [SVector<T, D>],
     ) {
         let own = corners.own();
-        let CornerValues { nodes: values, moments } = &mut self.values;
+        let CornerValues { nodes: values, moments } = &mut *at_corners;
         let (own_next, other_next) = next.split_at_mut(own.min(next.len()));
         let (mut of_moments, mut of_next) = (moments.chunks_mut(CHUNK), own_next.chunks_mut(CHUNK));
         let chunks = values[..own].chunks_mut(CHUNK).enumerate();
@@ -237,64 +191,18 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
                 next: of_next.next().unwrap_or_default(),
             })
             .collect();
-        let (buffers, at_nodes) = (&self.buffers, &self.at_nodes);
         each(chunks, &|Corners { first, values, moments, next }| {
             if corners.at_corner.on_axis == OnAxis::Hat {
                 dispatch(FromGrid { c, corners, nodes, first, values, moments });
             } else {
-                from_grid((c, corners), (at_nodes, buffers), nodes, first, values);
+                from_grid((c, corners), &self.buffers, nodes, first, values);
             }
             corners.follow(c, first, values, next);
         });
         if let Some(halo) = &corners.halo {
-            halo.exchange(&mut self.values);
+            halo.exchange(at_corners);
         }
-        corners.follow(c, own, &self.values.nodes[own..], other_next);
-    }
-
-    /// The first node that a corner reaches.
-    pub(crate) fn first_node(
-        &self,
-        c: &Constants<T, D>,
-        corners: &SharedCorners<T, D>,
-        corner: usize,
-    ) -> usize {
-        self.at_nodes.first_node(c, corner, &corners.at(corner), &SMatrix::identity())
-    }
-
-    /// Checks that every corner that this process sorts is where the grid has nodes for it, and in its bin.
-    pub(crate) fn check(
-        &self,
-        c: &Constants<T, D>,
-        corners: &SharedCorners<T, D>,
-        bin_of: &[u32],
-    ) -> Outcome {
-        let found = SharedOutcome::default();
-        each((0..corners.own()).step_by(CHUNK).collect(), &|chunk: usize| {
-            let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
-            for first in (chunk..corners.own().min(chunk + CHUNK)).step_by(BLOCK) {
-                let count = BLOCK.min(corners.own() - first);
-                let ids = &successive(first)[..count];
-                let mut bins = [0; BLOCK];
-                bins[..count].copy_from_slice(&bin_of[first..first + count]);
-                for (x, &corner) in copies.x.iter_mut().zip(ids) {
-                    *x = corners.at(corner as usize);
-                }
-                if self.at_nodes.are_valid(c, ids, &bins, copies.kinematics()) {
-                    continue;
-                }
-                for (k, bin) in bins[..count].iter().enumerate() {
-                    let (corner, at) = (first + k, &copies.x[k]);
-                    let failure = invalidity_of_corner(c, corners, corner);
-                    let no_stretch = SMatrix::identity();
-                    let is_inside = failure.is_some()
-                        || self.at_nodes.is_in_bin(c, corner, *bin, at, &no_stretch);
-                    outcome = outcome.merge(Outcome { failure, resort: !is_inside });
-                }
-            }
-            found.add(outcome);
-        });
-        found.all()
+        corners.follow(c, own, &at_corners.nodes[own..], other_next);
     }
 }
 
@@ -311,14 +219,14 @@ struct Corners<'a, T, const D: usize> {
 /// Values of nodes at corners from `first` on.
 fn from_grid<T: Lanes, const D: usize>(
     (c, corners): (&Constants<T, D>, &SharedCorners<T, D>),
-    (at_nodes, buffers): (&Support<T, D>, &BufferPool<T, D>),
+    buffers: &BufferPool<T, D>,
     nodes: &[Node<T, D>],
     first: usize,
     values: &mut [Node<T, D>],
 ) {
     let mut copies = Copies::new();
-    let mut own = buffers.take(at_nodes, false);
-    let Buffers { block, interpolated, .. } = &mut *own;
+    let mut own = buffers.take(&corners.at_corner, false);
+    let Buffers { weights, interpolated, .. } = &mut *own;
     for (index, values) in values.chunks_mut(BLOCK).enumerate() {
         let ids = successive(first + index * BLOCK);
         let ids = &ids[..values.len()];
@@ -326,8 +234,8 @@ fn from_grid<T: Lanes, const D: usize>(
             *x = corners.at(corner as usize);
         }
         let interpolated = &mut interpolated[..values.len()];
-        block.compute_weights(c, at_nodes, ids, copies.kinematics());
-        block.g2p((c, at_nodes), Seen::Nodes(nodes), interpolated);
+        weights.compute(c, ids, copies.kinematics());
+        weights.g2p(&c.strides, nodes, interpolated);
         for (value, own) in values.iter_mut().zip(&*interpolated) {
             *value = Node::new(&own.velocity, &own.second, T::zero());
         }
@@ -350,4 +258,39 @@ pub(crate) fn invalidity_of_corner<T: Lanes, const D: usize>(
         return None;
     };
     Some((invalid, corners.particle_at(corner)))
+}
+
+/// Checks that every corner that this process sorts is where the grid has nodes for it, and in its bin.
+pub(crate) fn check<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    corners: &SharedCorners<T, D>,
+    bin_of: &[u32],
+) -> Outcome {
+    let found = SharedOutcome::default();
+    each((0..corners.own()).step_by(CHUNK).collect(), &|chunk: usize| {
+        let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
+        for first in (chunk..corners.own().min(chunk + CHUNK)).step_by(BLOCK) {
+            let count = BLOCK.min(corners.own() - first);
+            let ids = &successive(first)[..count];
+            let mut bins = [0; BLOCK];
+            bins[..count].copy_from_slice(&bin_of[first..first + count]);
+            for (x, &corner) in copies.x.iter_mut().zip(ids) {
+                *x = corners.at(corner as usize);
+            }
+            let kinematics = copies.kinematics();
+            if corners.at_corner.are_valid(OfBlock { c, ids, bins: &bins, kinematics }) {
+                continue;
+            }
+            for (k, bin) in bins[..count].iter().enumerate() {
+                let (corner, at) = (first + k, &copies.x[k]);
+                let failure = invalidity_of_corner(c, corners, corner);
+                let no_stretch = SMatrix::identity();
+                let is_inside = failure.is_some()
+                    || corners.at_corner.is_in_bin(c, corner, *bin, at, &no_stretch);
+                outcome = outcome.merge(Outcome { failure, resort: !is_inside });
+            }
+        }
+        found.add(outcome);
+    });
+    found.all()
 }

@@ -28,12 +28,3 @@ impl<T: Lanes, const D: usize> CornerValues<T, D> {
         self.moments.resize(if has_moments { count } else { 0 }, [Lane4::zero(); D]);
     }
 }
-
-/// The values that G2P interpolates.
-#[derive(Clone, Copy)]
-pub(crate) enum Seen<'a, T, const D: usize> {
-    /// Values at nodes.
-    Nodes(&'a [Node<T, D>]),
-    /// Values of the grid at shared corners.
-    Corners(&'a CornerValues<T, D>),
-}

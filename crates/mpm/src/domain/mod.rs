@@ -1,172 +1,98 @@
-//! The support of particles: the shape function of a simulation, with the domains that its weights are means over.
+//! The domains of particles: shape functions, and the constructor of each.
+//!
+//! [`of_particles`] says what passes ask of a domain. [`product`] has the shapes that are products over the axes, [`cpdi`] parallelograms.
+//! Domains between corners that neighbours share exchange with the grid in two stages, by way of these [`corners`], which reach nodes by
+//! the domains of points.
+//!
+//! To add a domain: implement [`Domain`] in a file of this folder, and add its name and its constructor here.
 
 pub(crate) mod corner_exchange;
 pub(crate) mod corner_values;
+pub(crate) mod corners;
+pub(crate) mod cpdi;
+pub(crate) mod of_particles;
+pub(crate) mod product;
 pub(crate) mod shared_corners;
 
-use std::array;
-
 use mmsmith_lanes::simd::Lanes;
-use mmsmith_lanes::tensor::{product, real};
-use nalgebra::{RealField, SMatrix, SVector};
+use mmsmith_lanes::tensor::real;
+use nalgebra::{SMatrix, SVector};
 
-use crate::domain::corner_values::{CornerValues, Seen};
-use crate::domain::shared_corners::SharedCorners;
-use crate::grid::geometry::Constants;
-use crate::grid::node::Node;
-use crate::particles::body::Body;
-use crate::particles::mesh::Interpolation;
-use crate::scheme::Shape;
-use crate::shape::cells::{HalfEdges, REACHED};
-use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, first_layer, node_below};
+use crate::domain::cpdi::Parallelograms;
+use crate::domain::of_particles::Domain;
+use crate::named::named;
+use crate::particles::mesh::{Interpolation, Mesh};
+use crate::shape::one_axis::{OnAxis, ProductShape};
 
-/// The shape function of a simulation.
-#[derive(Debug)]
-pub(crate) enum Support<T, const D: usize> {
-    /// Weights are products over the axes.
-    Product(ProductShape<T, D>),
-    /// CPDI: hat functions interpolated between the corners of parallelograms, half of whose edges in the reference
-    /// configuration are the columns of a matrix, lengths.
-    Cpdi { half_edges: HalfEdges<T, D> },
-    /// Domains between shared corners, those of CPDI2 among them.
-    Mesh(Box<SharedCorners<T, D>>),
+named! {
+    /// Shape functions, whose values at particles are the weights of P2G and G2P.
+    pub enum Shape {
+        /// Hat functions at the particle's point
+        Linear = "linear",
+        /// GIMP weights of fixed size
+        Ugimp = "ugimp",
+        /// GIMP weights that follow the particle's stretch
+        ///
+        /// The boxes stretch with the diagonal of F.
+        Gimp = "gimp",
+        /// Quadratic splines
+        ///
+        /// B-splines about the nodes, at the particle's centre. Splines beyond a wall are folded on their mirror images, the
+        /// component across the wall with the opposite sign. The weights so add up to one in every cell, and fields that are
+        /// linear and vanish across the wall on it are reproduced: of linear fields these are all that a frictionless wall
+        /// admits. Beyond an open face the nodes go on, and all linear fields are reproduced there. (Steffen, Kirby & Berzins,
+        /// IJNME 76 (2008) 922-948, change the splines at the boundary instead. With lumped mass that costs an order there:
+        /// the changed spline's centre of mass is not where its coefficient is.)
+        Bspline2 = "bspline2",
+        /// Cubic splines
+        ///
+        /// Walls as for `Bspline2`.
+        Bspline3 = "bspline3",
+        /// Parallelograms that deform with the particle
+        ///
+        /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
+        /// & Burghardt, IJNME 86 (2011) 1435-1456); segments, parallelograms, parallelepipeds.
+        Cpdi = "cpdi",
+        /// Quadrilaterals (in space hexahedra) whose corners neighbours share
+        ///
+        /// `Cpdi` on segments, quadrilaterals and hexahedra whose corners are points of the body, which move with
+        /// the grid (CPDI2: Sadeghirad, Brannon & Guilkey, IJNME 95 (2013) 928-952).
+        Cpdi2 = "cpdi2",
+    }
+
 }
 
-impl<T: Lanes, const D: usize> Support<T, D> {
-    /// The support of a body's particles on a grid of this spacing, and the particles.
-    pub(crate) fn new(
-        shape: Shape,
-        body: Body<T, D>,
-        spacing: T,
-    ) -> (Self, crate::Particles<T, D>) {
-        let Body { particles, half_edges, mesh } = body;
-        let cells = particles.half_size / spacing;
-        let is_used =
-            |interpolation| interpolation == Interpolation::Triangles || shape == Shape::Cpdi2;
-        if let Some(mesh) = mesh.filter(|own| is_used(own.interpolation))
-            && let Some(at_corner) = ProductShape::new(at_corners(shape), cells)
-        {
-            let corners = Box::new(SharedCorners::new(mesh, at_corner));
-            return (Self::Mesh(corners), particles);
-        }
-        if let Some(product) = ProductShape::new(shape, cells) {
-            return (Self::Product(product), particles);
-        }
-        (Self::Cpdi { half_edges: HalfEdges::new(half_edges) }, particles)
-    }
-
-    /// Half-sizes of the box around the support of a particle's domain, in cells, about the particle's position.
-    pub(crate) fn half_size(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        F: &SMatrix<T, D, D>,
-    ) -> SVector<T, D> {
-        match self {
-            Self::Product(shape) => SVector::from_fn(|a, _| shape.half_size(a, F[(a, a)])),
-            Self::Cpdi { half_edges } => extent(&product(F, half_edges.of(p))) * c.inverse_spacing,
-            // Corners reach nodes, each its own.
-            Self::Mesh(_) => SVector::zeros(),
-        }
-    }
-
-    /// The rows of nodes that a particle with these half-sizes reaches.
-    pub(crate) fn rows(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-        l: &SVector<T, D>,
-    ) -> Rows<T> {
-        match self {
-            Self::Product(shape) => {
-                let is_extended = l.iter().any(|&l| l > shape.extended_above());
-                let width = if is_extended { EXTENDED } else { shape.width() };
-                Rows { edge: c.in_cells(x)[D - 1] - l[D - 1], width }
-            }
-            Self::Cpdi { half_edges } => {
-                // The last component of the corners, in the operations of `deformed` and `corner_of_parallelogram`.
-                let (own, last, height) = (half_edges.of(p), D - 1, c.in_cells(x)[D - 1]);
-                let edges: [T; D] = array::from_fn(|j| {
-                    let term = |l: usize| F[(last, l)] * c.inverse_spacing * own[(l, j)];
-                    (1..D).fold(term(0), |sum, l| sum + term(l))
-                });
-                Rows::between((0..1_usize << D).map(|corner| {
-                    edges.iter().enumerate().fold(height, |sum, (a, &edge)| {
-                        if corner >> a & 1 == 1 { sum + edge } else { sum - edge }
-                    })
-                }))
-            }
-            Self::Mesh(_) => Rows { edge: c.in_cells(x)[D - 1], width: REACHED },
-        }
-    }
-
-    /// The first node that a particle reaches along the last axis, and about the first one along the others.
-    pub(crate) fn first_node(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-    ) -> usize {
-        let (xi, l) = (c.in_cells(x), self.half_size(c, p, F));
-        let row = first_layer(self.rows(c, p, x, F, &l).edge, T::zero());
-        (0..D - 1).map(|a| first_layer(xi[a], l[a]) * c.strides[a]).sum::<usize>()
-            + row * c.strides[D - 1]
-    }
-
-    /// For domains between shared corners the volume of a particle's domain.
-    pub(crate) fn volume(&self, p: usize) -> Option<T> {
-        if let Self::Mesh(corners) = self { Some(corners.volume(p)) } else { None }
-    }
-
-    /// The values that particles interpolate: at nodes, or at corners.
-    pub(crate) fn seen<'a>(
-        &self,
-        nodes: &'a [Node<T, D>],
-        corners: &'a CornerValues<T, D>,
-    ) -> Seen<'a, T, D> {
-        if let Self::Mesh(_) = self { Seen::Corners(corners) } else { Seen::Nodes(nodes) }
-    }
-
-    /// The first axis along which a half-size, in cells, exceeds the limit.
-    pub(crate) fn axis_too_large(&self, l: &SVector<T, D>) -> Option<usize> {
-        (0..D).find(|&a| l[a] > real(HALF_SIZE_LIMIT))
+/// The domains of particles with these half-edges, lengths, or else with boxes of these half-sizes, on a grid of this spacing.
+pub(crate) fn new<T: Lanes, const D: usize>(
+    shape: Shape,
+    half_edges: Vec<SMatrix<T, D, D>>,
+    half_size: &SVector<T, D>,
+    spacing: T,
+) -> Box<dyn Domain<T, D>> {
+    let boxes = half_size / spacing;
+    let product = |on_axis, l| Box::new(ProductShape { on_axis, l });
+    match shape {
+        // The points of Cpdi2 are corners.
+        Shape::Linear | Shape::Cpdi2 => product(OnAxis::Hat, SVector::zeros()),
+        Shape::Ugimp => product(OnAxis::FixedBox, boxes),
+        // Contiguous particles.
+        Shape::Gimp => product(OnAxis::StretchingBox, boxes),
+        Shape::Bspline2 => product(OnAxis::Quadratic, SVector::repeat(real(0.5))),
+        Shape::Bspline3 => product(OnAxis::Cubic, SVector::repeat(real(1.0))),
+        Shape::Cpdi => Box::new(Parallelograms::new(half_edges, half_size)),
     }
 }
 
-/// The shape function by which shared corners reach nodes.
-pub(crate) fn at_corners(shape: Shape) -> Shape {
-    if shape == Shape::Cpdi2 { Shape::Linear } else { shape }
-}
-
-/// The rows of nodes that a particle reaches.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<T> {
-    /// The lower edge of what it covers, in cells from the lower corner of the grid: the first row is the one below.
-    pub(crate) edge: T,
-    /// How many rows at most.
-    pub(crate) width: usize,
-}
-
-impl<T: RealField + Copy> Rows<T> {
-    /// Around corners at these heights, in cells; computed as kernels compute them, so that both have the same first row.
-    #[inline(always)]
-    pub(crate) fn between(heights: impl Iterator<Item = T>) -> Self {
-        let (mut low, mut high) = (T::max_value().unwrap_or(T::one()), -T::one());
-        for height in heights {
-            low = if height < low { height } else { low };
-            high = if height > high { height } else { high };
-        }
-        let rows = node_below(high).0 - node_below(low).0 + 2.0;
-        // Small domains have a patch of so many nodes, reached or not.
-        Self { edge: low, width: (rows as usize).clamp(REACHED, EXTENDED) }
-    }
-}
-
-/// The half-sizes of the smallest box around a parallelogram with these half-edges.
-#[inline(always)]
-pub(crate) fn extent<T: RealField + Copy, const D: usize>(E: &SMatrix<T, D, D>) -> SVector<T, D> {
-    SVector::from_fn(|a, _| (0..D).fold(T::zero(), |sum, k| sum + E[(a, k)].abs()))
+/// The shape function by which the corners of a mesh reach nodes; none where a shape leaves the mesh alone.
+pub(crate) fn at_corners<T: Lanes, const D: usize>(
+    shape: Shape,
+    mesh: &Mesh<T, D>,
+) -> Option<ProductShape<T, D>> {
+    let (on_axis, half_size) = match (mesh.interpolation, shape) {
+        (_, Shape::Cpdi2) => (OnAxis::Hat, 0.0),
+        (Interpolation::Triangles, Shape::Bspline2) => (OnAxis::Quadratic, 0.5),
+        (Interpolation::Triangles, Shape::Bspline3) => (OnAxis::Cubic, 1.0),
+        _ => return None,
+    };
+    Some(ProductShape { on_axis, l: SVector::repeat(real(half_size)) })
 }

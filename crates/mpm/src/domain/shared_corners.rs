@@ -8,6 +8,7 @@ use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
+use crate::domain::of_particles::Domain;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::parallel::chunks::each;
@@ -15,6 +16,7 @@ use crate::particles::mesh::{Interpolation, Mesh, Share};
 use crate::processes::corner_halo::CornerHalo;
 use crate::shape::cells::{PAIRS, volume_of_cell};
 use crate::shape::one_axis::ProductShape;
+use crate::step::health::Invalid;
 
 /// Corners handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 pub(crate) const CHUNK: usize = 1024;
@@ -271,6 +273,33 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             }
         }
         inside
+    }
+
+    /// The reason why a particle is invalid, if it is.
+    pub(crate) fn invalidity(
+        &self,
+        c: &Constants<T, D>,
+        p: usize,
+        x: &SVector<T, D>,
+        F: &SMatrix<T, D, D>,
+    ) -> Option<Invalid> {
+        if let Some(invalid) = Invalid::of_deformation(x, F) {
+            return Some(invalid);
+        }
+        // Polygons may have axes of their own; their corners are looked at themselves.
+        if self.mesh.is_of_cells() && c.axis_outside(x).is_some() {
+            return Some(Invalid::LeftGrid);
+        }
+        let volume = self.volume(p);
+        if volume <= T::zero() {
+            return Some(Invalid::Inverted);
+        }
+        (!volume.is_finite()).then_some(Invalid::NotFinite)
+    }
+
+    /// The first node that a corner reaches.
+    pub(crate) fn first_node(&self, c: &Constants<T, D>, corner: usize) -> usize {
+        self.at_corner.first_node(c, corner, &self.at(corner), &SMatrix::identity())
     }
 
     /// Number of corners.

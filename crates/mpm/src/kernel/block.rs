@@ -1,4 +1,4 @@
-//! Blocks of 64 particles: their stresses, and the kernels for P2G and G2P that serve a simulation.
+//! Blocks of 64 particles: their stresses, and what their weights are to P2G and G2P.
 
 use std::sync::Arc;
 
@@ -9,16 +9,11 @@ use mmsmith_laws::{
 };
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_values::Seen;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::beyond;
+use crate::kernel::advance::AdvanceParticles;
+use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::parallelograms::ParallelogramWeights;
-use crate::kernel::product::ProductWeights;
-use crate::kernel::shared::FromCorners;
 
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
@@ -61,109 +56,49 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
     }
 }
 
-/// The weights of up to `BLOCK` particles.
+/// The weights of up to `BLOCK` particles at nodes, and the sums of P2G and G2P with them.
 ///
 /// A loop over the block completes before another loop reads its results: vector loads wait for the narrower stores that
 /// they overlap.
-pub(crate) enum Block<T, const D: usize> {
-    /// Products over the axes.
-    Product(Box<ProductWeights<T, D>>),
-    /// Means over parallelograms, for CPDI.
-    Parallelograms(Box<ParallelogramWeights<T, D>>),
-    /// Means over domains between shared corners, of particles from this one on.
-    Shared {
-        /// Whether there are affine velocities (APIC).
-        is_affine: bool,
-        /// The first of the particles.
-        first: usize,
-    },
-}
-
-impl<T: Lanes, const D: usize> Block<T, D> {
-    pub(crate) fn new(support: &Support<T, D>, is_affine: bool) -> Self {
-        match support {
-            Support::Product(shape) => {
-                Self::Product(Box::new(ProductWeights::new(shape, is_affine)))
-            }
-            Support::Cpdi { .. } => {
-                Self::Parallelograms(Box::new(ParallelogramWeights::new(is_affine)))
-            }
-            Support::Mesh(_) => Self::Shared { is_affine, first: 0 },
-        }
-    }
-
+pub(crate) trait BlockWeights<T: Lanes, const D: usize>: Send {
     /// Computes the weights of the particles `ids`.
-    pub(crate) fn compute_weights(
-        &mut self,
-        c: &Constants<T, D>,
-        support: &Support<T, D>,
-        ids: &[u32],
-        kinematics: Kinematics<'_, T, D>,
-    ) {
-        match (self, support) {
-            (Self::Product(weights), Support::Product(shape)) => {
-                weights.compute(c, shape, kinematics);
-            }
-            (Self::Parallelograms(weights), Support::Cpdi { half_edges }) => {
-                weights.compute(c, half_edges, ids, kinematics);
-            }
-            (Self::Shared { first, .. }, Support::Mesh(_)) => {
-                *first = ids.first().map_or(0, |id| *id as usize);
-            }
-            _ => beyond("a block for another shape function"),
-        }
-    }
-
-    /// A planted fault: particles in the last cell of an axis skip the last node they reach along it.
-    pub(crate) fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
-        if let Self::Product(weights) = self {
-            weights.skip_last_node(c, x);
-        }
-    }
+    fn compute(&mut self, c: &Constants<T, D>, ids: &[u32], kinematics: Kinematics<'_, T, D>);
 
     /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
-    pub(crate) fn p2g(
+    fn p2g(
         &mut self,
         strides: &[usize; D],
         band: &mut [Node<T, D>],
         first: usize,
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
+    );
+
+    /// G2P of the first particles, as many as `receiver` has places.
+    fn g2p(
+        &mut self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        receiver: &mut [Interpolated<T, D>],
+    );
+
+    /// G2P without affine velocities of as many particles as `interpolated` has places, by which they advance. Default: the values are
+    /// stored first.
+    fn g2p_and_advance(
+        &mut self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        interpolated: &mut [Interpolated<T, D>],
+        mut particles: AdvanceParticles<'_, T, D>,
     ) {
-        match self {
-            Self::Product(weights) => weights.p2g(strides, band, first, contributions, count),
-            Self::Parallelograms(weights) => {
-                weights.p2g(strides, band, first, contributions, count)
-            }
-            Self::Shared { .. } => beyond("these give to corners"),
+        self.g2p(strides, nodes, interpolated);
+        for (k, interpolated) in interpolated.iter().enumerate() {
+            particles.receive(k, interpolated);
         }
     }
 
-    /// G2P of the first particles, as many as `receiver` has places; those on shared corners are successive.
-    pub(crate) fn g2p(
-        &mut self,
-        (c, support): (&Constants<T, D>, &Support<T, D>),
-        seen: Seen<'_, T, D>,
-        receiver: &mut [Interpolated<T, D>],
-    ) {
-        match (self, seen, support) {
-            (Self::Product(weights), Seen::Nodes(nodes), _) => {
-                weights.g2p(&c.strides, nodes, receiver);
-            }
-            (Self::Parallelograms(weights), Seen::Nodes(nodes), _) => {
-                weights.g2p(&c.strides, nodes, receiver);
-            }
-            (
-                &mut Self::Shared { is_affine, first },
-                Seen::Corners(values),
-                Support::Mesh(corners),
-            ) => {
-                let shares = corners.measured.from(&corners.mesh, first);
-                FromCorners { c, corners, shares, values, first, receiver }.interpolate(is_affine);
-            }
-            _ => beyond("values for another shape function"),
-        }
-    }
+    /// A planted fault: particles in the last cell of an axis skip the last node they reach along it. Default: none does.
+    fn skip_last_node(&mut self, _c: &Constants<T, D>, _x: &[SVector<T, D>; BLOCK]) {}
 }
 
 /// A law that the caller brings, for blocks of particles in the updated Lagrangian formulation.

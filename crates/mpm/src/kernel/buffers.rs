@@ -4,15 +4,21 @@ use std::sync::{Mutex, PoisonError};
 
 use mmsmith_lanes::simd::Lanes;
 
-use crate::domain::Support;
+use crate::domain::corner_values::CornerValues;
+use crate::domain::of_particles::Domain;
+use crate::domain::shared_corners::SharedCorners;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::block::Block;
-use crate::kernel::copies::BLOCK;
+use crate::kernel::block::BlockWeights;
+use crate::kernel::copies::{BLOCK, Kinematics};
+use crate::kernel::shared::FromCorners;
 
 /// Buffers of a pass over blocks. Entries beyond the particles of a block are left from another block, and not read.
 pub(crate) struct Buffers<T, const D: usize> {
     is_affine: bool,
-    pub(crate) block: Block<T, D>,
+    /// Weights at nodes; those of particles that share corners are not computed.
+    pub(crate) weights: Box<dyn BlockWeights<T, D>>,
     pub(crate) contributions: Contributions<T, D, BLOCK>,
     pub(crate) interpolated: [Interpolated<T, D>; BLOCK],
 }
@@ -26,7 +32,7 @@ impl<T: Lanes, const D: usize> BufferPool<T, D> {
     }
 
     /// Buffers as their last user left them, or new ones; with affine velocities or without.
-    pub(crate) fn take(&self, support: &Support<T, D>, is_affine: bool) -> Box<Buffers<T, D>> {
+    pub(crate) fn take(&self, domain: &dyn Domain<T, D>, is_affine: bool) -> Box<Buffers<T, D>> {
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let place = free.iter().rposition(|buffers| buffers.is_affine == is_affine);
         let found = place.map(|place| free.swap_remove(place));
@@ -34,7 +40,7 @@ impl<T: Lanes, const D: usize> BufferPool<T, D> {
         found.unwrap_or_else(|| {
             Box::new(Buffers {
                 is_affine,
-                block: Block::new(support, is_affine),
+                weights: domain.weights(is_affine),
                 contributions: Contributions::zero(),
                 interpolated: [Interpolated::zero(); BLOCK],
             })
@@ -43,5 +49,48 @@ impl<T: Lanes, const D: usize> BufferPool<T, D> {
 
     pub(crate) fn give_back(&self, buffers: Box<Buffers<T, D>>) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(buffers);
+    }
+}
+
+/// The values of the grid that particles interpolate.
+#[derive(Clone, Copy)]
+pub(crate) struct GridValues<'a, T, const D: usize> {
+    pub(crate) nodes: &'a [Node<T, D>],
+    /// The corners that particles share, and the values there.
+    pub(crate) at_corners: Option<(&'a SharedCorners<T, D>, &'a CornerValues<T, D>)>,
+}
+
+impl<T: Lanes, const D: usize> GridValues<'_, T, D> {
+    /// Computes the weights of the particles `ids`, where they reach nodes themselves.
+    pub(crate) fn compute_weights(
+        &self,
+        c: &Constants<T, D>,
+        buffers: &mut Buffers<T, D>,
+        ids: &[u32],
+        kinematics: Kinematics<'_, T, D>,
+    ) {
+        if self.at_corners.is_none() {
+            buffers.weights.compute(c, ids, kinematics);
+        }
+    }
+
+    /// Interpolates at the particles `ids` of a block; those on shared corners are successive.
+    pub(crate) fn g2p<'b>(
+        &self,
+        c: &Constants<T, D>,
+        buffers: &'b mut Buffers<T, D>,
+        ids: &[u32],
+    ) -> &'b mut [Interpolated<T, D>] {
+        let Buffers { is_affine, weights, interpolated, .. } = buffers;
+        let receiver = &mut interpolated[..ids.len()];
+        match self.at_corners {
+            None => weights.g2p(&c.strides, self.nodes, receiver),
+            Some((corners, values)) => {
+                let first = ids.first().map_or(0, |id| *id as usize);
+                let shares = corners.measured.from(&corners.mesh, first);
+                FromCorners { c, corners, shares, values, first, receiver }.interpolate(*is_affine);
+            }
+        }
+        &mut interpolated[..ids.len()]
     }
 }

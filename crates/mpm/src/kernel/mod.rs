@@ -3,22 +3,23 @@
 //! A [`block`] has the weights of 64 particles, whose data lie side by side in [`copies`]. Weights that are products over the axes
 //! come from [`product`], which hands the sums over nodes to [`lanes_plane`] in one and two dimensions, to [`lanes_space`] in three,
 //! and to [`any`] for the extended support of a large GIMP box. CPDI has weights and sums of its own in
-//! [`parallelograms`];
+//! [`cpdi`];
 //! domains on shared corners, those of CPDI2 among them, have theirs in [`shared`],
 //! and these corners, where they reach nodes by hat functions, in [`points`]. Passes take both from [`buffers`], which outlive them.
 //! [`any`] also defines the values on either side: [`Contributions`](any::Contributions) to the grid,
 //! [`Interpolated`](any::Interpolated) values from it.
 
+pub(crate) mod advance;
 pub(crate) mod any;
 pub(crate) mod block;
 pub(crate) mod buffers;
 pub(crate) mod copies;
+pub(crate) mod cpdi;
 mod lanes_plane;
 mod lanes_space;
-pub(crate) mod parallelograms;
 pub(crate) mod points;
 pub(crate) mod prefetch;
-mod product;
+pub(crate) mod product;
 pub(crate) mod shared;
 
 /// Ends the run: a weight, a block or a node is not the one that the code around it has prepared. Checks of particles and bins rule it out;

@@ -9,7 +9,9 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
+use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
+use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
@@ -32,6 +34,7 @@ const MOST_NODES: usize = 4;
 ///
 /// Layout: `S[axis][place][k]` is the factor of particle `k` along an axis at its node `place`.
 pub(crate) struct ProductWeights<T, const D: usize> {
+    shape: ProductShape<T, D>,
     /// Nodes along each axis: 2, 3 or 4.
     width: usize,
     /// Whether there are affine velocities (APIC).
@@ -50,8 +53,6 @@ pub(crate) struct ProductWeights<T, const D: usize> {
     inverse_inertia: [PerParticle<T>; D],
     /// Whether any particle's box has extended support.
     any_extended: bool,
-    /// Half-size beyond which it is.
-    extended_above: T,
     /// Positions in cells from the lower corner, `xi[axis][k]`; valid where `any_extended`, and in single precision.
     xi: [PerParticle<T>; D],
     /// Half-sizes in cells, `l[axis][k]`; valid where positions are.
@@ -62,6 +63,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
     pub(crate) fn new(shape: &ProductShape<T, D>, is_affine: bool) -> Self {
         let zero = [T::zero(); BLOCK];
         Self {
+            shape: *shape,
             width: shape.width(),
             is_affine,
             first_node: [0; BLOCK],
@@ -71,28 +73,8 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
             Z: [[zero; MOST_NODES]; D],
             inverse_inertia: [zero; D],
             any_extended: false,
-            extended_above: shape.extended_above(),
             xi: [zero; D],
             l: [zero; D],
-        }
-    }
-
-    pub(crate) fn compute(
-        &mut self,
-        c: &Constants<T, D>,
-        shape: &ProductShape<T, D>,
-        kinematics: Kinematics<'_, T, D>,
-    ) {
-        self.nodes_before = c.nodes_before as usize;
-        let l = &shape.l;
-        match shape.on_axis {
-            OnAxis::Hat => self.compute_on_axes::<Hat, 2, false>(c, l, kinematics),
-            OnAxis::FixedBox => self.compute_on_axes::<Gimp, 3, false>(c, l, kinematics),
-            OnAxis::StretchingBox => self.compute_on_axes::<Gimp, 3, true>(c, l, kinematics),
-            OnAxis::Quadratic => {
-                self.compute_on_axes::<QuadraticSpline, 3, false>(c, l, kinematics);
-            }
-            OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4, false>(c, l, kinematics),
         }
     }
 
@@ -117,21 +99,54 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         }
     }
 
-    /// A planted fault: particles in the last cell of an axis skip the last node they reach along it.
-    pub(crate) fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
-        let upper = c.upper_in_cells();
-        let last = self.width - 1;
-        for (k, x) in x.iter().enumerate() {
-            let xi = c.in_cells(x);
-            for a in (0..D).filter(|&a| xi[a] >= upper[a] - T::one()) {
-                (self.S[a][last][k], self.G[a][last][k]) = (T::zero(), T::zero());
-            }
+    /// G2P of the first `count` particles without affine velocities, to a receiver that is compiled into the kernel.
+    fn g2p_with(
+        &self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        count: usize,
+        receiver: impl Receive<T, D>,
+    ) {
+        let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
+        match self.width {
+            2 => dispatch(G2p::<_, _, D, 2, false>(of_block)),
+            3 => dispatch(G2p::<_, _, D, 3, false>(of_block)),
+            _ => dispatch(G2p::<_, _, D, 4, false>(of_block)),
         }
     }
 
-    /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
-    pub(crate) fn p2g(
-        &self,
+    /// Position and half-sizes of a particle whose box has extended support.
+    #[inline(always)]
+    fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
+        if !self.any_extended {
+            return None;
+        }
+        let (mut xi, mut l, mut is_extended) = ([T::zero(); D], [T::zero(); D], false);
+        for a in 0..D {
+            (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
+            is_extended |= l[a] > self.shape.extended_above();
+        }
+        is_extended.then_some((xi, l))
+    }
+}
+
+impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
+    fn compute(&mut self, c: &Constants<T, D>, _: &[u32], kinematics: Kinematics<'_, T, D>) {
+        self.nodes_before = c.nodes_before as usize;
+        let ProductShape { on_axis, l } = self.shape;
+        match on_axis {
+            OnAxis::Hat => self.compute_on_axes::<Hat, 2, false>(c, &l, kinematics),
+            OnAxis::FixedBox => self.compute_on_axes::<Gimp, 3, false>(c, &l, kinematics),
+            OnAxis::StretchingBox => self.compute_on_axes::<Gimp, 3, true>(c, &l, kinematics),
+            OnAxis::Quadratic => {
+                self.compute_on_axes::<QuadraticSpline, 3, false>(c, &l, kinematics);
+            }
+            OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4, false>(c, &l, kinematics),
+        }
+    }
+
+    fn p2g(
+        &mut self,
         strides: &[usize; D],
         band: &mut [Node<T, D>],
         first: usize,
@@ -149,25 +164,8 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         }
     }
 
-    /// G2P of the first `count` particles without affine velocities, to a receiver that is compiled into the kernel.
-    pub(crate) fn g2p_with(
-        &self,
-        strides: &[usize; D],
-        nodes: &[Node<T, D>],
-        count: usize,
-        receiver: impl Receive<T, D>,
-    ) {
-        let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
-        match self.width {
-            2 => dispatch(G2p::<_, _, D, 2, false>(of_block)),
-            3 => dispatch(G2p::<_, _, D, 3, false>(of_block)),
-            _ => dispatch(G2p::<_, _, D, 4, false>(of_block)),
-        }
-    }
-
-    /// G2P of the first particles, as many as `receiver` has places.
-    pub(crate) fn g2p(
-        &self,
+    fn g2p(
+        &mut self,
         strides: &[usize; D],
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
@@ -185,18 +183,25 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         }
     }
 
-    /// Position and half-sizes of a particle whose box has extended support.
-    #[inline(always)]
-    fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
-        if !self.any_extended {
-            return None;
+    fn g2p_and_advance(
+        &mut self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        interpolated: &mut [Interpolated<T, D>],
+        particles: AdvanceParticles<'_, T, D>,
+    ) {
+        self.g2p_with(strides, nodes, interpolated.len(), particles);
+    }
+
+    fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
+        let upper = c.upper_in_cells();
+        let last = self.width - 1;
+        for (k, x) in x.iter().enumerate() {
+            let xi = c.in_cells(x);
+            for a in (0..D).filter(|&a| xi[a] >= upper[a] - T::one()) {
+                (self.S[a][last][k], self.G[a][last][k]) = (T::zero(), T::zero());
+            }
         }
-        let (mut xi, mut l, mut is_extended) = ([T::zero(); D], [T::zero(); D], false);
-        for a in 0..D {
-            (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
-            is_extended |= l[a] > self.extended_above;
-        }
-        is_extended.then_some((xi, l))
     }
 }
 
@@ -299,14 +304,14 @@ where
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, l: reference, .. } = self;
-        let ProductWeights { first_node, S, G, Z, inverse_inertia, extended_above, .. } = weights;
+        let above = weights.shape.extended_above();
+        let ProductWeights { first_node, S, G, Z, inverse_inertia, .. } = weights;
         let ProductWeights { any_extended, xi, l, .. } = weights;
         let of_particle = |k: usize, a: usize| {
             let Kinematics { x, F } = kinematics;
             let F_aa = stretch(c.planted, &F[k], a);
             (c.in_cells(&x[k])[a], half_size::<_, STRETCHING>(reference[a], F_aa))
         };
-        let above = *extended_above;
         // In single precision the loop is vectorised only where the numbers of an axis lie side by side; in double precision it is
         // vectorised either way, and laying them so would cost 1 to 3 % of a step.
         if const { size_of::<T>() > size_of::<f32>() } {
@@ -513,7 +518,6 @@ fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scheme::Shape;
     use std::array;
 
     use crate::kernel::block::tests::{constants, noise};
@@ -524,7 +528,7 @@ mod tests {
         fn check<const D: usize, const AFFINE: bool>() {
             let (c, nodes) = constants::<D>();
             let reference = SVector::repeat(0.25);
-            let shape = ProductShape::new(Shape::Gimp, reference).unwrap();
+            let shape = ProductShape { on_axis: OnAxis::StretchingBox, l: reference };
             let x: [_; BLOCK] =
                 array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
             let grid: Vec<Node<f64, D>> = (0..nodes)
@@ -547,7 +551,7 @@ mod tests {
                     }
                     F
                 });
-                block.compute(&c, &shape, Kinematics { x: &x, F: &F });
+                block.compute(&c, &[], Kinematics { x: &x, F: &F });
                 let exact = |k: usize| {
                     let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
                     ExtendedWeights::<_, D, AFFINE>::new(&c.in_cells(&x[k]), &l, (&c.strides, 0))

@@ -12,7 +12,7 @@ use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
-use crate::kernel::parallelograms::GROUP;
+use crate::kernel::cpdi::parallelograms::GROUP;
 use crate::particles::mesh::{Mesh, Share};
 use crate::shape::cells::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
 

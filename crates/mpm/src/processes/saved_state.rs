@@ -12,8 +12,9 @@ use mmsmith_ranks::total;
 use nalgebra::SVector;
 use thiserror::Error;
 
-use crate::domain::Support;
+use crate::domain::corners::Corners;
 use crate::particles::columns::{EachColumn, MovingColumns, Shares};
+use crate::particles::mesh::Mesh;
 use crate::processes::decomposition::Move;
 use crate::processes::directory::{Answers, Directory};
 use crate::simulation::Simulation;
@@ -194,14 +195,14 @@ impl EachColumn for Fetch<'_> {
 impl<T: Lanes, const D: usize> State<T, D> {
     /// The arrays of the particles here, but for the number of steps.
     fn arrays(&self) -> Vec<&[u8]> {
-        let Self { particles, support, bins, part, .. } = self;
+        let Self { particles, corners, bins, part, .. } = self;
         let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
         let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
         arrays.extend(particles.moving_bytes());
-        if let Support::Mesh(corners) = support {
-            let numbers = corners.mesh.numbers.as_ref();
-            let numbers = numbers.map_or(&[][..], |numbers| &numbers.corners);
-            arrays.extend([cast_slice(&corners.mesh.x), cast_slice(numbers)]);
+        if let Some(corners) = corners {
+            let Mesh { x, numbers, .. } = &corners.shared.mesh;
+            let numbers = numbers.as_ref().map_or(&[][..], |numbers| &numbers.corners);
+            arrays.extend([cast_slice(x), cast_slice(numbers)]);
         }
         arrays
     }
@@ -215,8 +216,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Puts the saved state of all particles in place, of which this process has read some parts. Gives the number of steps.
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
-        let kind =
-            Kind { shares: self.shares, has_corners: matches!(self.support, Support::Mesh(_)) };
+        let kind = Kind { shares: self.shares, has_corners: self.corners.is_some() };
         let saved = self.agreed(Saved::of_parts(parts, kind))?;
         let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
         self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
@@ -224,9 +224,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         // Those that have read no part do not know it.
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let steps_done = ranks.as_ref().map_or(steps_done, |ranks| ranks.largest(steps_done));
-        let keys = match self.support {
-            Support::Mesh(_) => self.put_mesh(saved)?,
-            _ => self.put_particles(saved)?,
+        let keys = match self.corners {
+            Some(_) => self.put_mesh(saved)?,
+            None => self.put_particles(saved)?,
         };
         self.sort_as(keys);
         Ok(steps_done as usize)
@@ -262,14 +262,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Puts particles that share corners in place, where they are. Gives the keys of their corners.
     fn put_mesh(&mut self, mut saved: Saved<T, D>) -> Result<Vec<u32>, SavedStateError> {
-        let Support::Mesh(corners) = &self.support else { return Ok(Vec::new()) };
+        let Some(Corners { shared, .. }) = self.corners.as_deref() else { return Ok(Vec::new()) };
         let ranks = self.part.as_ref().map(|part| part.ranks.clone());
         let ids = match &self.part {
             Some(part) => part.ids.to_vec(),
             None => (0..self.particles.len() as u64).collect(),
         };
         let numbers: Vec<u64> =
-            (0..corners.count()).map(|corner| corners.mesh.number(corner)).collect();
+            (0..shared.count()).map(|corner| shared.mesh.number(corner)).collect();
         let particles = Directory::new(ranks.as_ref(), &saved.ids).ask(&ids);
         let points = Directory::new(ranks.as_ref(), &saved.corner_ids).ask(&numbers);
         // All processes ask before one of them gives up.
@@ -278,8 +278,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         saved.columns.each(&self.shares, &mut Fetch(&particles));
         self.particles.replace_moving(saved.columns);
         let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
-        if let Support::Mesh(corners) = &mut self.support {
-            corners.positions().copy_from_slice(&x);
+        if let Some(corners) = &mut self.corners {
+            corners.shared.positions().copy_from_slice(&x);
         }
         Ok(keys)
     }

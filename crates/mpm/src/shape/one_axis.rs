@@ -3,14 +3,13 @@
 //! All lengths are in cells (`h = 1`). Positions count from the lower corner of the grid, `xi = (x - lower) / h`; half-sizes `l`
 //! of particle boxes and gradients are per cell too.
 //!
-//! To add one: name it in [`Shape`], implement [`ShapeFunction`] here and add it to [`OnAxis`]. The compiler tells of the rest, which is
-//! in this file and in `kernel/product.rs`.
+//! To add one: name it in [`Shape`](crate::Shape), implement [`ShapeFunction`] here and add it to [`OnAxis`]. The compiler tells of the rest, which is
+//! in this file, in `kernel/product.rs` and beside its name.
 
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
 use crate::grid::PAD_BELOW;
-use crate::scheme::Shape;
 
 /// Largest supported half-size of a particle's box, in cells.
 pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
@@ -158,21 +157,6 @@ pub(crate) struct ProductShape<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
-    /// That of this name, for particles with reference half-sizes `l` in cells; none where weights are no products.
-    pub(crate) fn new(shape: Shape, l: SVector<T, D>) -> Option<Self> {
-        let box_of = |cells: f64| SVector::repeat(real(cells));
-        let (on_axis, l) = match shape {
-            Shape::Linear => (OnAxis::Hat, box_of(0.0)),
-            Shape::Ugimp => (OnAxis::FixedBox, l),
-            // Contiguous particles.
-            Shape::Gimp => (OnAxis::StretchingBox, l),
-            Shape::Bspline2 => (OnAxis::Quadratic, box_of(0.5)),
-            Shape::Bspline3 => (OnAxis::Cubic, box_of(1.0)),
-            Shape::Cpdi | Shape::Cpdi2 => return None,
-        };
-        Some(Self { on_axis, l })
-    }
-
     /// Half-size of a box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
     pub(crate) fn half_size(&self, axis: usize, F_aa: T) -> T {
         match self.on_axis {

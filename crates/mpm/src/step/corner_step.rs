@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_lanes::simd::Lanes;
 
-use crate::domain::Support;
-use crate::domain::corner_exchange::ChunkSums;
+use crate::domain::corner_exchange::{self, ChunkSums};
 use crate::domain::corner_values::CornerValues;
+use crate::domain::corners::Corners;
+use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Measured, MeasuredPart, SharedCorners};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
@@ -39,7 +40,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         } else {
             self.p2g(body_force, times);
         }
-        self.move_corners();
+        if let Some(corners) = &mut self.corners {
+            corners.follow(&self.constants, &self.nodes);
+        }
         let outcome = self.g2p_and_to_corners(body_force, times.end);
         let outcome = self.agree(outcome);
         // A sort may bring other particles here, and after a failure the sums are of no use.
@@ -49,8 +52,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// The grid update from the sums that corners have already.
     fn update_from_corners(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
-        let Support::Mesh(corners) = &self.support else { return };
+        let Self { particles, constants, layout, bins, nodes, of_time, corners, .. } = self;
+        let Some(corners) = corners else { return };
+        let Corners { shared: corners, exchange, .. } = &mut **corners;
         let c = *constants;
         let time = Forcing::new(body_force, &particles.X, times.start, &c, of_time).time();
         let vectors = NodeVectors::of(self.transfer);
@@ -62,50 +66,45 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// G2P of this step, and P2G of the next one, which starts at `t_next`, to the corners.
     fn g2p_and_to_corners(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
-        let Self { particles, constants, bins, of_time, exchange, support, .. } = self;
+        let Self { particles, constants, bins, of_time, domain, corners, .. } = self;
         let (law, transfer, buffers, c) = (&*self.law, self.transfer, &self.buffers, *constants);
         let uniform = self.uniform;
-        let Support::Mesh(corners) = support else { return Outcome::default() };
-        let mut measured = std::mem::replace(&mut corners.measured, Measured::none());
-        let values = std::mem::replace(&mut exchange.values, CornerValues::none());
+        let Some(corners) = corners else { return Outcome::default() };
+        let Corners { shared, exchange, values, .. } = &mut **corners;
+        let mut measured = std::mem::replace(&mut shared.measured, Measured::none());
         let (fixed, mut moving) = particles.split();
-        let (at_start, is_in_doubt) = (&*support, AtomicBool::new(false));
-        if let Support::Mesh(corners) = at_start {
-            let pass = Pass {
-                c: &c,
-                support: at_start,
-                corners,
-                values: &values,
-                law,
-                transfer,
-                forcing: Forcing::new(body_force, fixed.X, t_next, &c, of_time),
-                fixed,
-                uniform,
-                buffers,
-                is_in_doubt: &is_in_doubt,
-            };
-            let chunks = &corners.chunks;
-            let particles = chunks.iter().map(|chunk| chunk.particles.clone());
-            let parts = measured.split(&corners.mesh, particles.clone());
-            let sums = exchange.begin(chunks, transfer.is_affine());
-            let pieces =
-                particles.zip(parts).zip(sums).map(|((particles, measured), sums)| Piece {
-                    first: particles.start,
-                    moving: moving.split_off(particles.len()),
-                    measured,
-                    sums,
-                });
-            each(pieces.collect(), &|piece| pass.advance(piece));
-        }
-        exchange.values = values;
-        let Support::Mesh(corners) = support else { return Outcome::default() };
-        corners.measured = measured;
-        corners.arrive(true);
-        let outcome = exchange.check(&c, corners, bins.bin_of());
+        let is_in_doubt = AtomicBool::new(false);
+        let pass = Pass {
+            c: &c,
+            domain: &**domain,
+            corners: shared,
+            values,
+            law,
+            transfer,
+            forcing: Forcing::new(body_force, fixed.X, t_next, &c, of_time),
+            fixed,
+            uniform,
+            buffers,
+            is_in_doubt: &is_in_doubt,
+        };
+        let chunks = &shared.chunks;
+        let of_chunks = chunks.iter().map(|chunk| chunk.particles.clone());
+        let parts = measured.split(&shared.mesh, of_chunks.clone());
+        let sums = exchange.begin(chunks, transfer.is_affine());
+        let pieces = of_chunks.zip(parts).zip(sums).map(|((particles, measured), sums)| Piece {
+            first: particles.start,
+            moving: moving.split_off(particles.len()),
+            measured,
+            sums,
+        });
+        each(pieces.collect(), &|piece| pass.advance(piece));
+        shared.measured = measured;
+        shared.arrive(true);
+        let outcome = corner_exchange::check(&c, shared, bins.bin_of());
         if !is_in_doubt.into_inner() {
             return outcome;
         }
-        outcome.merge(check_all(particles, (&c, support), bins.bin_of()))
+        outcome.merge(check_all(particles, (&c, shared)))
     }
 }
 
@@ -120,7 +119,7 @@ struct Piece<'a, T, const D: usize> {
 /// The inputs common to all chunks.
 struct Pass<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    support: &'a Support<T, D>,
+    domain: &'a dyn Domain<T, D>,
     corners: &'a SharedCorners<T, D>,
     /// The values of the grid at corners.
     values: &'a CornerValues<T, D>,
@@ -138,14 +137,14 @@ struct Pass<'a, T, const D: usize> {
 impl<T: Lanes, const D: usize> Pass<'_, T, D> {
     /// Advances the particles of a chunk, then sums their contributions to the next step at corners.
     fn advance(&self, piece: Piece<'_, T, D>) {
-        let &Self { c, support, corners, values, law, transfer, ref forcing, .. } = self;
+        let &Self { c, domain, corners, values, law, transfer, ref forcing, .. } = self;
         let &Self { fixed, uniform, buffers: pool, is_in_doubt, .. } = self;
         let Piece { first: of_chunk, moving, mut measured, mut sums } = piece;
         let SharedCorners { mesh, next, .. } = corners;
         let (is_affine, of_cells) = (transfer.is_affine(), mesh.is_of_cells());
         sums.clear();
         let mut copies = Copies::new();
-        let mut buffers = pool.take(support, is_affine);
+        let mut buffers = pool.take(domain, is_affine);
         let Buffers { contributions, interpolated, .. } = &mut *buffers;
         if let Some((mass, volume)) = uniform {
             contributions.set_uniform(mass, volume);

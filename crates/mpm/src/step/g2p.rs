@@ -6,20 +6,20 @@
 //!
 //! Steps in a [single pass](crate::step::is_fused) fuse this with the next P2G ([`g2p2g`](crate::step::g2p2g)).
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_exchange::Exchange;
-use crate::domain::corner_values::Seen;
+use crate::domain::corner_exchange;
+use crate::domain::corners::{Corners, grid_values, reprojected_values};
+use crate::domain::of_particles::{Domain, OfBlock};
+use crate::domain::shared_corners::SharedCorners;
 use crate::grid::geometry::Constants;
 use crate::kernel::any::Interpolated;
-use crate::kernel::block::{Block, BlockLaw};
-use crate::kernel::buffers::{BufferPool, Buffers};
+use crate::kernel::block::BlockLaw;
+use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::have_volume_next;
 use crate::parallel::bins::Bins;
@@ -28,7 +28,7 @@ use crate::particles::Particles;
 use crate::particles::columns::Moving;
 use crate::scheme::{Taken, Transfer};
 use crate::step::health::{Outcome, SharedOutcome};
-use crate::step::state::State;
+use crate::step::state::{State, invalidity};
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;
@@ -36,15 +36,16 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, support, buffers, exchange, .. } = self;
+        let Self { particles, constants, nodes, domain, corners, buffers, .. } = self;
         let Self { F_early, internal_early, law, .. } = self;
         let c = *constants;
-        if let Support::Mesh(corners) = support {
-            exchange.interpolate(&c, corners, nodes);
+        if let Some(corners) = corners {
+            corners.interpolate(&c, nodes);
         }
-        let nodes = support.seen(nodes, &exchange.values);
+        let corners = corners.as_deref();
+        let values = grid_values(nodes, corners);
         let Particles { x, F, internal, .. } = &*particles;
-        let (support, buffers) = (&*support, &*buffers);
+        let (domain, buffers) = (&**domain, &*buffers);
         let found = SharedOutcome::default();
         let variables = self.shares.internal;
         internal_early.copy_from_slice(internal);
@@ -52,7 +53,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let pieces = F_early.chunks_mut(CHUNK).map(|F| (F, of_internal.next().unwrap_or_default()));
         each(pieces.enumerate().collect(), &|(piece, (F_early, internal))| {
             let mut outcome = Outcome::default();
-            let mut grid = FromGrid::new(&c, support, nodes, buffers.take(support, false));
+            let mut grid = FromGrid::new(&c, values, buffers.take(domain, false));
             let (x, F) = (&x[piece * CHUNK..], &F[piece * CHUNK..]);
             let mut of_internal = internal.chunks_mut((BLOCK * variables).max(1));
             let blocks = F_early.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
@@ -63,7 +64,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                     F_early.iter_mut().zip(interpolated).zip(x).zip(F).enumerate()
                 {
                     *F_early = c.stretch_for(time, &interpolated.velocity_gradient, F);
-                    if let Some(invalid) = support.invalidity(&c, first + k, x, F_early) {
+                    if let Some(invalid) = invalidity(&c, domain, corners, first + k, x, F_early) {
                         let failure = Some((invalid, first + k));
                         outcome = outcome.merge(Outcome { failure, ..Outcome::default() });
                     }
@@ -81,35 +82,29 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Velocity by the transfer, position, and F for the rest of the step.
     pub(crate) fn g2p(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, support, transfer, .. } = self;
+        let Self { particles, constants, nodes, bins, domain, corners, transfer, .. } = self;
         let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
-        let buffers = &self.buffers;
         let (c, transfer) = (*constants, *transfer);
-        let nodes = support.seen(nodes, &self.exchange.values);
-        g2p(
-            particles,
-            bins,
-            c,
-            (support, &self.exchange),
-            buffers,
-            transfer,
-            |(block, support), interpolated, first, of_block| {
-                block.g2p((&c, support), nodes, interpolated);
-                let early = early(first..first + interpolated.len());
-                Follow { c: &c, law, late, early }.advance(transfer, interpolated, of_block);
-            },
-        )
+        let values = grid_values(nodes, corners.as_deref());
+        let pass = G2p { c: &c, bins, domain: &**domain, corners: corners.as_deref() };
+        let found = pass.all(particles, (&self.buffers, transfer), |buffers, ids, of_block| {
+            let interpolated = values.g2p(&c, buffers, ids);
+            let early = early(ids);
+            Follow { c: &c, law, late, early }.advance(transfer, interpolated, of_block);
+        });
+        drop(early);
+        self.arrive(found)
     }
 
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
-        let Self { particles, constants, nodes, support, transfer, buffers, .. } = self;
-        let (c, support, transfer) = (*constants, &*support, *transfer);
-        let nodes = support.seen(nodes, &self.exchange.values);
+        let Self { particles, constants, nodes, domain, corners, transfer, buffers, .. } = self;
+        let (c, domain, transfer) = (*constants, &**domain, *transfer);
+        let values = grid_values(nodes, corners.as_deref());
         let buffers = &*buffers;
         each_piece(particles, &|first, piece| {
-            let own = buffers.take(support, transfer.is_affine());
-            let mut grid = FromGrid::new(&c, support, nodes, own);
+            let own = buffers.take(domain, transfer.is_affine());
+            let mut grid = FromGrid::new(&c, values, own);
             for (start, Moving { x, v, F, affine, .. }) in piece.pieces(BLOCK) {
                 take_velocity(&c, transfer, grid.g2p(first + start, x, F), v, affine);
             }
@@ -119,34 +114,44 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, reprojected, support, .. } = self;
+        let Self { particles, constants, nodes, bins, reprojected, domain, corners, .. } = self;
         let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
-        let (buffers, exchange, c) = (&self.buffers, &mut self.exchange, *constants);
-        if let Support::Mesh(corners) = support {
-            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
-            exchange.interpolate(&c, corners, reprojected);
-            std::mem::swap(&mut exchange.values, &mut exchange.reprojected);
+        let c = *constants;
+        if let Some(corners) = corners {
+            corners.interpolate_reprojected(&c, reprojected);
         }
-        let reprojected = support.seen(reprojected, &exchange.reprojected);
-        let nodes = support.seen(nodes, &exchange.values);
-        let reprojected = if c.planted.is(Fault::NoReprojection) { nodes } else { reprojected };
-        g2p(
-            particles,
-            bins,
-            c,
-            (support, &*exchange),
-            buffers,
-            Transfer::Flip,
-            |(block, support), interpolated, first, of_block| {
-                block.g2p((&c, support), nodes, interpolated);
+        let values = grid_values(nodes, corners.as_deref());
+        let reprojected = match c.planted.is(Fault::NoReprojection) {
+            true => values,
+            false => reprojected_values(reprojected, corners.as_deref()),
+        };
+        let pass = G2p { c: &c, bins, domain: &**domain, corners: corners.as_deref() };
+        let found =
+            pass.all(particles, (&self.buffers, Transfer::Flip), |buffers, ids, of_block| {
+                let interpolated = values.g2p(&c, buffers, ids);
                 for (x, interpolated) in of_block.x.iter_mut().zip(&*interpolated) {
                     *x += interpolated.velocity * c.time_step;
                 }
-                block.g2p((&c, support), reprojected, interpolated);
-                let early = early(first..first + interpolated.len());
-                Follow { c: &c, law, late, early }.stretch(interpolated, of_block);
-            },
-        )
+                let interpolated = reprojected.g2p(&c, buffers, ids);
+                let follow = Follow { c: &c, law, late, early: early(ids) };
+                follow.stretch(interpolated, of_block);
+            });
+        drop(early);
+        self.arrive(found)
+    }
+
+    /// After a pass that has moved all particles: the corners that they share arrive at their places too, and are checked.
+    fn arrive(&mut self, (found, is_in_doubt): (SharedOutcome, bool)) -> Outcome {
+        let Self { particles, constants, bins, corners, .. } = self;
+        if let Some(corners) = corners {
+            let Corners { shared, .. } = &mut **corners;
+            shared.arrive(false);
+            found.add(corner_exchange::check(constants, shared, bins.bin_of()));
+            if is_in_doubt {
+                found.add(check_all(particles, (constants, shared)));
+            }
+        }
+        found.all()
     }
 
     /// APIC: the affine velocities of particles that have none yet are those of their velocities on the grid.
@@ -158,13 +163,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         for node in &mut self.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, support, buffers, exchange, .. } = self;
-        if let Support::Mesh(corners) = support {
-            exchange.interpolate(constants, corners, nodes);
+        let Self { particles, constants, nodes, domain, corners, buffers, .. } = self;
+        if let Some(corners) = corners {
+            corners.interpolate(constants, nodes);
         }
-        let nodes = support.seen(nodes, &exchange.values);
+        let values = grid_values(nodes, corners.as_deref());
         let Particles { x, F, affine, .. } = particles;
-        let mut grid = FromGrid::new(constants, support, nodes, buffers.take(support, true));
+        let mut grid = FromGrid::new(constants, values, buffers.take(&**domain, true));
         let blocks = affine.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
         for (index, ((affine, x), F)) in blocks.enumerate() {
             let interpolated = grid.g2p(index * BLOCK, x, F);
@@ -173,23 +178,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
             }
         }
     }
-
-    /// The corners of domains move with the grid; their new positions are stored beside the old.
-    pub(crate) fn move_corners(&mut self) {
-        let Self { constants, nodes, support, exchange, .. } = self;
-        if let Support::Mesh(corners) = support {
-            let mut next = std::mem::take(&mut corners.next);
-            exchange.interpolate_and_follow(constants, corners, nodes, &mut next);
-            corners.next = next;
-        }
-    }
 }
 
 /// G2P of successive particles, block by block.
 struct FromGrid<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    support: &'a Support<T, D>,
-    nodes: Seen<'a, T, D>,
+    values: GridValues<'a, T, D>,
     copies: Copies<T, D>,
     buffers: Box<Buffers<T, D>>,
 }
@@ -197,11 +191,10 @@ struct FromGrid<'a, T, const D: usize> {
 impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     fn new(
         c: &'a Constants<T, D>,
-        support: &'a Support<T, D>,
-        nodes: Seen<'a, T, D>,
+        values: GridValues<'a, T, D>,
         buffers: Box<Buffers<T, D>>,
     ) -> Self {
-        Self { c, support, nodes, copies: Copies::new(), buffers }
+        Self { c, values, copies: Copies::new(), buffers }
     }
 
     /// Interpolated values of the particles from the id `first` on, no more than a block.
@@ -211,17 +204,10 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) -> &[Interpolated<T, D>] {
-        let Self { c, support, nodes, copies, buffers } = self;
-        let Buffers { block, interpolated, .. } = &mut **buffers;
-        let interpolated = &mut interpolated[..x.len()];
-        block.compute_weights(
-            c,
-            support,
-            &successive(first)[..x.len()],
-            copies.of_successive(x, F),
-        );
-        block.g2p((c, support), *nodes, interpolated);
-        interpolated
+        let Self { c, values, copies, buffers } = self;
+        let ids = &successive(first)[..x.len()];
+        values.compute_weights(c, buffers, ids, copies.of_successive(x, F));
+        values.g2p(c, buffers, ids)
     }
 }
 
@@ -233,16 +219,15 @@ pub(crate) struct Early<'a, T, const D: usize> {
 }
 
 impl<'a, T, const D: usize> Early<'a, T, D> {
-    /// These of some of all particles, where steps have an early part.
-    fn of(
-        F: &'a [SMatrix<T, D, D>],
-        internal: &'a [T],
-    ) -> impl Fn(Range<usize>) -> Option<Self> + Sync
+    /// These of successive particles, where steps have an early part.
+    fn of(F: &'a [SMatrix<T, D, D>], internal: &'a [T]) -> impl Fn(&[u32]) -> Option<Self> + Sync
     where
         T: Sync,
     {
         let variables = internal.len().checked_div(F.len()).unwrap_or(0);
-        move |particles| {
+        move |ids| {
+            let first = ids.first().map_or(0, |id| *id as usize);
+            let particles = first..first + ids.len();
             let internal = &internal[particles.start * variables..];
             let internal = internal.get(..particles.len() * variables)?;
             Some(Self { F: F.get(particles)?, internal })
@@ -332,110 +317,104 @@ fn each_piece<T: Lanes, const D: usize>(
     each(moving.pieces(CHUNK).collect(), &|(first, piece)| work(first, piece));
 }
 
-/// Calls `update(weights, buffer for interpolated values, first id, particles)` for every block of particles, then checks that
-/// each particle is valid and in its bin.
-fn g2p<T: Lanes, const D: usize>(
-    particles: &mut Particles<T, D>,
-    bins: &Bins,
-    c: Constants<T, D>,
-    (support, exchange): (&mut Support<T, D>, &Exchange<T, D>),
-    buffers: &BufferPool<T, D>,
-    transfer: Transfer,
-    update: impl Fn(
-        (&mut Block<T, D>, &Support<T, D>),
-        &mut [Interpolated<T, D>],
-        usize,
-        &mut Moving<'_, T, D>,
-    ) + Sync,
-) -> Outcome {
-    let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
-    let at_start = &*support;
-    // Where domains share corners, these have to be at their new places before particles are told invalid.
-    let is_in_doubt = AtomicBool::new(false);
-    each_piece(particles, &|of_piece, piece| {
-        let mut outcome = Outcome::default();
-        let mut copies = Copies::new();
-        let mut own = buffers.take(at_start, transfer.is_affine());
-        let Buffers { block, interpolated, .. } = &mut *own;
-        for (start, mut of_block) in piece.pieces(BLOCK) {
-            let (first, count) = (of_piece + start, of_block.len());
-            if !matches!(at_start, Support::Mesh(_)) {
-                copies.copy(of_block.x, of_block.F);
-            }
-            if c.planted.is(Fault::WeightsOfNewPosition) {
-                for (x, v) in copies.x.iter_mut().zip(&*of_block.v) {
-                    *x += v * c.time_step;
+/// A pass of G2P over all particles.
+struct G2p<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    bins: &'a Bins,
+    domain: &'a dyn Domain<T, D>,
+    corners: Option<&'a Corners<T, D>>,
+}
+
+impl<T: Lanes, const D: usize> G2p<'_, T, D> {
+    /// Calls `update(buffers with weights, ids, particles)` for every block of particles, then checks that each particle is valid and
+    /// in its bin. Gives the outcome, and whether a particle is in doubt: where particles share corners, these have to be at their new
+    /// places before particles are told invalid.
+    fn all(
+        &self,
+        particles: &mut Particles<T, D>,
+        (buffers, transfer): (&BufferPool<T, D>, Transfer),
+        update: impl Fn(&mut Buffers<T, D>, &[u32], &mut Moving<'_, T, D>) + Sync,
+    ) -> (SharedOutcome, bool) {
+        let &Self { c, bins, domain, corners } = self;
+        let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
+        let is_in_doubt = AtomicBool::new(false);
+        each_piece(particles, &|of_piece, piece| {
+            let mut outcome = Outcome::default();
+            let mut copies = Copies::new();
+            let mut own = buffers.take(domain, transfer.is_affine());
+            for (start, mut of_block) in piece.pieces(BLOCK) {
+                let first = of_piece + start;
+                let ids = &successive(first)[..of_block.len()];
+                if corners.is_none() {
+                    copies.copy(of_block.x, of_block.F);
+                    if c.planted.is(Fault::WeightsOfNewPosition) {
+                        for (x, v) in copies.x.iter_mut().zip(&*of_block.v) {
+                            *x += v * c.time_step;
+                        }
+                    }
+                    own.weights.compute(c, ids, copies.kinematics());
                 }
-            }
-            block.compute_weights(&c, at_start, &successive(first)[..count], copies.kinematics());
-            update((block, at_start), &mut interpolated[..count], first, &mut of_block);
-            let Moving { x, F, .. } = of_block;
-            match at_start {
-                Support::Product(_) | Support::Cpdi { .. } => {
-                    outcome = outcome.merge(check(&c, at_start, &mut copies, first, bin_of, x, F));
-                }
-                Support::Mesh(corners) => {
-                    // Polygons are measured when all corners are at their new places.
-                    let is_valid = corners.mesh.is_of_cells()
-                        && corners.are_inside(&c, x, F)
-                        && have_volume_next(corners, (first, x.len()));
-                    if !is_valid {
-                        is_in_doubt.store(true, Ordering::Relaxed);
+                update(&mut own, ids, &mut of_block);
+                let Moving { x, F, .. } = of_block;
+                match corners {
+                    None => outcome = outcome.merge(self.check(&mut copies, ids, bin_of, x, F)),
+                    Some(Corners { shared, .. }) => {
+                        // Polygons are measured when all corners are at their new places.
+                        let is_valid = shared.mesh.is_of_cells()
+                            && shared.are_inside(c, x, F)
+                            && have_volume_next(shared, (first, x.len()));
+                        if !is_valid {
+                            is_in_doubt.store(true, Ordering::Relaxed);
+                        }
                     }
                 }
             }
-        }
-        buffers.give_back(own);
-        found.add(outcome);
-    });
-    let Support::Mesh(corners) = support else { return found.all() };
-    corners.arrive(false);
-    found.add(exchange.check(&c, corners, bin_of));
-    if is_in_doubt.into_inner() {
-        found.add(check_all(particles, (&c, support), bin_of));
+            buffers.give_back(own);
+            found.add(outcome);
+        });
+        (found, is_in_doubt.into_inner())
     }
-    found.all()
+
+    /// Checks the particles of a block.
+    fn check(
+        &self,
+        copies: &mut Copies<T, D>,
+        ids: &[u32],
+        bin_of: &[u32],
+        x: &[SVector<T, D>],
+        F: &[SMatrix<T, D, D>],
+    ) -> Outcome {
+        let &Self { c, domain, .. } = self;
+        let mut bins = [0; BLOCK];
+        for (bin, &p) in bins.iter_mut().zip(ids) {
+            *bin = bin_of[p as usize];
+        }
+        let kinematics = copies.of_successive(x, F);
+        let mut outcome = Outcome::default();
+        if domain.are_valid(OfBlock { c, ids, bins: &bins, kinematics }) {
+            return outcome;
+        }
+        for (((x, F), bin), &p) in x.iter().zip(F).zip(bins).zip(ids) {
+            outcome = outcome.merge(domain.diagnose(c, p as usize, bin, x, F));
+        }
+        outcome
+    }
 }
 
-/// Checks all particles.
+/// Checks all particles that share corners.
 pub(crate) fn check_all<T: Lanes, const D: usize>(
     particles: &mut Particles<T, D>,
-    (c, support): (&Constants<T, D>, &Support<T, D>),
-    bin_of: &[u32],
+    (c, corners): (&Constants<T, D>, &SharedCorners<T, D>),
 ) -> Outcome {
     let found = SharedOutcome::default();
-    each_piece(particles, &|of_piece, piece| {
-        let (mut outcome, mut copies) = (Outcome::default(), Copies::new());
-        for (start, Moving { x, F, .. }) in piece.pieces(BLOCK) {
-            let found = check(c, support, &mut copies, of_piece + start, bin_of, x, F);
-            outcome = outcome.merge(found);
+    each_piece(particles, &|first, Moving { x, F, .. }| {
+        let mut outcome = Outcome::default();
+        for (k, (x, F)) in x.iter().zip(&*F).enumerate() {
+            let invalid = corners.invalidity(c, first + k, x, F);
+            let failure = invalid.map(|invalid| (invalid, first + k));
+            outcome = outcome.merge(Outcome { failure, resort: false });
         }
         found.add(outcome);
     });
     found.all()
-}
-
-/// Checks the particles of a block, from the id `first` on.
-fn check<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    support: &Support<T, D>,
-    copies: &mut Copies<T, D>,
-    first: usize,
-    bin_of: &[u32],
-    x: &[SVector<T, D>],
-    F: &[SMatrix<T, D, D>],
-) -> Outcome {
-    let mut bins = [0; BLOCK];
-    // Where domains share corners the bins are those of the corners.
-    if !matches!(support, Support::Mesh(_)) {
-        bins[..x.len()].copy_from_slice(&bin_of[first..first + x.len()]);
-    }
-    let mut outcome = Outcome::default();
-    if support.are_valid(c, &successive(first)[..x.len()], &bins, copies.of_successive(x, F)) {
-        return outcome;
-    }
-    for (k, ((x, F), bin)) in x.iter().zip(F).zip(bins).enumerate() {
-        outcome = outcome.merge(support.diagnose(c, first + k, bin, x, F));
-    }
-    outcome
 }

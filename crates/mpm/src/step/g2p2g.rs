@@ -6,23 +6,19 @@
 //!
 //! Source: Wang et al., "A massively parallel and scalable multi-GPU material point method", ACM Trans. Graph. 39 (2020) 30.
 
-use mmsmith_lanes::simd::{Lane4, Lanes, Vectors};
+use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
-use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_values::Seen;
+use crate::domain::of_particles::{Domain, OfBlock};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::grid::node::Node;
-use crate::kernel::any::{Contributions, Interpolated, Receive};
-use crate::kernel::block::{Block, BlockLaw};
+use crate::kernel::advance::AdvanceParticles;
+use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::prefetch::prefetch;
 use crate::particles::columns::{DisjointMoving, Fixed, Moving, MovingColumns, PartMoving, Shares};
 use crate::scheme::Transfer;
-use crate::shape::weights::Weights;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::g2p::Follow;
@@ -36,12 +32,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self;
         let (transfer, shares) = (self.transfer, self.shares);
         let buffers = &self.buffers;
-        let (support, law) = (&self.support, &*self.law);
+        let (domain, law) = (&*self.domain, &*self.law);
         let (fixed, moving) = particles.split();
         let forcing = Forcing::new(body_force, fixed.X, t_next, c, of_time);
         let uniform = *uniform;
         let step =
-            G2p2g { c, support, law, transfer, nodes, fixed, uniform, forcing, buffers, shares };
+            G2p2g { c, domain, law, transfer, nodes, fixed, uniform, forcing, buffers, shares };
         let found = SharedOutcome::default();
         let vectors = NodeVectors::of(transfer);
         let update =
@@ -62,7 +58,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 /// The inputs common to all bins.
 struct G2p2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    support: &'a Support<T, D>,
+    domain: &'a dyn Domain<T, D>,
     law: &'a dyn BlockLaw<T, D>,
     transfer: Transfer,
     /// The grid of this step, updated.
@@ -86,7 +82,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         mut particles: PartMoving<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        let mut buffers = self.buffers.take(self.support, self.transfer.is_affine());
+        let mut buffers = self.buffers.take(self.domain, self.transfer.is_affine());
         if let Some((mass, volume)) = self.uniform {
             buffers.contributions.set_uniform(mass, volume);
         }
@@ -115,7 +111,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// As [`advance_bin`](Self::advance_bin) for a block of particles.
     fn advance_block(
         &self,
-        Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
+        Buffers { weights, contributions, interpolated, .. }: &mut Buffers<T, D>,
         band: &mut [Node<T, D>],
         (first, bin): (usize, u32),
         ids: &[u32],
@@ -123,25 +119,25 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     ) -> Outcome {
         let Moving { x, v, F, .. } = &mut particles;
         let (x, v, F) = (whole(x), whole(v), whole(F));
-        let &Self { c, support, law, transfer, nodes, ref forcing, .. } = self;
+        let &Self { c, domain, law, transfer, nodes, ref forcing, .. } = self;
         let is_with_memory = self.shares.internal > 0;
         if c.planted.is(Fault::WeightsOfNewPosition) {
             let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
-            block.compute_weights(c, support, ids, Kinematics { x: &ahead, F });
+            weights.compute(c, ids, Kinematics { x: &ahead, F });
         } else {
-            block.compute_weights(c, support, ids, Kinematics { x, F });
+            weights.compute(c, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
         let interpolated = &mut interpolated[..ids.len()];
         if transfer != Transfer::Flip {
-            block.g2p((c, support), Seen::Nodes(nodes), interpolated);
+            weights.g2p(&c.strides, nodes, interpolated);
             let mut own = particles.first(ids.len());
             let follow = Follow { c, law, late: c.time_step, early: None };
             follow.advance(transfer, interpolated, &mut own);
             contributions.set_values(c, own.v, own.affine);
         } else {
             let start = is_with_memory.then(|| F.to_vec());
-            let mut receiver = AdvanceParticles {
+            let advance = AdvanceParticles {
                 c,
                 time_step: c.time_step,
                 per_cell: c.time_step * c.inverse_spacing,
@@ -150,25 +146,19 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 F,
                 contributions,
             };
-            if let Block::Product(weights) = block {
-                weights.g2p_with(&c.strides, nodes, ids.len(), receiver);
-            } else {
-                block.g2p((c, support), Seen::Nodes(nodes), interpolated);
-                for (k, interpolated) in interpolated.iter().enumerate() {
-                    receiver.receive(k, interpolated);
-                }
-            }
+            weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
             if let Some(start) = start {
                 law.evolve(c.time_step, &start, &particles.F[..BLOCK], particles.internal);
             }
         }
         let Moving { x, F, internal, .. } = particles;
         let (x, F) = (whole(x), whole(F));
-        block.compute_weights(c, support, ids, Kinematics { x, F });
-        if !support.are_valid(c, ids, &[bin; BLOCK], Kinematics { x, F }) {
+        weights.compute(c, ids, Kinematics { x, F });
+        let of_block = OfBlock { c, ids, bins: &[bin; BLOCK], kinematics: Kinematics { x, F } };
+        if !domain.are_valid(of_block) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
-                outcome = outcome.merge(support.diagnose(c, p as usize, bin, &x[k], &F[k]));
+                outcome = outcome.merge(domain.diagnose(c, p as usize, bin, &x[k], &F[k]));
             }
             // A particle outside its bin would write to nodes beyond the band.
             if !outcome.is_clean() {
@@ -176,10 +166,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             }
         }
         if c.planted.is(Fault::LastNodeSkipped) {
-            block.skip_last_node(c, x);
+            weights.skip_last_node(c, x);
         }
         law.stress(c, F, internal, contributions);
-        block.p2g(&c.strides, band, first, contributions, ids.len());
+        weights.p2g(&c.strides, band, first, contributions, ids.len());
         Outcome::default()
     }
 }
@@ -187,78 +177,4 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
 /// A column of a whole block.
 fn whole<E>(column: &mut [E]) -> &mut [E; BLOCK] {
     column.first_chunk_mut().expect("blocks are whole")
-}
-
-/// Receiver of G2P by FLIP: advances velocity, position and F, and sets mass, momentum and body force of the next P2G.
-struct AdvanceParticles<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
-    time_step: T,
-    /// Time step over the edge of a cell.
-    per_cell: T,
-    x: &'a mut [SVector<T, D>; BLOCK],
-    v: &'a mut [SVector<T, D>; BLOCK],
-    F: &'a mut [SMatrix<T, D, D>; BLOCK],
-    /// `b` holds the body forces per mass on entry.
-    contributions: &'a mut Contributions<T, D, BLOCK>,
-}
-
-impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
-    #[inline(always)]
-    fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
-        let Self { c, contributions, .. } = self;
-        let (x, v, F) = (&mut self.x[k], &mut self.v[k], &mut self.F[k]);
-        *v += interpolated.second * c.time_step;
-        let mut velocity = interpolated.velocity;
-        if c.planted.is(Fault::PicForFlip) {
-            *v = velocity;
-        }
-        if c.planted.is(Fault::OwnVelocity) {
-            velocity = *v;
-        }
-        *x += c.planted.change(velocity * c.time_step);
-        *F = c.stretch(&interpolated.velocity_gradient, F);
-        contributions.set_value(c, k, v);
-    }
-
-    #[inline(always)]
-    fn receive_lanes<const W: usize>(
-        &mut self,
-        vectors: impl Vectors,
-        k: usize,
-        weights: &impl Weights<T, D, W>,
-        value: Lane4<T>,
-        gradient: [Lane4<T>; D],
-    ) {
-        // Faults are planted in the form for all dimensions.
-        if D != 2 || self.c.planted.is_any() {
-            self.receive(
-                k,
-                &Interpolated::new(weights, &value.0, &gradient.map(|gradient| gradient.0)),
-            );
-            return;
-        }
-        prefetch(&self.x[k], BLOCK);
-        prefetch(&self.v[k], BLOCK);
-        prefetch(&self.F[k], BLOCK);
-        let Self { time_step, per_cell, contributions, .. } = self;
-        let (Some(x), Some(v), Some(F)) = (
-            self.x[k].as_mut_slice().first_chunk_mut::<2>(),
-            self.v[k].as_mut_slice().first_chunk_mut::<2>(),
-            self.F[k].as_mut_slice().first_chunk_mut::<4>(),
-        ) else {
-            return;
-        };
-        let xv = vectors
-            .add(Lane4([x[0], x[1], v[0], v[1]]), vectors.mul(value, vectors.splat(*time_step)));
-        *x = [xv.0[0], xv.0[1]];
-        *v = [xv.0[2], xv.0[3]];
-        let factor = vectors.splat(*per_cell);
-        let old = vectors.load(F);
-        let along = vectors.mul(vectors.low_twice(gradient[0]), factor);
-        let across = vectors.mul(vectors.low_twice(gradient[D - 1]), factor);
-        let stretch = vectors
-            .add(vectors.mul(along, vectors.even(old)), vectors.mul(across, vectors.odd(old)));
-        *F = vectors.add(old, stretch).0;
-        contributions.set_value_in_plane(vectors, k, xv);
-    }
 }

@@ -2,18 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use mmsmith_lanes::simd::{Eight, Lanes, Loop, Vectors, dispatch};
-use mmsmith_lanes::tensor::{determinant, real};
-use nalgebra::{SMatrix, SVector};
-
-use crate::domain::{Rows, Support};
-use crate::grid::geometry::Constants;
-use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::parallelograms::{GROUP, OfGroup, gather, padded, parallelograms};
-use crate::shape::cells::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram};
-use crate::shape::one_axis::{
-    EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size, node_below,
-};
+use mmsmith_lanes::tensor::determinant;
+use nalgebra::{RealField, SMatrix, SVector};
 
 /// Reasons why a particle is invalid, worst first: where one particle is inverted, others may follow in the same step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -24,243 +14,18 @@ pub(crate) enum Invalid {
     TooLarge,
 }
 
-impl<T: Lanes, const D: usize> Support<T, D> {
-    /// The reason why a particle is invalid, if it is.
-    pub(crate) fn invalidity(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
+impl Invalid {
+    /// The reason why a particle is invalid whatever its domain, if there is one.
+    pub(crate) fn of_deformation<T: RealField + Copy, const D: usize>(
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
-    ) -> Option<Invalid> {
+    ) -> Option<Self> {
         let J = determinant(F);
         if J <= T::zero() {
-            return Some(Invalid::Inverted);
+            return Some(Self::Inverted);
         }
-        if !J.is_finite() || x.iter().any(|x| !x.is_finite()) {
-            return Some(Invalid::NotFinite);
-        }
-        // Polygons may have axes of their own; their corners are looked at themselves.
-        let is_polygon = matches!(self, Self::Mesh(corners) if !corners.mesh.is_of_cells());
-        if !is_polygon && c.axis_outside(x).is_some() {
-            return Some(Invalid::LeftGrid);
-        }
-        if let Some(volume) = self.volume(p) {
-            if volume <= T::zero() {
-                return Some(Invalid::Inverted);
-            }
-            if !volume.is_finite() {
-                return Some(Invalid::NotFinite);
-            }
-        }
-        self.axis_too_large(&self.half_size(c, p, F)).map(|_| Invalid::TooLarge)
-    }
-
-    /// Diagnoses a particle that may be invalid or outside its bin.
-    pub(crate) fn diagnose(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        bin: u32,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-    ) -> Outcome {
-        if let Some(invalid) = self.invalidity(c, p, x, F) {
-            return Outcome { failure: Some((invalid, p)), resort: false };
-        }
-        // Where domains share corners, these are what is sorted.
-        let is_inside = matches!(self, Self::Mesh(_)) || self.is_in_bin(c, p, bin, x, F);
-        Outcome { failure: None, resort: !is_inside }
-    }
-
-    /// Whether a particle is in a bin.
-    pub(crate) fn is_in_bin(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        bin: u32,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-    ) -> bool {
-        let l = self.half_size(c, p, F);
-        let Rows { edge, width } = self.rows(c, p, x, F, &l);
-        let (first, end) = c.bins.range(bin, width);
-        edge >= real(first) && edge < real(end)
-    }
-
-    /// Whether all particles `ids` of a block are valid, each in its own of `bins`. Nearly all are, and this tells it sooner
-    /// than [`diagnose`](Self::diagnose), which has to tell for the others.
-    pub(crate) fn are_valid(
-        &self,
-        c: &Constants<T, D>,
-        ids: &[u32],
-        bins: &[u32; BLOCK],
-        kinematics: Kinematics<'_, T, D>,
-    ) -> bool {
-        let mut all_valid = true;
-        let of_block = OfBlock { c, kinematics, bins, count: ids.len().min(BLOCK) };
-        let all = &mut all_valid;
-        match self {
-            Self::Product(shape) if shape.on_axis == OnAxis::StretchingBox => {
-                dispatch(CheckBoxes::<_, D, true> { of_block, shape, all_valid: all });
-            }
-            Self::Product(shape) => {
-                dispatch(CheckBoxes::<_, D, false> { of_block, shape, all_valid: all });
-            }
-            Self::Cpdi { half_edges } => {
-                let ids = &padded(ids);
-                dispatch(CheckParallelograms { of_block, half_edges, ids, all_valid: all });
-            }
-            Self::Mesh(_) => {
-                let Kinematics { x, F } = kinematics;
-                for (k, &p) in ids.iter().enumerate() {
-                    all_valid &= self.invalidity(c, p as usize, &x[k], &F[k]).is_none();
-                }
-            }
-        }
-        all_valid
-    }
-}
-
-/// Particles of a block that are to be checked: the first `count`, each in one of `bins`.
-#[derive(Clone, Copy)]
-struct OfBlock<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
-    kinematics: Kinematics<'a, T, D>,
-    bins: &'a [u32; BLOCK],
-    count: usize,
-}
-
-impl<T: Lanes, const D: usize> OfBlock<'_, T, D> {
-    /// Whether all particles of a group are valid: inside the grid, with small domains between these corners, in cells, and in
-    /// their bins.
-    #[inline(always)]
-    fn are_domains_valid<V: Vectors>(
-        &self,
-        vectors: V,
-        group: usize,
-        corners: &[[Eight<T, V>; D]; MOST_CORNERS],
-    ) -> bool {
-        let &Self { c, kinematics: Kinematics { x, F }, bins, count } = self;
-        let constant = |value: T| Eight { lanes: vectors.splat8(value), vectors };
-        // The sign of a difference is exact: none of these may be negative.
-        let mut slack = constant(T::one()).lanes;
-        let (mut low, mut high) = (corners[0], corners[0]);
-        for a in 0..D {
-            for corner in &corners[1..1 << D] {
-                low[a].lanes = vectors.min8(low[a].lanes, corner[a].lanes);
-                high[a].lanes = vectors.max8(high[a].lanes, corner[a].lanes);
-            }
-            let x = gather(vectors, group, |k| x[k][a]);
-            let above = x - constant(c.lower[a]);
-            let xi = above * constant(c.inverse_spacing);
-            let small = constant(real(SMALL));
-            for slack_of in
-                [above, constant(c.upper[a]) - x, small - (xi - low[a]), small - (high[a] - xi)]
-            {
-                slack = vectors.min8(slack, slack_of.lanes);
-            }
-        }
-        let mut lanes_of_F = [[corners[0][0]; D]; D];
-        for i in 0..D {
-            for j in 0..D {
-                lanes_of_F[i][j] = gather(vectors, group, |k| F[k][(i, j)]);
-            }
-        }
-        let J = cells::determinant(&lanes_of_F).lanes;
-        let (low, high) = (low[D - 1].lanes, high[D - 1].lanes);
-        let mut all = true;
-        for n in 0..GROUP {
-            let k = group * GROUP + n;
-            let (first, end) = c.bins.range(bins[k], REACHED);
-            let rows = node_below(high.0[n]).0 - node_below(low.0[n]).0;
-            let is_valid = (J.0[n] > T::zero())
-                & (slack.0[n] >= T::zero())
-                & (rows <= (REACHED - 2) as f64)
-                & (low.0[n] >= real(first))
-                & (low.0[n] < real(end));
-            all &= is_valid | (k >= count);
-        }
-        all
-    }
-}
-
-/// Half-size of a domain, in cells, that is below [`HALF_SIZE_LIMIT`] however it is rounded.
-const SMALL: f64 = HALF_SIZE_LIMIT - 0.125;
-
-struct CheckBoxes<'a, 'b, T, const D: usize, const STRETCHING: bool> {
-    of_block: OfBlock<'a, T, D>,
-    shape: &'a ProductShape<T, D>,
-    all_valid: &'b mut bool,
-}
-
-impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
-    for CheckBoxes<'_, '_, T, D, STRETCHING>
-{
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) {
-        let Self { of_block, shape, all_valid } = self;
-        let OfBlock { c, kinematics: Kinematics { x, F }, bins, count } = of_block;
-        let (width, above) = (shape.width(), shape.extended_above());
-        let more_rows: T = real((EXTENDED - width) as f64);
-        let half_size = |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]);
-        // The lower edge, and the same where it would be for the last row of a box with extended support.
-        let edges = |k: usize, is_extended: bool| {
-            let a = D - 1;
-            let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - half_size(k, a);
-            (edge, if is_extended { edge + more_rows } else { edge })
-        };
-        let is_inside = |(first, end): (f64, f64), (low, high): (T, T)| {
-            (low >= real(first)) & (high < real(end))
-        };
-        let bins = &bins[..count.min(BLOCK)];
-        let Some((&bin, others)) = bins.split_first() else { return };
-        let range = c.bins.range(bin, width);
-        let (mut all, mut all_inside) = (true, true);
-        for k in 0..bins.len() {
-            let mut valid = determinant(&F[k]) > T::zero();
-            let mut is_extended = false;
-            for a in 0..D {
-                let (x, l) = (x[k][a], half_size(k, a));
-                valid &= (x >= c.lower[a]) & (x <= c.upper[a]) & (l <= real(HALF_SIZE_LIMIT));
-                is_extended |= l > above;
-            }
-            all &= valid;
-            all_inside &= is_inside(range, edges(k, is_extended));
-        }
-        // Blocks with particles of several bins are rare.
-        if others.iter().any(|other| *other != bin) {
-            all_inside = bins.iter().enumerate().all(|(k, &bin)| {
-                let is_extended = (0..D).any(|a| half_size(k, a) > above);
-                is_inside(c.bins.range(bin, width), edges(k, is_extended))
-            });
-        }
-        *all_valid = all && all_inside;
-    }
-}
-
-struct CheckParallelograms<'a, 'b, T, const D: usize> {
-    of_block: OfBlock<'a, T, D>,
-    half_edges: &'a HalfEdges<T, D>,
-    ids: &'a [usize; BLOCK],
-    all_valid: &'b mut bool,
-}
-
-impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
-    #[inline(always)]
-    fn run<V: Vectors>(self, vectors: V) {
-        let Self { of_block, half_edges, ids, all_valid } = self;
-        let OfBlock { c, kinematics, count, .. } = of_block;
-        let mut all = true;
-        for group in 0..count.div_ceil(GROUP).min(BLOCK / GROUP) {
-            let OfGroup { xi, E } = parallelograms(vectors, c, half_edges, ids, kinematics, group);
-            let mut corners = [xi; MOST_CORNERS];
-            for (corner, at) in corners.iter_mut().enumerate().take(1 << D) {
-                *at = corner_of_parallelogram(&xi, &E, corner);
-            }
-            all &= of_block.are_domains_valid(vectors, group, &corners);
-        }
-        *all_valid = all;
+        let is_finite = J.is_finite() && x.iter().all(|x| x.is_finite());
+        (!is_finite).then_some(Self::NotFinite)
     }
 }
 
@@ -308,14 +73,16 @@ impl SharedOutcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::of_particles::{Domain, OfBlock};
+    use crate::grid::geometry::Constants;
     use crate::grid::{Grid, Layout};
-    use crate::kernel::copies::Copies;
+    use crate::kernel::copies::{BLOCK, Copies};
     use crate::parallel::bins::Bins;
-    use crate::scheme::Shape;
+    use crate::shape::one_axis::{OnAxis, ProductShape};
     use nalgebra::{Matrix2, Vector2, vector};
 
-    fn shape(shape: Shape) -> ProductShape<f64, 2> {
-        ProductShape::new(shape, Vector2::repeat(0.25)).unwrap()
+    fn shape(on_axis: OnAxis, half_size: f64) -> ProductShape<f64, 2> {
+        ProductShape { on_axis, l: Vector2::repeat(half_size) }
     }
 
     fn constants() -> Constants<f64, 2> {
@@ -359,14 +126,15 @@ mod tests {
 
     fn is_valid(
         c: &Constants<f64, 2>,
-        support: &Support<f64, 2>,
+        domain: &ProductShape<f64, 2>,
         bin: u32,
         x: Vector2<f64>,
         F: Matrix2<f64>,
     ) -> bool {
         let mut copies = Copies::new();
         copies.copy(&[x], &[F]);
-        support.are_valid(c, &[0], &[bin; BLOCK], copies.kinematics())
+        let kinematics = copies.kinematics();
+        domain.are_valid(OfBlock { c, ids: &[0], bins: &[bin; BLOCK], kinematics })
     }
 
     #[test]
@@ -375,20 +143,19 @@ mod tests {
         let with = |a: f64, b: f64| Matrix2::from_diagonal(&vector![a, b]);
         let one = with(1.0, 1.0);
         let valid = |shape: ProductShape<f64, 2>| {
-            let support = Support::Product(shape);
             move |x, F| {
-                let is_valid = is_valid(&c, &support, 2, x, F);
-                let outcome = support.diagnose(&c, 0, 2, &x, &F);
+                let is_valid = is_valid(&c, &shape, 2, x, F);
+                let outcome = shape.diagnose(&c, 0, 2, &x, &F);
                 assert_eq!(is_valid, outcome.is_clean(), "{x} {F}");
                 is_valid
             }
         };
-        for_all_limits("hat", one, 0.0, 28.0, &valid(shape(Shape::Linear)));
-        let fixed = shape(Shape::Ugimp);
+        for_all_limits("hat", one, 0.0, 28.0, &valid(shape(OnAxis::Hat, 0.0)));
+        let fixed = shape(OnAxis::FixedBox, 0.25);
         for_all_limits("fixed", one, 0.25, 27.0, &valid(fixed));
-        for_all_limits("quadratic", one, 0.5, 27.0, &valid(shape(Shape::Bspline2)));
-        for_all_limits("cubic", one, 1.0, 26.0, &valid(shape(Shape::Bspline3)));
-        let of_box = valid(shape(Shape::Gimp));
+        for_all_limits("quadratic", one, 0.5, 27.0, &valid(shape(OnAxis::Quadratic, 0.5)));
+        for_all_limits("cubic", one, 1.0, 26.0, &valid(shape(OnAxis::Cubic, 1.0)));
+        let of_box = valid(shape(OnAxis::StretchingBox, 0.25));
         for (F, half_size, end) in [
             (one, 0.25, 27.0),
             (with(1.0, 2.0), 0.5, 27.0),
@@ -407,7 +174,7 @@ mod tests {
         for (bin, y, valid) in
             [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
         {
-            let hat = Support::Product(shape(Shape::Linear));
+            let hat = shape(OnAxis::Hat, 0.0);
             assert_eq!(is_valid(&c, &hat, bin, vector![1.2, y], one), valid, "{bin} {y}");
         }
     }
@@ -416,7 +183,7 @@ mod tests {
     fn a_particle_that_left_its_bin_is_sorted_anew_and_an_invalid_one_stops_the_run() {
         let c = constants();
         let one = Matrix2::identity();
-        let hat = Support::Product(shape(Shape::Linear));
+        let hat = shape(OnAxis::Hat, 0.0);
         let diagnose = |y: f64, F: &Matrix2<f64>| hat.diagnose(&c, 41, 2, &vector![1.2, y], F);
         assert!(diagnose(9.0, &one).is_clean());
         let moved = diagnose(15.0, &one);

@@ -16,7 +16,6 @@ pub(crate) mod xpic;
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 
-use crate::domain::Support;
 use crate::scheme::{Integrator, Taken, Transfer};
 use crate::step::body_force::BodyForce;
 use crate::step::health::Outcome;
@@ -48,13 +47,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         times: StepTimes<T>,
     ) -> Outcome {
-        if let Support::Mesh(corners) = &mut self.support {
-            corners.measure();
+        if let Some(corners) = &mut self.corners {
+            corners.shared.measure();
         }
         if is_fused(integrator, self.transfer) {
-            return match self.support {
-                Support::Mesh(_) => self.step_at_corners(body_force, times),
-                Support::Product(_) | Support::Cpdi { .. } => self.fused_step(body_force, times),
+            return match self.corners {
+                Some(_) => self.step_at_corners(body_force, times),
+                None => self.fused_step(body_force, times),
             };
         }
         let early = integrator.early();
@@ -75,7 +74,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Taken::Filtered(filter) = self.transfer.taken() {
             self.filter(filter);
         }
-        self.move_corners();
+        if let Some(corners) = &mut self.corners {
+            corners.follow(&self.constants, &self.nodes);
+        }
         let outcome = if integrator.reprojects() {
             self.g2p_velocity();
             self.p2g_updated_momentum();

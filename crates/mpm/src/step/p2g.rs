@@ -11,9 +11,9 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
 use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
-use crate::domain::corner_values::CornerValues;
+use crate::domain::corners::Corners;
+use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
@@ -21,7 +21,7 @@ use crate::grid::grid_update::{
     VelocityAndAcceleration,
 };
 use crate::grid::node::Node;
-use crate::kernel::buffers::{BufferPool, Buffers};
+use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::ToCorners;
 use crate::parallel::bins::Bins;
@@ -35,8 +35,8 @@ use crate::step::state::State;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, of_time, exchange, .. } = self;
-        let (support, law, transfer) = (&self.support, &self.law, self.transfer);
+        let Self { particles, constants, layout, bins, nodes, of_time, corners, .. } = self;
+        let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let (buffers, variables) = (&self.buffers, self.shares.internal);
         let Particles { X, x, v, F, mass, volume, affine, internal, .. } = &*particles;
         let c = *constants;
@@ -44,7 +44,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -57,27 +57,27 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 copies.pick_internal(ids, internal, variables);
                 law.stress(&c, &copies.F, &copies.internal, contributions);
             };
-        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
+        p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set);
     }
 
     /// P2G of mass and momentum, and from them the velocities at the start of the step.
     pub(crate) fn p2g_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, nodes, exchange, .. } = self;
-        let (support, transfer) = (&self.support, self.transfer);
+        let Self { particles, constants, layout, bins, nodes, corners, .. } = self;
+        let (domain, transfer) = (&*self.domain, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
-        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
-        p2g.to_grid(&update, (bins, exchange, None), nodes, &momenta(mass, v, affine));
+        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
+        p2g.to_grid(&update, (bins, two_stages(corners), None), nodes, &momenta(mass, v, affine));
     }
 
     /// P2G of forces, by the stress of the F that has followed the grid with the weights of the one before; from them
     /// accelerations and the velocities at the end of the step.
     pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, F_early, of_time, exchange, .. } =
+        let Self { particles, constants, layout, bins, nodes, F_early, of_time, corners, .. } =
             self;
-        let (support, law, transfer) = (&self.support, &self.law, self.transfer);
+        let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let buffers = &self.buffers;
         let Particles { X, x, F, mass, volume, internal, .. } = &*particles;
         let (c, F_early, internal_early) = (*constants, &F_early[..], &self.internal_early[..]);
@@ -85,7 +85,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
+        let p2g = P2g { c: &c, domain, buffers, is_affine: false, x, F };
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -100,41 +100,48 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 }
                 law.stress(&c, &copies.F, &copies.internal, contributions);
             };
-        p2g.to_grid(&update, (bins, exchange, loading), nodes, &set);
+        p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set);
     }
 
     /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
     pub(crate) fn p2g_updated_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, reprojected, exchange, .. } = self;
-        let (support, transfer) = (&self.support, self.transfer);
+        let Self { particles, constants, layout, bins, reprojected, corners, .. } = self;
+        let (domain, transfer) = (&*self.domain, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g { c: &c, support, buffers, is_affine: transfer.is_affine(), x, F };
-        p2g.to_grid(&update, (bins, exchange, None), reprojected, &momenta(mass, v, affine));
+        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
+        p2g.to_grid(
+            &update,
+            (bins, two_stages(corners), None),
+            reprojected,
+            &momenta(mass, v, affine),
+        );
     }
 
     /// XPIC: the grid's velocities go to the particles and back. `next` gets those of `reprojected`, or of `nodes` at first.
     pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
-        let Self { particles, constants, layout, bins, nodes, reprojected, next, exchange, .. } =
+        let Self { particles, constants, layout, bins, nodes, reprojected, next, corners, .. } =
             self;
-        let (support, buffers) = (&self.support, &self.buffers);
+        let (domain, buffers) = (&*self.domain, &self.buffers);
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;
         let from = if is_first { &nodes[..] } else { &reprojected[..] };
-        if let Support::Mesh(corners) = support {
-            exchange.interpolate(&c, corners, from);
-        }
-        let at_corners = std::mem::replace(&mut exchange.values, CornerValues::none());
-        let seen = support.seen(from, &at_corners);
+        let (values, stages) = match corners {
+            Some(corners) => {
+                corners.interpolate(&c, from);
+                let Corners { shared, exchange, values, .. } = &mut **corners;
+                let at_corners = Some((&*shared, &*values));
+                (GridValues { nodes: from, at_corners }, Some((&*shared, exchange)))
+            }
+            None => (GridValues { nodes: from, at_corners: None }, None),
+        };
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g { c: &c, support, buffers, is_affine: false, x, F };
-        let set = |Buffers { block, contributions, interpolated, .. }: &mut Buffers<T, D>,
-                   _: &mut Copies<T, D>,
-                   ids: &[u32]| {
-            let interpolated = &mut interpolated[..ids.len()];
-            block.g2p((&c, support), seen, interpolated);
+        let p2g = P2g { c: &c, domain, buffers, is_affine: false, x, F };
+        let set = |buffers: &mut Buffers<T, D>, _: &mut Copies<T, D>, ids: &[u32]| {
+            values.g2p(&c, buffers, ids);
+            let Buffers { contributions, interpolated, .. } = buffers;
             contributions.without_stress();
             for (value, (interpolated, &p)) in
                 contributions.value.iter_mut().zip(interpolated.iter().zip(ids))
@@ -143,8 +150,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 *value = Node::new(&(interpolated.velocity * m), &SVector::zeros(), m);
             }
         };
-        p2g.to_grid(&update, (bins, exchange, None), next, &set);
-        exchange.values = at_corners;
+        p2g.to_grid(&update, (bins, stages, None), next, &set);
     }
 }
 
@@ -160,10 +166,20 @@ fn momenta<'a, T: Lanes, const D: usize>(
     }
 }
 
+/// Corners that particles share, and their exchange with particles and grid.
+type TwoStages<'a, T, const D: usize> = (&'a SharedCorners<T, D>, &'a mut Exchange<T, D>);
+
+fn two_stages<T, const D: usize>(
+    corners: &mut Option<Box<Corners<T, D>>>,
+) -> Option<TwoStages<'_, T, D>> {
+    let Corners { shared, exchange, .. } = &mut **corners.as_mut()?;
+    Some((shared, exchange))
+}
+
 /// P2G of all particles.
 struct P2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    support: &'a Support<T, D>,
+    domain: &'a dyn Domain<T, D>,
     buffers: &'a BufferPool<T, D>,
     is_affine: bool,
     x: &'a [SVector<T, D>],
@@ -176,11 +192,11 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
     fn to_grid<S: NodeUpdate<T, D>>(
         &self,
         update: &GridUpdate<'_, T, S, D>,
-        (bins, exchange, loading): (&mut Bins, &mut Exchange<T, D>, Loading<'_, T, D>),
+        (bins, stages, loading): (&mut Bins, Option<TwoStages<'_, T, D>>, Loading<'_, T, D>),
         nodes: &mut [Node<T, D>],
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
-        let Support::Mesh(corners) = self.support else {
+        let Some((corners, exchange)) = stages else {
             update.p2g(bins, nodes, &|band, first, ids| self.bin(band, first, ids, set));
             return;
         };
@@ -196,19 +212,18 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         exchange: &mut Exchange<T, D>,
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
-        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
+        let &Self { c, domain, buffers: pool, is_affine, x, F } = self;
         let chunks = &corners.chunks;
         let pieces = chunks.iter().zip(exchange.begin(chunks, is_affine)).collect();
         each(pieces, &|(Chunk { particles, .. }, mut of_chunk)| {
             of_chunk.clear();
             let ChunkSums { sums, affine_sums } = of_chunk;
             let mut copies = Copies::new();
-            let mut buffers = pool.take(support, is_affine);
+            let mut buffers = pool.take(domain, is_affine);
             for first in particles.clone().step_by(BLOCK) {
                 let ids = successive(first);
                 let ids = &ids[..BLOCK.min(particles.end - first)];
                 copies.pick(ids, x, F);
-                buffers.block.compute_weights(c, support, ids, copies.kinematics());
                 set(&mut buffers, &mut copies, ids);
                 ToCorners {
                     c,
@@ -235,18 +250,18 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         ids: &[u32],
         set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
-        let &Self { c, support, buffers: pool, is_affine, x, F } = self;
+        let &Self { c, domain, buffers: pool, is_affine, x, F } = self;
         let mut copies = Copies::new();
-        let mut buffers = pool.take(support, is_affine);
+        let mut buffers = pool.take(domain, is_affine);
         for ids in ids.chunks(BLOCK) {
             copies.pick(ids, x, F);
-            buffers.block.compute_weights(c, support, ids, copies.kinematics());
+            buffers.weights.compute(c, ids, copies.kinematics());
             if c.planted.is(Fault::LastNodeSkipped) {
-                buffers.block.skip_last_node(c, &copies.x);
+                buffers.weights.skip_last_node(c, &copies.x);
             }
             set(&mut buffers, &mut copies, ids);
-            let Buffers { block, contributions, .. } = &mut *buffers;
-            block.p2g(&c.strides, band, first, contributions, ids.len());
+            let Buffers { weights, contributions, .. } = &mut *buffers;
+            weights.p2g(&c.strides, band, first, contributions, ids.len());
         }
         pool.give_back(buffers);
     }

@@ -3,8 +3,8 @@
 use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
-use crate::domain::corner_exchange::Exchange;
+use crate::domain::corners::Corners;
+use crate::domain::of_particles::Domain;
 use crate::grid::Layout;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
@@ -15,12 +15,15 @@ use crate::particles::Particles;
 use crate::particles::columns::Shares;
 use crate::processes::decomposition::Part;
 use crate::scheme::Transfer;
-use crate::step::health::Outcome;
+use crate::step::health::{Invalid, Outcome};
 
 /// Everything that a step reads and changes.
 pub(crate) struct State<T, const D: usize> {
     pub(crate) particles: Particles<T, D>,
-    pub(crate) support: Support<T, D>,
+    /// The domains by which particles reach nodes, or else the corners that they share.
+    pub(crate) domain: Box<dyn Domain<T, D>>,
+    /// The corners that particles share, where they do.
+    pub(crate) corners: Option<Box<Corners<T, D>>>,
     pub(crate) law: Box<dyn BlockLaw<T, D>>,
     pub(crate) transfer: Transfer,
     /// How many elements a particle has in the columns that steps change.
@@ -49,8 +52,6 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) filtered: Vec<SVector<T, D>>,
     /// Buffers for blocks of particles.
     pub(crate) buffers: BufferPool<T, D>,
-    /// Buffers between shared corners and the grid.
-    pub(crate) exchange: Exchange<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
 }
@@ -71,14 +72,36 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Sorts the particles into bins, those of other processes too.
     pub(crate) fn sort(&mut self) {
-        let Self { constants: c, particles, support, bins, layout, exchange, .. } = self;
+        let Self { constants: c, particles, domain, corners, bins, layout, .. } = self;
         let Particles { x, F, .. } = &*particles;
-        let keys = match support {
-            Support::Mesh(corners) => bins.keys_of(layout, corners.count(), &|corner| {
-                exchange.first_node(c, corners, corner)
-            }),
-            _ => bins.keys_of(layout, x.len(), &|p| support.first_node(c, p, &x[p], &F[p])),
+        let keys = match corners {
+            Some(corners) => {
+                let Corners { shared, .. } = &**corners;
+                bins.keys_of(layout, shared.count(), &|corner| shared.first_node(c, corner))
+            }
+            None => bins.keys_of(layout, x.len(), &|p| domain.first_node(c, p, &x[p], &F[p])),
         };
         self.sort_as(keys);
+    }
+
+    /// The reason why a particle is invalid, if it is.
+    pub(crate) fn invalidity(&self, p: usize) -> Option<Invalid> {
+        let Self { constants: c, particles: Particles { x, F, .. }, domain, corners, .. } = self;
+        invalidity(c, &**domain, corners.as_deref(), p, &x[p], &F[p])
+    }
+}
+
+/// The reason why a particle with this position and deformation gradient is invalid, if it is.
+pub(crate) fn invalidity<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    domain: &dyn Domain<T, D>,
+    corners: Option<&Corners<T, D>>,
+    p: usize,
+    x: &SVector<T, D>,
+    F: &SMatrix<T, D, D>,
+) -> Option<Invalid> {
+    match corners {
+        Some(Corners { shared, .. }) => shared.invalidity(c, p, x, F),
+        None => domain.invalidity(c, p, x, F),
     }
 }

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use mmsmith_lanes::simd::Lanes;
 
-use crate::domain::Support;
 use crate::domain::shared_corners::SharedCorners;
 use crate::particles::mesh::Mesh;
 use crate::particles::mesh::part::{LoadRecords, Records};
@@ -19,9 +18,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// Gives every particle to the processes of its corners, of which `keys` has the sub-bins. Gives those of the corners that this
     /// process sorts then.
     pub(super) fn give_mesh(&mut self, keys: &[u32]) -> Vec<u32> {
-        let (Some(part), Support::Mesh(corners)) = (&mut self.part, &self.support) else {
+        let (Some(part), Some(corners)) = (&mut self.part, &self.corners) else {
             return keys.to_vec();
         };
+        let corners = &corners.shared;
         let (known, mesh) = (part.ids.clone(), &corners.mesh);
         let is_own = |corner: u32| (corner as usize) < corners.own();
         let first_corner = |p: usize| mesh.corners[mesh.places(p).start];
@@ -75,9 +75,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             CornerHalo::new(&part.ranks, own, others, holders)
         });
         let ids = self.part.as_ref().map_or_else(Default::default, |part| part.ids.clone());
-        let corners = SharedCorners::of_part(mesh, at_corner, &ids, (own, halo));
-        self.exchange.fit(&corners);
-        self.support = Support::Mesh(Box::new(corners));
+        if let Some(corners) = &mut self.corners {
+            corners.replace(SharedCorners::of_part(mesh, at_corner, &ids, (own, halo)));
+        }
         self.hold(held, own);
         own_keys
     }

@@ -9,12 +9,11 @@ use std::sync::Arc;
 use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::Support;
 use crate::grid::node::Node;
+use crate::kernel::buffers::BufferPool;
 use crate::parallel::coloring::Held;
 use crate::particles::Particles;
 use crate::processes::decomposition::Move;
-use crate::shape::cells::HalfEdges;
 use crate::step::state::State;
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -22,9 +21,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// or of each corner that they share.
     pub(crate) fn sort_as(&mut self, mut keys: Vec<u32>) {
         if self.part.is_some() {
-            keys = match self.support {
-                Support::Mesh(_) => self.give_mesh(&keys),
-                _ => self.give_to_bins(keys),
+            keys = match self.corners {
+                Some(_) => self.give_mesh(&keys),
+                None => self.give_to_bins(keys),
             };
         }
         self.bins.sort_as(keys);
@@ -47,19 +46,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Gives every particle to the processes `to(particle)`, and tells how they move; a mesh stays.
     pub(crate) fn give<'a>(&mut self, to: &dyn Fn(usize) -> &'a [usize]) -> Option<Move> {
-        let Self { particles, support, part, .. } = self;
+        let Self { particles, domain, part, .. } = self;
         let part = part.as_mut()?;
         let (moved, ids) = Move::new(Some(&part.ranks), &part.ids, to);
         part.version += 1;
         let before = std::mem::replace(&mut part.ids, Arc::new(ids)).len();
         particles.each(&self.shares, &mut &moved);
-        match support {
-            Support::Product(_) | Support::Mesh(_) => {}
-            Support::Cpdi { half_edges } => {
-                let each: Vec<_> = (0..before).map(|p| *half_edges.of(p)).collect();
-                *half_edges = HalfEdges::new(moved.all(&each));
-            }
-        }
+        domain.follow(&moved, before);
+        // Weights in buffers may hold domains of particles that were here.
+        self.buffers = BufferPool::new();
         let Particles { x, mass, volume, internal, .. } = &self.particles;
         if self.keeps_F_early {
             self.F_early.resize(x.len(), SMatrix::identity());
