@@ -6,12 +6,12 @@
 use crate::number::Range;
 use std::collections::BTreeMap;
 
-/// Inputs, sines and cosines that stand for themselves in one box.
+/// The number of inputs, sines and cosines that are kept apart in a box.
 const MOST: usize = 16;
 const UNIT: f64 = 1.0 / (1_u64 << 53) as f64;
-/// For the roundings of this comparison.
+/// A margin for the roundings of this comparison.
 const SPARE: f64 = 1e-13;
-/// A sine is its argument times a ratio, where the argument passes zero and is not above this.
+/// The largest argument for which a sine whose argument passes zero is written as the argument times a ratio.
 const SMALL_ANGLE: f64 = 1.2;
 
 type Powers = [i8; MOST];
@@ -129,7 +129,7 @@ fn divides(a: Powers, b: Powers) -> bool {
     a.iter().zip(&b).all(|(a, b)| a <= b)
 }
 
-/// A factor: its range, and for a sine or cosine how far it may be from its exact value, as powers times a number.
+/// A factor: its range, and for a sine or cosine the largest distance from its exact value, as powers times a number.
 struct Factor {
     range: Range,
     error: Option<(Powers, f64)>,
@@ -141,7 +141,7 @@ pub(crate) struct Program<'a> {
     lines: &'a [Line],
     output: usize,
     needed: Vec<bool>,
-    /// Errors of each line, in units of 2^-53: its own, and that of its value wherever one is known beforehand.
+    /// Errors of each line, in units of 2^-53: the error of its operation, and the error of its value where it is known beforehand.
     own: Vec<f64>,
     all: Vec<f64>,
 }
@@ -195,7 +195,7 @@ impl<'a> Program<'a> {
         Self { lines, output, needed, own, all }
     }
 
-    /// Whether the factor is at most `claimed` in the box, but for the remainder.
+    /// Whether the factor is at most `claimed` in the box, except for the remainder.
     pub(crate) fn keeps(&self, inputs: &[(&str, Range)], claimed: f64, remainder: f64) -> bool {
         let mut part = Part { program: self, factors: Vec::new(), values: Vec::new() };
         for n in 0..=self.output {
@@ -238,7 +238,7 @@ impl Part<'_> {
         Some(Term { powers, range: Range::ONE })
     }
 
-    /// The sum, with the powers that both have taken out.
+    /// The sum, with the common powers of both terms taken out.
     fn sum(&self, a: Term, b: Term) -> Term {
         if a.range.is_zero() {
             return b;
@@ -327,7 +327,7 @@ impl Part<'_> {
         Term::of(self.whole(of).inverse())
     }
 
-    /// Adds to a sum in which no term's powers divide another's.
+    /// Adds a term to a sum in which the powers of no term divide those of another.
     fn add(&self, sum: &mut Vec<Term>, term: Term) {
         let beside = |a: Powers, b: Powers| self.range_of(joined(a, b, |a, b| a - b));
         if term.range.is_zero() {
@@ -419,7 +419,7 @@ impl Part<'_> {
         known.then(|| self.left(errors, allowed, claimed) <= remainder)
     }
 
-    /// A term of the error. A sine at a perturbed argument is at most that at the exact one and the perturbation.
+    /// Adds a term of the error. A sine at a perturbed argument is at most the sine at the exact argument plus the perturbation.
     fn err(&self, errors: &mut BTreeMap<Powers, f64>, weight: Term, own: f64) {
         let mut terms = vec![(weight.powers, own * weight.range.largest())];
         for (n, factor) in self.factors.iter().enumerate() {
@@ -434,8 +434,8 @@ impl Part<'_> {
         terms.into_iter().for_each(|(powers, c)| *errors.entry(powers).or_default() += c);
     }
 
-    /// Remainder of the errors, when each has taken its need from the allowed terms: from those of the same powers first, then
-    /// from others that are not much smaller.
+    /// The rest of the errors after the allowed terms have covered their part: first terms with the same powers, then terms that are
+    /// not much smaller.
     fn left(
         &self,
         errors: BTreeMap<Powers, f64>,

@@ -1,10 +1,10 @@
 //! An independent check of certificates of accuracy.
 //!
-//! It shares no code with `mmsmith-certify`, which proves them, and depends on nothing of this workspace. A certificate says
-//! `|r - g| <= 2^-53 (K (s + |g|) + remainder)` for the results `r` of its program over a box. Its theory is in the book, under
-//! "Certificates". Checked is: the trees tile the box; the bound that is claimed for each leaf holds by this crate's own
-//! intervals; errors of functions are assumed no smaller than [`LEAST_ROUNDINGS`]; inputs that are taken as one may be so.
-//! Whether the program is that of the present source is for others to compare.
+//! It shares no code with `mmsmith-certify`, which proves them, and depends on nothing of this workspace. A certificate says `|r - g|
+//! <= 2^-53 (K (s + |g|) + remainder)` for the results `r` of its program over a box. The page "Certificates" of the book has the
+//! theory. The check covers four claims: the trees tile the box; the bound of each leaf holds by this crate's own intervals; errors of
+//! functions are assumed no smaller than [`LEAST_ROUNDINGS`]; inputs that are taken as one may be so. The caller compares the program
+//! with the program of the present source.
 
 mod bound;
 mod number;
@@ -33,7 +33,7 @@ pub const LEAST_ROUNDINGS: [(&str, f64); 5] = [
 /// The bound that a certificate proves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
-    /// The solution that it names.
+    /// The solution that the certificate names.
     pub solution: String,
     /// The factor over all fields.
     pub factor: f64,
@@ -41,13 +41,13 @@ pub struct Checked {
     pub boxes: usize,
 }
 
-/// Why a certificate is refused.
+/// The reason why a certificate is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Refusal {
-    /// It cannot be read.
+    /// The text cannot be read.
     #[error("it is no certificate: {0}")]
     Form(String),
-    /// It states something that is not so.
+    /// The certificate states something that is not true.
     #[error("{0}")]
     Claim(String),
     /// A leaf whose bound does not hold.
@@ -109,7 +109,7 @@ fn claim(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), Refusal>
 ///
 /// # Errors
 ///
-/// [`Refusal`] with the first thing that is wrong.
+/// [`Refusal`] with the first fault.
 pub fn check(text: &str) -> Result<Checked, Refusal> {
     let stated: Certificate =
         serde_json::from_str(text).map_err(|error| Refusal::Form(error.to_string()))?;
@@ -202,7 +202,7 @@ struct Leaves<'a> {
 }
 
 impl Leaves<'_> {
-    /// The next part of the tree, which has to cover the box `ranges`: both halves where it is halved.
+    /// The next part of the tree, which has to cover the box `ranges`; a part that is halved has both halves.
     fn part(&mut self, ranges: Vec<Range>, depth: usize) -> Result<(), Refusal> {
         let name = || format!("{}[{}]", self.field.field, self.field.entry);
         claim(depth < 2000, || format!("{}: its tree is too deep", name()))?;

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-/// From `low` to `high`; without any number where one of them is none.
+/// The real numbers from `low` to `high`; empty where `low` or `high` is NaN.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     pub(crate) low: f64,
     pub(crate) high: f64,
 }
 
-/// The relative error of a value that a function of the system's library has a share in, with much to spare.
+/// The relative error of values computed with functions of the system's library, with a wide margin.
 const SPARE: f64 = 2e-15;
 
 impl Range {
@@ -43,7 +43,7 @@ impl Range {
         if self.touches_zero() { 0.0 } else { f64::min(self.low.abs(), self.high.abs()) }
     }
 
-    /// The least and the greatest of some results of one rounding each.
+    /// The range from the least to the greatest of some results with one rounding each.
     fn spanning(results: &[f64]) -> Self {
         let mut span = Self::new(f64::INFINITY, f64::NEG_INFINITY);
         for &result in results {
@@ -88,7 +88,7 @@ impl Range {
         Self::spanning(&[1.0 / self.low, 1.0 / self.high])
     }
 
-    /// With every number times all of `1 + d`, `|d| <= relative`.
+    /// The range with every number multiplied by `1 + d` for all `|d| <= relative`.
     pub(crate) fn blurred(self, relative: f64) -> Self {
         if relative == 0.0 {
             self
@@ -103,7 +103,7 @@ impl Range {
         Self::new(root.low.max(0.0), root.high)
     }
 
-    /// `ln(1 + x)/x`, or `ln(1 + x)`: the one falls, the other grows.
+    /// `ln(1 + x)/x`, which falls, or `ln(1 + x)`, which grows.
     pub(crate) fn logarithm(self, ratio: bool) -> Self {
         let at = |x: f64| match (x > -1.0, ratio && x != 0.0) {
             (false, _) => f64::NAN,
@@ -114,7 +114,7 @@ impl Range {
         Self::spanning(&[at(self.low), at(self.high)]).blurred(SPARE)
     }
 
-    /// `sin(x)/x` where the sine has no zero but that at zero: it falls as `|x|` grows.
+    /// `sin(x)/x` where the sine has no other zero than at zero: it falls as `|x|` grows.
     pub(crate) fn sine_ratio(self) -> Self {
         let at = |x: f64| if x == 0.0 { 1.0 } else { x.sin() / x };
         Self::spanning(&[at(self.largest()), at(self.smallest())]).blurred(SPARE)

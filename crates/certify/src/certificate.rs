@@ -48,13 +48,13 @@ pub struct Certificate {
     pub solution: String,
     /// The factor that is proved for all fields.
     pub factor: f64,
-    /// The remainder that is left over, in units of `2^-53` and of the field where all scales are one.
+    /// The remainder that is not covered, in units of `2^-53` and of the field where all scales are one.
     pub remainder: f64,
     /// Letters of the trees stand for factors of so many parts of one.
     pub steps_of_factor: f64,
     /// The range of each input, coordinates, time, parameters, after scaling.
     pub inputs: Vec<InputRange>,
-    /// The inputs that are taken as one, and what that makes of the others.
+    /// The inputs that are taken as one, and the resulting units of the other inputs.
     pub scalings: Vec<Scaling>,
     /// The errors that are assumed of functions, in units of `2^-53`.
     pub roundings: Roundings,
@@ -80,7 +80,7 @@ fn hash(lines: &[String]) -> String {
 }
 
 impl Certificate {
-    /// Whether this is about the program and the outputs of `subject`, all of them; else what differs.
+    /// Compares the certificate with the program and all outputs of `subject`.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl Certificate {
         }
     }
 
-    /// Reads what [`Certificate::text`] wrote.
+    /// Reads a certificate from the text of [`Certificate::text`].
     ///
     /// # Errors
     ///
@@ -128,7 +128,7 @@ impl Certificate {
         serde_json::from_str(text)
     }
 
-    /// As JSON.
+    /// The certificate as JSON.
     ///
     /// # Errors
     ///
@@ -138,10 +138,10 @@ impl Certificate {
     }
 }
 
-/// Proves the bound of `limits` for every output of `subject`. `step` is told the output that is under way and the share of it
-/// that is done; `found` each proof, or why there is none.
+/// Proves the bound of `limits` for every output of `subject`. `step` receives the output that is under way and its finished share;
+/// `found` receives each proof, or the reason why there is none.
 ///
-/// `None` where one of them does not close.
+/// `None` where a proof does not close.
 pub fn certify(
     subject: &Subject,
     roundings: &Roundings,

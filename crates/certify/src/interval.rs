@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// All real numbers from `low` to `high`. What an operation gives contains every value that it has on its operands; where it
-/// has none, both ends are not numbers.
+/// All real numbers from `low` to `high`. The result of an operation contains every value of the operation on its operands; where there
+/// is no value, both ends are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The least number.
@@ -22,7 +22,7 @@ impl Interval {
     pub const ZERO: Self = Self { low: 0.0, high: 0.0 };
     /// The number one.
     pub const ONE: Self = Self { low: 1.0, high: 1.0 };
-    /// The circle number, which is above its nearest double.
+    /// The number pi, which is above its nearest double.
     pub const PI: Self = Self { low: PI, high: PI.next_up() };
     /// No number.
     pub const NONE: Self = Self { low: f64::NAN, high: f64::NAN };
@@ -50,7 +50,7 @@ impl Interval {
         self.low.is_finite() && self.high.is_finite()
     }
 
-    /// Whether zero is in it; true of no number.
+    /// Whether the interval contains zero; true for [`Self::NONE`].
     #[must_use]
     pub fn has_zero(self) -> bool {
         !(self.low > 0.0 || self.high < 0.0)
@@ -77,7 +77,7 @@ impl Interval {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Every number of it times `1 + d` for all `|d| <= relative`.
+    /// All numbers of the interval, times `1 + d` for all `|d| <= relative`.
     #[must_use]
     pub fn widened(self, relative: f64) -> Self {
         if relative == 0.0 {
@@ -86,7 +86,7 @@ impl Interval {
         self * Self::outward(1.0 - relative, 1.0 + relative)
     }
 
-    /// The quotient; no number where the divisor may be zero.
+    /// The quotient; [`Self::NONE`] where the divisor may be zero.
     #[must_use]
     pub fn over(self, divisor: Self) -> Self {
         if divisor.has_zero() || !divisor.is_finite() {
@@ -113,7 +113,7 @@ impl Interval {
         Self::outward(low, high)
     }
 
-    /// The square root; no number where a negative number is in it.
+    /// The square root; [`Self::NONE`] where the interval contains a negative number.
     #[must_use]
     pub fn sqrt(self) -> Self {
         if self.low.is_nan() || self.low < 0.0 {
@@ -122,7 +122,7 @@ impl Interval {
         Self { low: self.low.sqrt().next_down().max(0.0), high: self.high.sqrt().next_up() }
     }
 
-    /// The function of which `at` gives values to within the bound of [`LIBRARY`], where it grows or falls throughout.
+    /// The range of a function that grows or falls throughout; `at` gives its values to within the bound of [`LIBRARY`].
     fn monotonic(self, at: impl Fn(f64) -> f64) -> Self {
         let (low, high) = (at(self.low), at(self.high));
         if low.is_nan() || high.is_nan() {
@@ -131,10 +131,10 @@ impl Interval {
         Self::point(low).hull(Self::point(high)).widened(LIBRARY)
     }
 
-    /// Values from those at both ends and at the extrema, which are at all `first + 2 n` for whole `n` (greatest, 1) and
-    /// `first + 1 + 2 n` (least, -1) in units in which `from` and `to` are the ends.
+    /// The range of a wave, from its values at both ends and at its extrema: the greatest value, 1, at all `first + 2 n` for whole `n`,
+    /// and the least value, -1, at all `first + 1 + 2 n`, in units in which `from` and `to` are the ends.
     fn wave(ends: Self, from: f64, to: f64, first: f64) -> Self {
-        // The units are formed by a division: a little is added so that no extremum is missed.
+        // The units are formed by a division: a margin is added so that no extremum is missed.
         let slack = 1e-9;
         if from.is_nan() || to.is_nan() {
             return Self::NONE;
@@ -202,7 +202,7 @@ impl Interval {
         }
     }
 
-    /// `sin(x)/x`, of which the greatest value is one at zero, for `|x| <= 2`, where it falls to both sides.
+    /// `sin(x)/x`, whose greatest value is one at zero, for `|x| <= 2`, where it falls to both sides.
     #[must_use]
     pub fn sine_ratio(self) -> Self {
         if self.magnitude().is_nan() || self.magnitude() > 2.0 {
@@ -274,7 +274,7 @@ impl Mul for Interval {
             return self;
         }
         if self == Self::ZERO || other == Self::ZERO {
-            // No number times zero is zero for no purpose here: such values are refused before.
+            // Zero times an interval that is not finite has no value here; such intervals are refused before.
             return if self.is_finite() && other.is_finite() { Self::ZERO } else { Self::NONE };
         }
         Self::around([

@@ -25,7 +25,7 @@ pub use subject::{Judged, Subject};
 use mmsmith_expr::Operation;
 use thiserror::Error;
 
-/// Why there is no certificate.
+/// The reason why there is no certificate.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CertifyError {
     /// An operation that has no enclosure.
@@ -37,7 +37,7 @@ pub enum CertifyError {
     /// The fields could not be derived.
     #[error("{0}")]
     Derive(String),
-    /// A range that is none, or of no input.
+    /// A range that is empty, or of an unknown input.
     #[error("{0}")]
     Range(String),
 }

@@ -1,11 +1,11 @@
 //! Intervals times factors that are known exactly.
 //!
-//! Both sides of the acceptance rule vanish where a sine, a coordinate or the amplitude does. Such factors are kept apart, so
-//! that they cancel: a value is a [`Monomial`] of factors times an interval, a sum of such is a [`Polynomial`].
+//! Both sides of the acceptance rule vanish where a sine, a coordinate or the amplitude does. Such factors are kept apart, so that they
+//! cancel: a value is a [`Monomial`] of factors times an interval, and a sum of such values is a [`Polynomial`].
 
 use crate::interval::Interval;
 
-/// As many factors as are kept apart on one box; further ones stay within intervals.
+/// The number of factors that are kept apart on a box; further factors stay within intervals.
 pub(crate) const MOST_FACTORS: usize = 16;
 
 /// The exponents of the factors in a product.
@@ -58,7 +58,7 @@ impl Monomial {
         self.each(divisor, |own, divisor| own - divisor)
     }
 
-    /// All values that it has.
+    /// The range of the product.
     pub(crate) fn range(self, factors: &[Interval]) -> Interval {
         let mut range = Interval::ONE;
         for (&exponent, &factor) in self.0.iter().zip(factors) {
@@ -127,7 +127,7 @@ impl Polynomial {
         self.0.is_empty()
     }
 
-    /// Adds a term. One whose monomial is a multiple of another's goes into that one's interval.
+    /// Adds a term. A term whose monomial is a multiple of another term's monomial is added to that term's interval.
     pub(crate) fn add(&mut self, term: Scaled, factors: &[Interval]) {
         if term.rest == Interval::ZERO {
             return;
@@ -149,12 +149,12 @@ impl Polynomial {
         self.0.push(sum);
     }
 
-    /// Every term times one.
+    /// Every term times a factor.
     pub(crate) fn times(&self, factor: Scaled) -> impl Iterator<Item = Scaled> + use<'_> {
         self.0.iter().map(move |term| term.times(factor))
     }
 
-    /// A monomial and a number whose product is nowhere greater than the absolute value.
+    /// A monomial and a number whose product is nowhere greater than the absolute value of the polynomial.
     pub(crate) fn least(&self, factors: &[Interval]) -> Option<(Monomial, f64)> {
         let mut terms = self.0.iter();
         let first = *terms.next()?;

@@ -33,11 +33,11 @@ use mmsmith_expr::{Function, Operation, Program, Slot, nearest_f64};
 /// rounding errors, such as that of two sines next to their zeros, which no sensitivity accounts for.
 pub const REMAINDER: f64 = 1e-10;
 
-/// Up to here a sine whose argument passes zero is taken as the argument times a ratio, so that its zero is that of the
+/// Up to this argument a sine whose argument passes zero is written as the argument times a ratio, so that its zero is that of the
 /// argument's own factors.
 const LARGEST_ANGLE_AT_ZERO: f64 = 1.2;
 
-/// Room for the roundings of the comparison itself, which are fewer than a thousand.
+/// A margin for the roundings of the comparison itself, which are fewer than a thousand.
 const SLACK: f64 = 1e-12;
 
 /// A program with one output, ready to be judged over boxes.
@@ -47,9 +47,9 @@ pub struct Judgement {
     output: usize,
     /// The error of each operation, in units of `2^-53`.
     rounding: Vec<f64>,
-    /// Bounds of the relative error of each value whatever the inputs, in units of `2^-53`; infinite where none is known.
+    /// Bounds of the relative error of each value for all inputs, in units of `2^-53`; infinite where none is known.
     relative: Vec<f64>,
-    /// The inputs that it reads.
+    /// The inputs that the program reads.
     inputs: Vec<usize>,
 }
 
@@ -65,8 +65,7 @@ impl Judgement {
         Ok(Self::with_roundings(&program, rounding))
     }
 
-    /// As [`Judgement::new`], with the error of each operation of a program that has one output, and nothing that it does not
-    /// need.
+    /// As [`Judgement::new`], with the error of each operation, for a program with one output and without unused operations.
     #[must_use]
     pub fn with_roundings(program: &Program, rounding: Vec<f64>) -> Self {
         let operations = program.operations().to_vec();
@@ -315,12 +314,12 @@ impl Wave {
     }
 }
 
-/// Factors that are kept apart on one box.
+/// Factors that are kept apart on a box.
 #[derive(Default)]
 struct Factors {
     /// The range of each factor.
     ranges: Vec<Interval>,
-    /// How far each is at most from its value without rounding errors, as a monomial with a coefficient.
+    /// The largest distance of each factor from its value without rounding errors, as a monomial with a coefficient.
     errors: Vec<Option<(Monomial, f64)>>,
     /// The sines and cosines among them.
     waves: Vec<(Wave, Slot, Monomial)>,
@@ -336,14 +335,14 @@ impl Factors {
         Some(Monomial::factor(self.ranges.len() - 1))
     }
 
-    /// Keeps the sine and the cosine of an argument apart, of which the relative error is known.
+    /// Keeps the sine and the cosine of an argument apart; `relative` is the relative error of the argument.
     fn add_waves(&mut self, wave: Wave, slot: Slot, argument: Scaled, relative: f64) {
         if !relative.is_finite() {
             return;
         }
         let x = argument.range(&self.ranges);
         let slope = if wave.times_pi { Interval::PI } else { Interval::ONE };
-        // To first order, and a little more for the higher ones.
+        // To first order, with a margin for higher orders.
         let error = (argument.rest * slope).magnitude() * relative * UNIT * (1.0 + 1e-9);
         for wave in [wave, wave.other()] {
             if self.waves.iter().all(|(known, at, _)| (*known, *at) != (wave, slot))
@@ -363,7 +362,7 @@ impl Factors {
 }
 
 impl Factors {
-    /// One divided by a value: with its factors apart where those are exact and not zero.
+    /// One divided by a value. Its factors stay apart where they are exact and not zero.
     fn inverse(&self, value: Scaled) -> Scaled {
         let exact = |factor: usize| {
             value.monomial.exponent(factor) == 0
@@ -380,9 +379,9 @@ impl Factors {
 /// Both sides of the acceptance rule over a box, as sums of absolute monomials with coefficients.
 #[derive(Clone, Debug)]
 pub struct Sides {
-    /// No less than the error, in units of `2^-53`.
+    /// Upper bound of the error, in units of `2^-53`.
     error: Vec<(Monomial, f64)>,
-    /// No more than `s + |g|`.
+    /// Lower bound of `s + |g|`.
     allowed: Vec<(Monomial, f64)>,
     ranges: Vec<Interval>,
 }
@@ -460,7 +459,7 @@ impl Sides {
                 .map(|(source, amount)| (*source, ratio(*source), amount))
                 .filter(|(_, ratio, _)| ratio.is_finite())
                 .collect();
-            // The same monomial first, which serves without loss.
+            // First the same monomial, which covers without loss.
             sources.sort_by(|a, b| {
                 (a.0 != monomial).cmp(&(b.0 != monomial)).then(a.1.total_cmp(&b.1))
             });
@@ -477,7 +476,7 @@ impl Sides {
         left <= REMAINDER
     }
 
-    /// The least multiple of `1/steps` up to `most` that covers the error; `None` where none does.
+    /// The least multiple of `1/steps` up to `most` that covers the error; `None` where no multiple does.
     #[must_use]
     pub fn factor(&self, most: f64, steps: f64) -> Option<f64> {
         let (mut low, mut high) = (0, (most * steps).ceil() as u32);

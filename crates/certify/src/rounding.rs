@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 /// Sums, products, quotients and square roots are rounded once, and sums and products that are exact count as such.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Roundings {
-    /// Error of a sum, a difference, a product, a quotient, a square root, and a number that is no double.
+    /// Error of a sum, a difference, a product, a quotient, a square root, and of a number that is not a double.
     pub arithmetic: f64,
-    /// Error of the circle number: `|fl(pi) - pi|/(2^-53 pi)` is 0.351.
+    /// Error of pi: `|fl(pi) - pi|/(2^-53 pi)` is 0.351.
     pub pi: f64,
     /// Error of `sin(pi x)` and `cos(pi x)` in generated code, which are within one unit in the last place (2).
     pub trigonometric_pi: f64,
@@ -33,7 +33,7 @@ impl Default for Roundings {
     }
 }
 
-/// The half of the distance from one to the next double.
+/// Half of the distance from one to the next double.
 pub(crate) const UNIT: f64 = f64::EPSILON / 2.0;
 
 fn is_double(number: &Rational) -> bool {
@@ -47,7 +47,7 @@ fn is_power_of_two(operation: &Operation) -> bool {
 }
 
 impl Roundings {
-    /// For each operation its error beyond those of its operands.
+    /// The error of each operation beyond the errors of its operands.
     pub(crate) fn of(&self, program: &Program) -> Result<Vec<f64>, CertifyError> {
         let operations = program.operations();
         let power = |slot: mmsmith_expr::Slot| is_power_of_two(&operations[slot.index()]);

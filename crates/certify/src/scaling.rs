@@ -23,7 +23,7 @@ struct Conditions {
     rows: Vec<Vec<f64>>,
 }
 
-/// Exponents of values are sums of those of inputs with these coefficients.
+/// The conditions of a program. The exponent of a value is a linear combination of the exponents of inputs.
 fn conditions(program: &Program, inputs: usize) -> Conditions {
     let mut values: Vec<Vec<f64>> = Vec::new();
     let mut rows = Vec::new();
@@ -62,7 +62,7 @@ fn conditions(program: &Program, inputs: usize) -> Conditions {
 }
 
 impl Conditions {
-    /// Adds the condition that an input has this exponent, written as a further column.
+    /// Exponents of inputs that fulfil the conditions, with fixed exponents for some inputs; `None` where there are none.
     fn solve(&self, fixed: &[(usize, f64)], inputs: usize) -> Option<Vec<f64>> {
         let mut rows: Vec<Vec<f64>> =
             self.rows.iter().map(|row| row.iter().copied().chain([0.0]).collect()).collect();
@@ -99,8 +99,8 @@ impl Conditions {
     }
 }
 
-/// The inputs among `positive` that may be taken as one all at once, with the exponents of each: its own is one, and the
-/// others that are taken as one have none.
+/// The inputs among `positive` that may be taken as one together, with the exponents of each: its own exponent is one, and the
+/// exponents of the other inputs that are taken as one are zero.
 #[must_use]
 pub fn scalings(program: &Program, inputs: usize, positive: &[usize]) -> Vec<Scaling> {
     let conditions = conditions(program, inputs);

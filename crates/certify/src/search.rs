@@ -7,15 +7,15 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::fmt::Write;
 
-/// Bounds of factors are multiples of one part in as many.
+/// Bounds of factors are multiples of one over this number.
 pub const STEPS_OF_FACTOR: f64 = 4.0;
 
-/// Largest factors beyond this are told as such.
+/// Factors above this limit are not computed.
 const MOST_TOLD: f64 = 1e5;
-/// Halvings are compared by factors of this fineness.
+/// Factors of halvings are compared to one over this number.
 const FINE_STEPS: f64 = 1024.0;
 
-/// How a box was halved, and again its parts, until the bound held on each.
+/// The halvings of a box and of its parts, until the bound held on each part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
     /// In pre-order: a digit is the input along which a box is halved, and the lower half follows, then the upper one; a
@@ -23,20 +23,20 @@ pub struct Proof {
     pub tree: String,
     /// The number of boxes that were not halved.
     pub leaves: usize,
-    /// The largest of their factors.
+    /// The largest factor of the boxes.
     pub factor: f64,
 }
 
-/// Where a proof did not close: the part of the largest bound of those that are left.
+/// The place where a proof did not close: the part with the largest bound among the remaining parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Open {
     /// The range of each input.
     pub bounds: Vec<Interval>,
-    /// The bound of the factor there, and so everywhere; infinite where there is none.
+    /// The bound of the factor there, which holds everywhere; infinite where there is none.
     pub factor: f64,
 }
 
-/// The letter for a factor of so many quarters: A is one, Z is 26, a is 27, f is 32.
+/// The letter for a factor in quarters: A is one quarter, Z is 26, a is 27, f is 32.
 #[must_use]
 pub fn letter(quarters: u32) -> Option<char> {
     let place = u8::try_from(quarters.checked_sub(1)?).ok()?;
@@ -52,29 +52,29 @@ pub const LARGEST_WRITTEN: f64 = 13.0;
 /// A tree names inputs by one digit.
 const MOST_INPUTS: usize = 10;
 
-/// A smaller decrease of the logarithms of both halves' factors is none.
+/// A smaller decrease of the logarithms of both halves' factors counts as none.
 const LEAST_GAIN: f64 = 1e-6;
-/// No input is halved whose range is a smaller share of the whole than one part in as many of the largest share. Each is tried
-/// in turn: some fields need halvings of several inputs together before anything is gained, others of one alone.
+/// An input is halved only if the share of its range in the whole range is at least the largest share divided by this number. Both
+/// numbers are tried in turn: some fields need halvings of several inputs together before anything is gained, others of one input
+/// alone.
 const SLENDER: [f64; 2] = [1.5, 8.0];
-/// So few boxes need not be fewer.
+/// A proof with so few boxes is short enough.
 const FEW: usize = 50;
 
-/// When a search ends.
+/// Limits of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// The factor that is to hold; a tree cannot tell of more than [`LARGEST_WRITTEN`].
+    /// The factor to be proved; a tree cannot state more than [`LARGEST_WRITTEN`].
     pub factor: f64,
     /// The most boxes.
     pub boxes: usize,
 }
 
-/// Proves that the factor of `judgement` is at most that of `limits` over `bounds`. `step` is told the share of the volume
-/// that is done.
+/// Proves that the factor of `judgement` is at most that of `limits` over `bounds`. `step` receives the finished share of the volume.
 ///
 /// # Errors
 ///
-/// [`CertifyError::Open`] with the box of the largest bound, where so many boxes do not do.
+/// [`CertifyError::Open`] with the box of the largest bound, where the boxes of `limits` do not suffice.
 pub fn prove(
     judgement: &Judgement,
     bounds: &[Interval],
@@ -117,13 +117,13 @@ struct Search<'a> {
     inputs: &'a [usize],
     limits: Limits,
     slender: f64,
-    /// The box and the parts of it, each with its place among these.
+    /// The box and its parts; a part is named by its place in this list.
     parts: Vec<Part>,
     step: &'a mut dyn FnMut(f64),
 }
 
-/// The inputs whose ranges matter to the bound; such as an amplitude that multiplies all has none. Told from bounds on small
-/// boxes: a wrong guess makes a search longer or end without a proof, and no proof wrong.
+/// The inputs whose ranges change the bound. An amplitude that multiplies all does not change it. The inputs are chosen by bounds on
+/// small boxes: a wrong choice makes a search longer, or ends it without a proof, but makes no proof wrong.
 fn effective(judgement: &Judgement, bounds: &[Interval]) -> Vec<usize> {
     const SAMPLES: usize = 7;
     let small = |sample: usize| -> Vec<Interval> {
@@ -149,7 +149,7 @@ fn effective(judgement: &Judgement, bounds: &[Interval]) -> Vec<usize> {
     if matter.is_empty() { named } else { matter }
 }
 
-/// How far a box is from its bound: none has it, or by which factor.
+/// The least factor that is proved on a box; infinite where none is.
 fn bound_over(judgement: &Judgement, bounds: &[Interval]) -> f64 {
     judgement
         .over(bounds)
@@ -159,15 +159,15 @@ fn bound_over(judgement: &Judgement, bounds: &[Interval]) -> f64 {
 
 /// A part of the box.
 enum Part {
-    /// The factor is at most as many quarters.
+    /// The factor is at most this many quarters.
     Closed(u32),
-    /// It is halved along an input; where its halves are.
+    /// The part is halved along an input; the places of its halves.
     Halved(usize, [usize; 2]),
-    /// Its bound does not hold yet.
+    /// The bound does not hold yet.
     Open,
 }
 
-/// A part whose bound does not hold yet, those of the largest bound first.
+/// A part whose bound does not hold yet; parts with the largest bound come first.
 struct Pending {
     factor: f64,
     place: usize,
@@ -178,7 +178,7 @@ struct Pending {
 
 impl Ord for Pending {
     fn cmp(&self, other: &Self) -> Ordering {
-        // Of equal bounds the larger part, and then the one that came first, so that the order is definite.
+        // Of equal bounds the larger part comes first, and then the earlier part, so that the order is definite.
         self.factor
             .total_cmp(&other.factor)
             .then(self.share.total_cmp(&other.share))
@@ -226,7 +226,7 @@ impl Search<'_> {
         Ok(Proof { tree, leaves, factor: f64::from(worst) / STEPS_OF_FACTOR })
     }
 
-    /// Adds a part: closed where its bound holds, else it is given back.
+    /// Adds a part. Where its bound holds the part is closed, else it is returned.
     fn judged(&mut self, bounds: Vec<Interval>, share: f64, done: &mut f64) -> Option<Pending> {
         let sides = self.judgement.over(&bounds);
         let place = self.parts.len();
@@ -241,7 +241,7 @@ impl Search<'_> {
         Some(Pending { factor, place, bounds, share })
     }
 
-    /// Writes a part and its parts in pre-order.
+    /// Writes a part and the parts within it in pre-order.
     fn write(&self, place: usize, tree: &mut String) {
         match self.parts[place] {
             Part::Closed(quarters) => tree.extend(letter(quarters)),
@@ -253,8 +253,8 @@ impl Search<'_> {
         }
     }
 
-    /// The halving that helps most: after which least is missing on both halves together. An input that changes nothing comes
-    /// last, and of equal ones that whose range is the largest share of the whole comes first.
+    /// The halving that helps most: both halves together miss least. An input without effect comes last. Of equal inputs the input
+    /// whose range is the largest share of the whole comes first.
     fn best_halves(&self, bounds: &[Interval]) -> Option<Halving> {
         let parent = bound_over(self.judgement, bounds).min(MOST_TOLD);
         let width = |b: Interval| b.high - b.low;
@@ -263,8 +263,7 @@ impl Search<'_> {
         let mut best: Option<Halving> = None;
         for &input in self.inputs {
             let share = share_of(input);
-            // Parts that are long beside their width say little of how far they are from their bound. An input of one value
-            // has no share.
+            // Slender parts say little about their distance from the bound. An input with a single value has no share.
             if share.is_nan() || share * self.slender < widest {
                 continue;
             }
@@ -287,7 +286,7 @@ impl Search<'_> {
 /// A box halved along an input.
 struct Halving {
     input: usize,
-    /// By how much the logarithms of both factors are nearer to what is to hold.
+    /// The decrease of the logarithms of both factors towards the factor to be proved.
     gain: f64,
     /// The range of the input as a share of the whole.
     share: f64,

@@ -1,4 +1,4 @@
-//! The program whose outputs are judged, and the box over which.
+//! The program whose outputs are judged, and the box of its inputs.
 
 use crate::interval::Interval;
 use crate::propagate::Judgement;
@@ -8,9 +8,9 @@ use mmsmith_expr::{Program, Slot};
 use mmsmith_spec::{Domain, Fields, Relation, Spec};
 use mmsmith_stage::{Measures, Staged};
 
-/// Parameters without bounds on both sides go as far from their defaults, as points of `mms check --thorough` do.
+/// Parameters without bounds on both sides vary by this share of their defaults, as points of `mms check --thorough` do.
 const SHARE_OF_DEFAULT: f64 = 0.4;
-/// Parameters with bounds on both sides take as much of what is admitted, around its middle.
+/// Parameters with bounds on both sides vary over this share of their admissible range, around its middle.
 const SHARE_OF_ADMITTED: f64 = 0.8;
 
 /// An output of the program.
@@ -37,7 +37,7 @@ pub struct Subject {
     pub inputs: Vec<String>,
     /// The inputs that are taken as one.
     pub scalings: Vec<Scaling>,
-    /// The range of each input, where those that are scaled out are one.
+    /// The range of each input; inputs that are scaled out have the range one.
     pub bounds: Vec<Interval>,
 }
 
@@ -48,7 +48,7 @@ impl Subject {
     ///
     /// # Errors
     ///
-    /// [`CertifyError`] where a field is nowhere defined, or a range is none.
+    /// [`CertifyError`] where a field is nowhere defined, or a range is empty.
     pub fn new(spec: &Spec, ranges: &[(String, f64, f64)]) -> Result<Self, CertifyError> {
         let fields = spec.derive().map_err(|error| CertifyError::Derive(error.to_string()))?;
         let (program, judged, measures) = program(spec, fields.clone());
@@ -114,7 +114,7 @@ impl Subject {
         Ok(Self { solution: spec.name.clone(), program, judged, inputs, scalings, bounds })
     }
 
-    /// An input in the units in which others are one, as `t E^0.5 L^-1`.
+    /// An input in units of the inputs that are taken as one, as `t E^0.5 L^-1`.
     #[must_use]
     pub fn scaled_name(&self, input: usize) -> String {
         let mut name = self.inputs[input].clone();
@@ -127,7 +127,7 @@ impl Subject {
         name
     }
 
-    /// Ranges of the inputs in words, but for those that are taken as one.
+    /// Ranges of the inputs in words, without the inputs that are taken as one.
     #[must_use]
     pub fn place(&self, bounds: &[Interval]) -> String {
         let words = bounds.iter().enumerate().filter_map(|(input, bounds)| {

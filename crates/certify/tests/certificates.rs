@@ -1,4 +1,4 @@
-//! The certificates that are kept, by the independent checker; altered ones; and a planted fault.
+//! The certificates in the repository, examined by the independent checker; altered certificates; and a planted fault.
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_certificate_checker::{LEAST_ROUNDINGS, Refusal, check};

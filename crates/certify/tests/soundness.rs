@@ -1,4 +1,4 @@
-//! Bounds at points against exact values: what is computed is never further from them than the bound of the error, and the
+//! Bounds at points against exact values: computed values are never further from exact values than the bound of the error, and the
 //! sensitivity is never smaller than its bound.
 #![allow(clippy::unwrap_used)]
 

@@ -115,7 +115,7 @@ impl<'a> Published<'a> {
         })
     }
 
-    /// Targets of the listing: every component of each field of which it assigns one.
+    /// Targets of the listing: every component of each field of which the listing assigns at least one component.
     fn targets(&self, fields: &Fields) -> Result<Vec<Target>, Diagnostic> {
         let n = self.spec.dimension;
         let assigned: BTreeSet<&str> =
@@ -156,7 +156,7 @@ impl<'a> Published<'a> {
         Ok(targets)
     }
 
-    /// Names that the table gives and the listing does not use are mistakes.
+    /// Refuses names that the table gives and the listing does not use.
     fn check_names(&self) -> Result<(), Diagnostic> {
         let mut used = BTreeSet::new();
         for assignment in &self.listing.assignments {
@@ -209,7 +209,7 @@ impl<'a> Published<'a> {
     }
 }
 
-/// The problem with its line numbers counted from `lines` further up.
+/// The problem with its line numbers counted from a line that is `lines` further up.
 fn shifted(problem: Problem, lines: usize) -> Problem {
     match problem {
         Problem::Broken { what, first_line, second_line, first, second, joined } => {

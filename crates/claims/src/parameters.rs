@@ -1,24 +1,24 @@
-//! Where parameters are varied: near their defaults, and over all that the specification admits.
+//! Variation of parameters: near their defaults, and over all admissible values.
 
 use mmsmith_spec::{Parameter, Relation};
 
-/// Near its default a parameter varies by this share of it; one that is zero by default, by this number.
+/// Near its default a parameter varies by this share of the default; a parameter whose default is zero varies by this number.
 pub(crate) const VARIATION: f64 = 0.1;
-/// Powers of ten that a side without a limit is gone through, evenly in the logarithm.
+/// The powers of ten over which a side without a limit is sampled, evenly in the logarithm.
 const DECADES: [f64; 2] = [-2.0, 1.5];
-/// Powers of ten, of the whole range, next to a limit.
+/// The distances from a limit, as powers of ten of the whole range.
 const NEXT_TO_LIMIT: [f64; 2] = [-3.0, -1.0];
 
-/// A value near the default, `share` of the way through.
+/// A value near the default; `share` from 0 to 1 chooses it.
 pub(crate) fn near(parameter: &Parameter, share: f64) -> f64 {
     let middle = parameter.default;
     let half = if middle == 0.0 { VARIATION } else { VARIATION * middle.abs() };
     middle - half + 2.0 * half * share
 }
 
-/// A value anywhere in the admissible range, `share` in `[0, 1)` of the way through what is looked at: between two limits
-/// one half is spread evenly and a quarter lies next to either limit; on a side without a limit magnitudes are spread
-/// evenly in the logarithm around that of the default.
+/// A value anywhere in the admissible range; `share` in `[0, 1)` chooses it. Between two limits half of the shares are spread evenly,
+/// and a quarter lies next to each limit. On a side without a limit magnitudes are spread evenly in the logarithm around that of the
+/// default.
 #[must_use]
 pub fn admissible_value(parameter: &Parameter, share: f64) -> f64 {
     let limits = |below: bool| {

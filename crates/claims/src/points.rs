@@ -8,12 +8,12 @@ use mmsmith_spec::{Domain, Fields, Parameter, Spec, Surface};
 use num_traits::One;
 use thiserror::Error;
 
-/// One draw in so many has its parameters near their defaults, the others anywhere in the admissible range.
+/// One draw of this many has its parameters near their defaults; the other draws take them from the whole admissible range.
 const NEAR: usize = 4;
-/// Draws for each point that is wanted.
+/// The number of draws for each wanted point.
 const DRAWS: usize = 50;
 
-/// Why there are no points.
+/// Too few points were found.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "found {found} of {wanted} points in the body where the parameters are admissible, J > 0 and every field has a \
@@ -21,17 +21,17 @@ const DRAWS: usize = 50;
     100.0 * VARIATION
 )]
 pub struct PointsError {
-    /// How many points were found.
+    /// The number of points that were found.
     pub found: usize,
-    /// How many points were wanted.
+    /// The number of points that were wanted.
     pub wanted: usize,
 }
 
 /// A value for every input of the fields.
 pub(crate) type Values = Vec<(Expr, Rational)>;
 
-/// `count` points. Positions are in the body, or on `surface` to far more digits than doubles have; times are within a
-/// period, parameters admissible, some near their defaults; the values of `expressions` are finite and `J > 0`.
+/// `count` points. Positions are in the body, or on `surface` to far more digits than doubles have; times are within a period,
+/// parameters admissible, and some parameters near their defaults; the values of `expressions` are finite and `J > 0`.
 pub(crate) fn points(
     spec: &Spec,
     fields: &Fields,
@@ -49,7 +49,7 @@ pub(crate) fn points(
     let parameters: Vec<(Expr, Dependence)> =
         inputs[n + 1..].iter().map(|&p| (p, Dependence::default())).collect();
     let sides = Program::lower(&mut graph, &parameters, &[], &sides);
-    // Everything as shares.
+    // Every input is drawn as a share of its range.
     let bounds: Vec<(Expr, [f64; 2])> = inputs.iter().map(|&input| (input, [0.0, 1.0])).collect();
     let mut found = Vec::new();
     for (number, draw) in sample(&bounds, DRAWS * count, 1).enumerate() {
@@ -122,7 +122,7 @@ fn place(
     match (surface, &spec.domain) {
         (Some(Surface::Lower(axis)), Domain::Box { .. }) => X[axis] = measures[axis].clone(),
         (Some(Surface::Upper(axis)), Domain::Box { .. }) => X[axis] = measures[n + axis].clone(),
-        // The cut may lie outside of the body's radii: the fields are the same formulas there.
+        // The plane of symmetry may lie outside of the body's radii: the fields have the same formulas there.
         (Some(Surface::Lower(axis)), Domain::Annulus { .. }) => X[axis] = Rational::default(),
         _ => {}
     }

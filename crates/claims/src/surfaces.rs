@@ -7,7 +7,7 @@ use mmsmith_spec::{ClaimKind, Fields, Spec, Surface};
 use num_traits::{Signed, Zero};
 use thiserror::Error;
 
-/// Points at which a claim is looked at that symbols do not show.
+/// The number of points at which a claim is tested that is not proved in symbols.
 const POINTS: usize = 20;
 /// A quantity that is smaller than its scale by this many digits at every point is zero.
 const VERIFIED_DIGITS: f64 = 40.0;
@@ -15,7 +15,7 @@ const VERIFIED_DIGITS: f64 = 40.0;
 /// Finding on a claim about a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceFinding {
-    /// Which surface.
+    /// The surface.
     pub surface: Surface,
     /// The quantity claimed to be zero there.
     pub claim: ClaimKind,
@@ -28,11 +28,11 @@ pub struct SurfaceFinding {
 pub enum Outcome {
     /// It is zero in symbols, for all parameters.
     Proved,
-    /// It is zero to `digits` digits of the field's size, at so many points with random parameters.
+    /// It is zero to `digits` digits of the field's size, at `points` points with random parameters.
     Verified {
-        /// The digits, 40 or more.
+        /// The number of digits, 40 or more.
         digits: f64,
-        /// The points.
+        /// The number of points.
         points: usize,
     },
     /// It is not zero.
@@ -54,30 +54,30 @@ impl SurfaceFinding {
     }
 }
 
-/// Why a claim could be neither verified nor refuted.
+/// The reason why a claim could be neither verified nor refuted.
 // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SurfaceError {
-    /// There were no points to look at.
+    /// There were no points to test.
     #[error("the condition on {surface}: {cause}")]
     Points {
-        /// Where.
+        /// The surface.
         surface: Surface,
-        /// Why.
+        /// The reason.
         cause: PointsError,
     },
     /// A quantity has no value.
     #[error("the condition on {surface}: {cause}")]
     Value {
-        /// Where.
+        /// The surface.
         surface: Surface,
-        /// Why.
+        /// The reason.
         cause: Box<OracleError>,
     },
 }
 
-/// Goes through the boundary conditions of `spec`: what they say is zero is shown to be zero in symbols, or else in
-/// high precision on the surface, at random points and parameters.
+/// Examines the boundary conditions of `spec`: each states that a quantity is zero. That is proved in symbols, or else tested in high
+/// precision on the surface, at random points and parameters.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Reading of listings: what is accepted, and what each mistake is called.
+//! Reading of listings: accepted listings, and the message for each mistake.
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_claims::maple::Listing;

@@ -143,27 +143,27 @@ const C_WORDS: &[&str] = &[
     "xor_eq",
 ];
 
-/// Beginnings of families of macros.
+/// Prefixes of families of macros.
 const C_FAMILIES: &[&str] = &[
     "CHAR_", "DBL_", "DECIMAL_", "FE_", "FLT_", "FP_", "INT", "LDBL_", "LLONG_", "LONG_", "MATH_",
     "MMSMITH_", "M_", "SCHAR_", "SHRT_", "SIZE_", "UCHAR_", "UINT", "ULLONG_", "ULONG_", "USHRT_",
 ];
 
-/// Whether C takes it for a word of its own, or may have a macro of that name.
+/// Whether C has this word, or may have a macro of this name.
 fn is_taken(name: &str) -> bool {
     C_WORDS.contains(&name) || C_FAMILIES.iter().any(|family| name.starts_with(family))
 }
 
-/// A name with an underscore at its end where C has it already.
+/// The name, with an underscore at its end where C has it already.
 pub(crate) fn c_name(name: &str) -> String {
     if is_taken(name) { format!("{name}_") } else { name.to_owned() }
 }
 
-/// The names of parameters as members of a structure: what is no name in C gets an underscore at its end, and more
-/// where another parameter is called so.
+/// The names of parameters as members of a structure. A name that C has already gets an underscore at its end, and more underscores
+/// where another parameter has that name.
 pub(crate) fn members(parameters: &[Parameter]) -> Vec<String> {
     let plain = |name: &str| parameters.iter().any(|p| p.name == name && !is_taken(name));
-    // No two become one: what the one passes over is plain, so that the other is not it.
+    // All names differ: underscores are added past the names of other parameters that C does not have.
     let member = |parameter: &Parameter| {
         let mut member = parameter.name.clone();
         if is_taken(&member) {

@@ -14,12 +14,12 @@ pub struct Code<'a> {
     pub(crate) wrong: Option<String>,
 }
 
-/// Where a solution comes from, as its files say.
+/// The origin of a solution, as its files state it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// The command that writes it down.
+    /// The command that writes the file.
     pub command: String,
-    /// The specification that it is written from.
+    /// The specification of the solution.
     pub file: String,
 }
 
@@ -46,7 +46,7 @@ impl<'a> Code<'a> {
         Code { spec, staged: Staged::of(spec, fields), origin, wrong: None }
     }
 
-    /// Stages `fields` with a fault planted in them, which the code says at its head.
+    /// Stages `fields` with a fault planted in them, which the head of the code states.
     ///
     /// # Errors
     ///
@@ -63,7 +63,7 @@ impl<'a> Code<'a> {
         Ok(Code::wrong_on_purpose(spec, fields, origin, wrong))
     }
 
-    /// Stages `fields` that are wrong on purpose, as the code says at its head.
+    /// Stages `fields` that are wrong on purpose, which the head of the code states.
     #[must_use]
     pub fn wrong_on_purpose(spec: &'a Spec, fields: Fields, origin: Origin, why: String) -> Self {
         Code { wrong: Some(why), ..Code::of(spec, fields, origin) }
@@ -77,7 +77,7 @@ impl<'a> Code<'a> {
         lines
     }
 
-    /// Whether any operation calls such a function.
+    /// Whether an operation calls a function for which `such` holds.
     pub(crate) fn calls(&self, such: impl Fn(Function) -> bool) -> bool {
         let mut operations = self.staged.program().operations().iter();
         operations.any(|operation| match operation {

@@ -1,6 +1,7 @@
 //! Faults planted in the fields, for authors who test their own tests: code with a fault must fail them.
 //!
-//! Each fault is a mistake that published codes carry. It changes derived fields, so that generated code has the same one in every language.
+//! Each fault is a mistake that published codes carry. It changes derived fields, so that generated code has the same mistake in every
+//! language.
 
 use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
 use mmsmith_spec::{Domain, Fields, Law, Spec};
@@ -14,13 +15,13 @@ use thiserror::Error;
 pub enum Fault {
     /// `-b`.
     BodyForceSign,
-    /// `rho0 b`, a force per volume where one per mass is asked for.
+    /// `rho0 b`, a force per volume in place of a force per mass.
     BodyForcePerVolume,
     /// `b/J`, per current volume.
     BodyForcePerCurrentVolume,
     /// `b` at a time that is a hundredth of the period later.
     BodyForceLate,
-    /// `b` at `x = X + u` in the place of `X`.
+    /// `b` at `x = X + u` in place of `X`.
     BodyForceAtCurrentPosition,
     /// `b - a`.
     BodyForceWithoutInertia,
@@ -190,7 +191,7 @@ impl Fault {
                 let coordinates: Vec<Expr> = f.inputs[..n].iter().map(|(X, _)| *X).collect();
                 let current: BTreeMap<Expr, Expr> =
                     coordinates.iter().zip(&f.u).map(|(&X, &u)| (X, graph.add(X, u))).collect();
-                // First what other symbols mean, as the radius, so that it moves with the coordinates.
+                // First the meanings of other symbols, such as the radius, so that they move with the coordinates.
                 let definitions: BTreeMap<Expr, Expr> = f.definitions.iter().copied().collect();
                 for b in &mut f.b {
                     let explicit = graph.replace(*b, &definitions);
@@ -246,7 +247,7 @@ impl Fault {
     }
 }
 
-/// A word that names no fault.
+/// A word that is not the name of a fault.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("there is no fault '{0}'")]
 pub struct UnknownFault(String);
@@ -254,7 +255,7 @@ pub struct UnknownFault(String);
 impl FromStr for Fault {
     type Err = UnknownFault;
 
-    /// By its name, in which `b-` may stand for `body-force-`.
+    /// The fault of a name, in which `b-` may stand for `body-force-`.
     fn from_str(name: &str) -> Result<Self, UnknownFault> {
         let is_named = |fault: &Fault| {
             let of_b = fault.name().strip_prefix("body-force-");
@@ -271,7 +272,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Whether a change of the fields of `spec` shows in those expressions that are looked at, before and after.
+/// Whether a change of the fields of `spec` shows in the given expressions, before and after the change.
 pub(crate) fn has_effect(
     spec: &Spec,
     fields: &mut Fields,
@@ -294,7 +295,7 @@ pub(crate) fn swap_first_two(vector: &mut [Expr]) {
     }
 }
 
-/// All that generated code computes of position and time.
+/// All outputs of generated code that depend on position and time.
 fn outputs(fields: &Fields) -> Vec<Expr> {
     let Fields { u, v, a, H, F, J, P, b, W, surfaces, .. } = fields;
     let matrices = [H, F, P].into_iter().flatten().flatten();
@@ -309,7 +310,7 @@ const NOTICED: f64 = 1e-9;
 /// Whether values differ at places within the body, with parameters next to their defaults.
 fn is_noticed(spec: &Spec, fields: &mut Fields, before: &[Expr], after: &[Expr]) -> bool {
     let n = spec.dimension;
-    // Next to the defaults, of which some are one.
+    // Parameters next to their defaults, since some defaults are one.
     let defaults = spec.parameters.iter().enumerate();
     let defaults = defaults.map(|(i, p)| p.default * (0.97 - 0.02 * (i % 5) as f64));
     let measures = match &spec.domain {
@@ -345,10 +346,10 @@ fn is_noticed(spec: &Spec, fields: &mut Fields, before: &[Expr], after: &[Expr])
     })
 }
 
-/// Takes for `b` what balances a stress: `a - Div P/rho0`.
+/// Sets `b` to the body force that balances a stress: `a - Div P/rho0`.
 pub(crate) fn balance(fields: &mut Fields, stress: &[Vec<Expr>], density: Expr) {
     let Fields { graph, definitions, inputs, a, b, .. } = fields;
-    // In the coordinates alone, so that derivatives see all of it.
+    // In the coordinates alone, so that derivatives see every dependence.
     let definitions: BTreeMap<Expr, Expr> = definitions.iter().copied().collect();
     let mut derivatives = Derivatives::default();
     for (i, row) in stress.iter().enumerate() {
@@ -366,7 +367,7 @@ pub(crate) fn balance(fields: &mut Fields, stress: &[Vec<Expr>], density: Expr) 
     }
 }
 
-/// Derives the fields with other Lame constants; those of a law without them, and of one that has no such fields, stay.
+/// Derives the fields with other Lame constants. The fields stay where the law has no such constants, or no fields with them.
 fn with_constants(
     spec: &Spec,
     fields: &mut Fields,

@@ -1,12 +1,12 @@
 //! Source for manufactured solutions from their specifications, in the language of each host.
 //!
-//! Specifications are read by [`mmsmith_spec`], and [`mmsmith_stage`] decides what is computed when. A [`Code`] is a solution with
-//! its fields in stages. [`HOSTS`] lists the languages and hosts that it can be written down for, the Rust module and the C header
-//! of the library among them; all have the same values in the same order. The commands `cargo xtask gen` and `mms gen` write
-//! files; the macro `manufactured_solution!` puts the Rust items where it stands.
+//! Specifications are read by [`mmsmith_spec`], and [`mmsmith_stage`] decides which values are computed in which stage. A [`Code`] is a
+//! solution with its fields in stages. [`HOSTS`] lists the languages and hosts for which it can be written; the Rust module and the C
+//! header of the library are among them. All files compute the same values in the same order. The commands `cargo xtask gen` and `mms
+//! gen` write files; the macro `manufactured_solution!` puts the Rust items where it stands.
 //!
-//! A language spells operations, literals, calls and operands (`target.rs`); what a file holds and says at its head is the same for
-//! all (`listing.rs`), and so are the functions that hosts lack (`runtime.txt`).
+//! A language spells operations, literals, calls and operands (`target.rs`). The content and the head of a file are the same for all
+//! languages (`listing.rs`), and so are the functions that hosts lack (`runtime.txt`).
 //!
 //! The output is deterministic to the byte. Text from a specification reaches it only as checked identifiers, as
 //! numbers, and as string literals and comments, never as code.

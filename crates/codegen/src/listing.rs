@@ -1,4 +1,4 @@
-//! Files in languages that have functions: what they hold, and the text at their heads.
+//! Files in languages that have functions: their content, and the text at their heads.
 
 use crate::code::Code;
 use crate::runtime::{Routine, WithRuntime, routines};
@@ -20,10 +20,10 @@ pub(crate) struct Item {
     outputs: Vec<Slot>,
 }
 
-/// The arguments of a function, beside the solution.
+/// The arguments of a function beside the solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Given {
-    /// None.
+    /// No arguments.
     Nothing,
     /// A position and a time.
     PositionAndTime,
@@ -37,26 +37,26 @@ impl Item {
 }
 
 impl Item {
-    /// Where its entries are, row by row.
+    /// The slots of its entries, row by row.
     pub(crate) fn outputs(&self) -> &[Slot] {
         &self.outputs
     }
 
-    /// Its entries for the defaults of the parameters, of a function that depends on these alone.
+    /// The entries at the default parameters, of a function that depends on the parameters alone.
     pub(crate) fn values(&self, code: &Code<'_>) -> Vec<f64> {
         code.values(&self.outputs)
     }
 }
 
 impl Code<'_> {
-    /// The values of the stage of the parameters, for their defaults.
+    /// The values of the stage of the parameters, at their defaults.
     pub(crate) fn fixed_values(&self) -> Vec<f64> {
         self.values(self.staged.fixed())
     }
 
-    /// Values of the parameters alone, for their defaults.
+    /// Values that depend on the parameters alone, at their defaults.
     fn values(&self, slots: &[Slot]) -> Vec<f64> {
-        // The coordinates and the time, which nobody reads.
+        // Coordinates and time, which no operation reads.
         let nowhere = vec![0.0; self.spec.dimension + 1];
         let defaults = self.spec.parameters.iter().map(|p| p.default);
         let inputs: Vec<f64> = nowhere.into_iter().chain(defaults).collect();
@@ -126,7 +126,7 @@ impl Code<'_> {
         all
     }
 
-    /// The functions that the solution's operations call and that the host lacks.
+    /// The functions that the solution's operations call and the host lacks.
     pub(crate) fn routines(&self, target: &impl WithRuntime) -> Vec<Routine> {
         let mut roots = BTreeSet::new();
         for operation in self.staged.program().operations() {
@@ -146,8 +146,8 @@ impl Code<'_> {
         routines(target, &roots.into_iter().collect::<Vec<_>>())
     }
 
-    /// The head of a file, a line each: the solution, where it comes from, what `host` adds, and the conventions that decide
-    /// whether a run agrees.
+    /// The head of a file, a line each: the solution, its origin, remarks of `host`, and the conventions on which the agreement of a
+    /// run depends.
     pub(crate) fn head_for_host(&self, host: &str) -> Vec<String> {
         let spec = self.spec;
         let mut lines = vec![format!("{}.", spec.title)];
@@ -192,8 +192,8 @@ In two dimensions the deformation is plane strain. Units are those of the parame
         self.spec.parameters.iter().map(about).collect()
     }
 
-    /// The lines that refuse parameters which are not admissible, those of the stage of the parameters, and its values; `named` is
-    /// how the language calls a parameter, by its number.
+    /// The lines that refuse inadmissible parameters, the lines of the stage of the parameters, and the values of that stage; `named`
+    /// gives the language's name of a parameter by its number.
     pub(crate) fn admitted<T: Target>(
         &self,
         target: &T,
@@ -232,13 +232,13 @@ In two dimensions the deformation is plane strain. Units are those of the parame
     }
 }
 
-/// How a language refuses parameters.
+/// The text by which a language refuses parameters.
 pub(crate) struct Refusal {
     /// Whether `#` is a finite number.
     pub(crate) finite: &'static str,
     /// The operator that joins conditions.
     pub(crate) and: &'static str,
-    /// A number that two sides of a condition are compared as, for `#`.
+    /// The form of `#` in which the two sides of a condition are compared.
     pub(crate) side: &'static str,
     /// Lines that refuse the parameters unless the first `#` holds, with the second as the message.
     pub(crate) lines: &'static str,
@@ -314,7 +314,7 @@ mod tests {
             for line in lines.lines() {
                 prop_assert!(line.starts_with(sign), "{line:?}");
                 let rest = &line[sign.len()..];
-                // What follows the sign directly may be a directive.
+                // Text that follows the sign directly may be a directive.
                 prop_assert!(rest.is_empty() || rest.starts_with(' '), "{line:?}");
                 prop_assert!(line.len() <= 64 && !line.ends_with('\\'), "{line:?}");
             }

@@ -14,11 +14,11 @@ use thiserror::Error;
      by more than hyphens"
 )]
 pub struct NameClash {
-    /// The one.
+    /// The first solution.
     pub first: String,
-    /// The other.
+    /// The other solution.
     pub second: String,
-    /// The type.
+    /// The type of both.
     pub solution: String,
 }
 

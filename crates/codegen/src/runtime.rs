@@ -7,30 +7,30 @@ use std::iter::Peekable;
 use std::str::Chars;
 use std::sync::LazyLock;
 
-/// Operations of functions beside sums, products and calls of `math.h`.
+/// Operations of functions, beside sums, products and calls of `math.h`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Primitive {
-    /// The second where the first holds, else the third.
+    /// The second operand where the first holds, else the third.
     Choose,
-    /// Whether the first is less than the second.
+    /// Whether the first operand is less than the second.
     Less,
-    /// Whether the first is at most the second.
+    /// Whether the first operand is at most the second.
     AtMost,
-    /// Whether both are equal.
+    /// Whether both operands are equal.
     Equal,
-    /// The size.
+    /// The absolute value.
     Abs,
-    /// The nearest whole number, of two the even one.
+    /// The nearest whole number; halves go to the even number.
     Nearest,
-    /// The `e` of `m 2^e` with `m` from 1/2 to 1, as a number.
+    /// The exponent `e` of `m 2^e` with `m` from 1/2 to 1, as a number.
     Exponent,
     /// `x 2^e`.
     Scaled,
 }
 
-/// A language that has functions of its own, or into whose expressions they are put.
+/// A language in which functions can be defined, or into whose expressions the functions are written.
 pub(crate) trait WithRuntime: Target {
-    /// How the language spells it, with `#` for each operand.
+    /// The spelling of a primitive, with `#` for each operand.
     fn primitive(&self, primitive: Primitive) -> &'static str;
 }
 
@@ -58,7 +58,7 @@ struct Function {
     result: Term,
 }
 
-/// A function in a language.
+/// A function as a language spells it.
 pub(crate) struct Routine {
     /// Its name.
     pub(crate) name: &'static str,
@@ -70,17 +70,17 @@ pub(crate) struct Routine {
     pub(crate) steps: Vec<Step>,
     /// Its value.
     pub(crate) result: String,
-    /// The statements for languages in which a function can end early: nothing is computed that its value does not need.
+    /// The statements for languages in which a function can return early: a value that the result does not need is not computed.
     pub(crate) body: Vec<Line>,
 }
 
-/// A line of a function that can end early.
+/// A line of a function that can return early.
 pub(crate) enum Line {
     /// A statement that names a value.
     Step(Step),
-    /// Lines that end the function where the condition holds.
+    /// Lines that return a value where the condition holds.
     If(String, Vec<Line>),
-    /// The value of the function.
+    /// The return of a value.
     Return(String),
 }
 
@@ -97,8 +97,8 @@ pub(crate) struct Step {
 static FUNCTIONS: LazyLock<BTreeMap<&'static str, Function>> =
     LazyLock::new(|| read(include_str!("runtime.txt")));
 
-/// The functions that `roots` and those that these call, each after those that it calls. Those for which the language has a
-/// call of its own are left out.
+/// Transitive callees of `roots`, and `roots`, in definition-before-use order. Functions for which the language has a call of its own
+/// are left out.
 pub(crate) fn routines<T: WithRuntime>(target: &T, roots: &[&'static str]) -> Vec<Routine> {
     let (mut done, mut routines) = (BTreeSet::new(), Vec::new());
     for root in roots {
@@ -113,7 +113,7 @@ fn visit<T: WithRuntime>(
     done: &mut BTreeSet<&'static str>,
     routines: &mut Vec<Routine>,
 ) {
-    // The language's own call does not have the name of the project's function.
+    // The language's own call has another name than the project's function.
     let own = !target.function(Called::Support(name)).contains(name);
     let Some(function) = FUNCTIONS.get(name).filter(|_| !own && done.insert(name)) else { return };
     let mut called = Vec::new();
@@ -144,7 +144,7 @@ fn spelled<T: WithRuntime>(target: &T, (name, term): &(String, Term)) -> Step {
 }
 
 impl Function {
-    /// The lines that return `term`; `done` says which steps have a line before them.
+    /// The lines that return `term`; `done` marks the steps that have a line already.
     fn lines<T: WithRuntime>(
         &self,
         target: &T,
@@ -153,7 +153,7 @@ impl Function {
         lines: &mut Vec<Line>,
     ) {
         let branched = term.choice().filter(|[_, first, second]| {
-            // Where both need the same and call nothing, the choice is one of values.
+            // Where both values need the same steps and call nothing, a choice between values is enough.
             self.needs(first) != self.needs(second) || first.works() || second.works()
         });
         let now = if branched.is_some() { self.always_needs(term) } else { self.needs(term) };
@@ -172,14 +172,14 @@ impl Function {
         self.lines(target, second, done, lines);
     }
 
-    /// Which steps a term is made of.
+    /// Marks the steps that a term needs.
     fn needs(&self, term: &Term) -> Vec<bool> {
         let mut needed = vec![false; self.steps.len()];
         self.need(term, &mut needed);
         needed
     }
 
-    /// Steps that a term is made of whatever its choices are.
+    /// Marks the steps that a term needs whichever way its choices go.
     fn always_needs(&self, term: &Term) -> Vec<bool> {
         let Some([condition, first, second]) = term.choice() else { return self.needs(term) };
         let ways = self.always_needs(first).into_iter().zip(self.always_needs(second));
@@ -225,7 +225,7 @@ impl Term {
         }
     }
 
-    /// The functions of the file that it calls; `log1p` is the one by which the language calls that of `math.h`, if any.
+    /// The functions of the file that the term calls; `log1p` is the function by which the language calls that of `math.h`, if any.
     fn calls(&self, log1p: Option<&'static str>, names: &mut Vec<&'static str>) {
         match self {
             Term::Support(name, _) => names.push(name),
@@ -235,7 +235,7 @@ impl Term {
         self.parts().iter().for_each(|part| part.calls(log1p, names));
     }
 
-    /// The condition and the two values of a choice.
+    /// The condition and the two values, if the term is a choice.
     fn choice(&self) -> Option<&[Term; 3]> {
         match self {
             Term::Primitive(Primitive::Choose, parts) => parts[..].try_into().ok(),
@@ -243,7 +243,7 @@ impl Term {
         }
     }
 
-    /// Whether it is more than a name or a number with a sign.
+    /// Whether the term is more than a name or a number with a sign.
     fn works(&self) -> bool {
         match self {
             Term::Number(_) | Term::Name(_) => false,
@@ -253,7 +253,7 @@ impl Term {
         }
     }
 
-    /// How strongly it binds.
+    /// The precedence of the term's operator.
     fn rank(&self) -> u8 {
         match self {
             Term::Sum(_) | Term::Difference(_) => 1,
@@ -290,7 +290,7 @@ impl Term {
     }
 }
 
-/// Reads `runtime.txt`; what is wrong in it is left out, which the tests notice.
+/// Reads `runtime.txt`. Faulty lines are left out, which the tests notice.
 fn read(text: &'static str) -> BTreeMap<&'static str, Function> {
     let mut functions = BTreeMap::new();
     let mut own: Option<(&'static str, Function)> = None;
@@ -325,7 +325,7 @@ impl Function {
         }
     }
 
-    /// The statement for `k = count, ..., 1`; all values but the last have a number at their names.
+    /// Adds the statement for `k = count, ..., 1`; the names of all values but the last end with their number.
     fn repeat(&mut self, count: u32, statement: &str) {
         let Some((name, value)) = statement.split_once(" = ") else { return };
         if let Some((first, _)) = self.steps.last_mut().filter(|(last, _)| last == name) {
@@ -340,7 +340,7 @@ impl Function {
 }
 
 impl Term {
-    /// This term for a value of `k`, with the value before by its number.
+    /// This term for a value of `k`; `before` is the name of the previous value, without its number.
     fn at(&self, k: u32, before: &str) -> Term {
         let both = |parts: &[Term; 2]| Box::new([parts[0].at(k, before), parts[1].at(k, before)]);
         let folded = |parts: &[Term; 2], of: fn(f64, f64) -> f64| match &*both(parts) {
@@ -558,7 +558,7 @@ mod tests {
         }
     }
 
-    /// Whatever generated code calls, the file has.
+    /// The file has every function that generated code calls.
     #[test]
     fn no_function_is_missing() {
         for function in Named::ALL {

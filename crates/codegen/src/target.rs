@@ -9,19 +9,19 @@ use thiserror::Error;
 
 /// A language that solutions are written in: how it spells each part of a program.
 pub(crate) trait Target {
-    /// Where a function finds what is not computed in it.
+    /// The places of values that a function does not compute.
     type Places: Copy;
 
-    /// Text before the index of a value in a statement that names it, and the end of the statement.
+    /// Text before the index of a value in a statement that names the value, and text at the end of the statement.
     const STATEMENT: [&'static str; 2];
 
-    /// A double; negative ones so that they can stand after a sign.
+    /// A double; negative numbers in a form that can stand behind a sign.
     fn literal(&self, value: f64) -> String;
 
     /// A call of a function, with `#` for each argument.
     fn function(&self, function: Called) -> Cow<'static, str>;
 
-    /// Where a value is found that is not computed in the same block.
+    /// Writes the place of a value that is not computed in the same block.
     fn operand(&self, text: &mut String, operand: Operand<'_>, places: Self::Places);
 
     /// A number of the specification.
@@ -37,7 +37,7 @@ pub(crate) trait Target {
             .map_or_else(String::new, |(before, after)| before.to_owned() + &exponent + after)
     }
 
-    /// An operation, with `#` for each operand. Numbers and inputs are operands and no statements.
+    /// An operation, with `#` for each operand. Numbers and inputs are operands and have no statement.
     fn operation(&self, operation: &Operation) -> Cow<'static, str> {
         let call = match operation {
             Operation::Number(value) => return self.number(value).into(),
@@ -91,7 +91,7 @@ pub(crate) trait Target {
     }
 }
 
-/// Sums, products and what else is written the same in every language; nothing for other operations.
+/// The spelling of sums, products and other operations that all languages share; empty for other operations.
 pub(crate) fn arithmetic(operation: &Operation) -> &'static str {
     match operation {
         Operation::Add(..) => "# + #",
@@ -103,7 +103,7 @@ pub(crate) fn arithmetic(operation: &Operation) -> &'static str {
     }
 }
 
-/// A block in a language.
+/// A block as a language spells it.
 pub(crate) struct Written {
     /// The statements.
     pub(crate) lines: String,
@@ -114,9 +114,9 @@ pub(crate) struct Written {
 /// A function that generated code calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Called {
-    /// One of `math.h`, by its name there.
+    /// A function of `math.h`, by its name there.
     Library(&'static str),
-    /// One that the project defines, by its name in the file `runtime.txt`.
+    /// A function of the project, by its name in the file `runtime.txt`.
     Support(&'static str),
 }
 
@@ -162,16 +162,16 @@ impl Host {
     ///
     /// # Errors
     ///
-    /// [`Unwritable`] where the solution needs what the host has no words for.
+    /// [`Unwritable`] where the host cannot express a part of the solution.
     pub fn source(&self, code: &Code<'_>) -> Result<String, Unwritable> {
         (self.write)(code)
     }
 }
 
-/// A host has no words for a solution.
+/// The reason why a host cannot express a solution.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Unwritable {
-    /// A function that its expressions lack.
+    /// A function that the host's expressions lack.
     #[error(
         "--target {target}: the expressions of {target} have no form of {function}, which {solution} calls; choose a target \
          with functions of its own, such as cpp, fortran or numpy"

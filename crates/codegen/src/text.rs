@@ -21,7 +21,7 @@ pub(crate) fn meaning(name: &str, description: &str, unit: &str, range: &str) ->
     text
 }
 
-/// Writes `template` with an operand of the operation in the place of each `#`, in their order.
+/// Writes `template` with an operand of the operation in place of each `#`, in their order.
 pub(crate) fn spell(
     text: &mut String,
     template: &str,
@@ -39,7 +39,7 @@ pub(crate) fn spell(
     }
 }
 
-/// `template` with a part in the place of each `#`.
+/// `template` with a part in place of each `#`.
 pub(crate) fn with(template: &str, parts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     let mut pieces = template.split('#');
     let mut text = pieces.next().unwrap_or_default().to_owned();
@@ -49,7 +49,7 @@ pub(crate) fn with(template: &str, parts: impl IntoIterator<Item = impl AsRef<st
     text
 }
 
-/// `template` with the text of each place between two signs `@`, by the name that stands there.
+/// `template` with each name between two signs `@` replaced by `place(name)`.
 pub(crate) fn filled(template: &str, place: impl Fn(&str) -> String) -> String {
     let pieces = template.split('@').enumerate();
     let text = |(index, piece): (usize, &str)| match index % 2 {
@@ -65,9 +65,9 @@ pub(crate) fn push_index(text: &mut String, index: usize) {
     let _ = write!(text, "{index}");
 }
 
-/// C's comments show this many characters of longer text ...
+/// The most characters of a text in C's comments.
 const LONGEST: usize = 2_000;
-/// ... and its messages this many characters, which stay below what every compiler takes when each is an escape of four.
+/// The most characters of a text in C's messages: every compiler accepts as many, even when each is an escape of four characters.
 const LONGEST_MESSAGE: usize = 500;
 
 fn shortened(text: &str, longest: usize) -> String {
@@ -81,9 +81,9 @@ pub(crate) fn comment(text: &str) -> String {
     let mut safe = String::new();
     for c in shortened(&one_line(text), LONGEST).chars() {
         let c = match c {
-            // At the end of a line, this would join it with the next one.
+            // A backslash at the end of a line would join the next line.
             '\\' => '_',
-            // Letters of any alphabet; everything else, as marks and spaces nobody sees, stays out.
+            // Letters of any alphabet stay. Other characters, such as invisible marks and spaces, do not.
             c if !c.is_ascii() && !c.is_alphanumeric() => '_',
             c => c,
         };
@@ -110,7 +110,7 @@ pub(crate) fn digits(magnitude: f64) -> String {
     if text.contains(['.', 'e']) { text } else { format!("{text}.0") }
 }
 
-/// A double of C; negative ones with a minus sign.
+/// A double in C; negative numbers begin with a minus sign.
 pub(crate) fn c_number(value: f64) -> String {
     let sign = if value.is_sign_negative() { "-" } else { "" };
     let size = if value.is_infinite() { "HUGE_VAL".into() } else { digits(value.abs()) };
@@ -125,7 +125,7 @@ pub(crate) fn c_string(text: &str) -> String {
             // A question mark may start a trigraph.
             b'"' | b'\\' | b'?' => literal.extend(['\\', char::from(byte)]),
             b' '..=b'~' => literal.push(char::from(byte)),
-            // Three digits always: a digit that follows is not taken for a part.
+            // Always three digits, so that a digit behind them is not read as a part of the escape.
             _ => literal += &format!("\\{byte:03o}"),
         }
     }

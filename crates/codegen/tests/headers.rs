@@ -1,4 +1,5 @@
-//! Rules for every generated header by itself: it defines all that it calls, says what its functions give, and has names that C takes.
+//! Rules for every generated header by itself: it defines all functions that it calls, describes their results, and has names that C
+//! accepts.
 
 #![allow(clippy::unwrap_used)]
 
@@ -115,7 +116,7 @@ fn functions_of_another_library_are_named() {
     }
 }
 
-/// Words and macros of C get an underscore at their end, and more where that name is another parameter's.
+/// Words and macros of C get an underscore at their end, and more underscores where another parameter has that name.
 #[test]
 fn members_have_names_that_c_takes() {
     let law = "law = 'neo-hookean'\nlambda = 1\nmu = 1";

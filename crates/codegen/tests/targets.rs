@@ -92,7 +92,7 @@ fn fortran_stays_within_its_lines() {
     }
 }
 
-/// Each fault shows in each file whose host has what it changes, and the file says so.
+/// Each fault shows in each file whose host has the changed field, and the file names the fault.
 #[test]
 fn faults_show_in_every_host() {
     let spec = library("skew-2d");
@@ -110,14 +110,14 @@ fn faults_show_in_every_host() {
                 "{}: {fault}",
                 host.name
             );
-            // The fragments for OpenFOAM include the header, which has it.
+            // The fragments for OpenFOAM include the header, which has the changed field.
             let changed = body(&text) != body(&host.source(&right).unwrap());
             assert!(changed || host.name == "openfoam", "{}: {fault}", host.name);
         }
     }
 }
 
-/// Names that a language takes for one, or has itself.
+/// The names of parameters that a language has as words or functions of its own.
 #[test]
 fn names_of_parameters_are_the_specifications_business() {
     let text = "name = 'class'\ntitle = 'Test'\ncoordinates = 'cartesian'\ndimension = 1\n\

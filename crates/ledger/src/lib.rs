@@ -9,8 +9,8 @@
 //!   where they stood, so that no other line moves, and their cases are free to be computed again.
 //! - `claims/`: a lock file for each case under way, and `lock`, which orders the processes.
 //! - `cases-I-of-N.jsonl`: the cases of a [`Shard`], in the same form. One process at a time appends to it, and takes no locks, so
-//!   that the folder may lie on a file system of many machines. Its lines are read when a ledger or a shard is opened. Damaged
-//!   ones are told and stay.
+//!   that the folder may lie on a file system of many machines. Its lines are read when a ledger or a shard is opened. Damaged lines
+//!   are reported, and stay.
 //!
 //! A process that is killed loses the cases that it had claimed and not finished, and no others: its locks vanish with
 //! it, and a line that it had not written whole is set aside. Lines are handed to the system one by one and not forced
@@ -56,7 +56,7 @@ pub struct Ledger {
 
 /// Contents known of the case file, and the handles to the file.
 struct State {
-    /// Held by whoever reads or writes the case file.
+    /// Held while the case file is read or written.
     lock: File,
     cases: File,
     /// Where the next line to be read starts, and its number from 1.
@@ -64,7 +64,7 @@ struct State {
     line: usize,
     /// Values by the text of their keys.
     values: HashMap<String, Value>,
-    /// Values from the shards' files, likewise.
+    /// Values from the shards' files, by the text of their keys.
     shards: HashMap<String, Value>,
     damaged: Vec<Damage>,
 }
@@ -78,28 +78,28 @@ pub struct Damage {
     pub line: usize,
     /// The fault of the line.
     pub problem: &'static str,
-    /// The file that it was moved to; none where it stays, as in the file of a shard.
+    /// The file to which the line was moved; `None` where it stays, as in the file of a shard.
     pub moved_to: Option<PathBuf>,
 }
 
 /// State of a case for the process that asks for it.
 #[derive(Debug)]
 pub enum Claim<'a> {
-    /// It is finished, with this value.
+    /// The case is finished, with this value.
     Done(Value),
-    /// Another process, or another thread, is at work on it.
+    /// Another process, or another thread, is computing the case.
     Taken,
-    /// It is the caller's to compute.
+    /// The case is the caller's to compute.
     Mine(Case<'a>),
 }
 
-/// A case that the holder computes. Dropped unfinished, it is free again.
+/// A case that the holder computes. A case that is dropped unfinished is free again.
 pub struct Case<'a> {
     ledger: &'a Ledger,
     key: String,
     claim: File,
     path: PathBuf,
-    /// Whether no other case was under way when this one was claimed, and how many were finished then.
+    /// Whether no other case was under way when this case was claimed, and how many cases were finished then.
     alone: bool,
     finished_before: usize,
 }
@@ -118,7 +118,7 @@ pub enum LedgerError {
         /// Why it failed.
         cause: io::Error,
     },
-    /// The cases of a shard are of another origin: their results may be others.
+    /// The cases of a shard have another origin, so that their results may differ.
     #[error("{} has cases of another origin: {found}, not {expected}", path.display())]
     OtherOrigin {
         /// The file.
@@ -136,8 +136,8 @@ const LOCK: &str = "lock";
 const CLAIMS: &str = "claims";
 
 impl Ledger {
-    /// Opens the ledger in `folder`, which is made where there is none, sets damaged lines aside, and takes in the cases of its
-    /// shards. Those have to be of `origin`, which says what results depend on beside their keys.
+    /// Opens the ledger in `folder`, which is created where it is missing, sets damaged lines aside, and reads the cases of its shards.
+    /// The shards have to be of `origin`, which states everything that results depend on beside their keys.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// The case of `key`: its value if it is finished, or else the right to compute it, unless that is taken.
+    /// The case of `key`: its value if it is finished, or else the right to compute it, unless another process has that right.
     ///
     /// A caller that meets [`Claim::Taken`] asks again later: the case will be done, or free if its holder was killed.
     ///
@@ -190,7 +190,7 @@ impl Ledger {
         })
     }
 
-    /// The number of finished cases, those of other processes included and those of shards left out.
+    /// The number of finished cases: cases of other processes count, cases of shards do not.
     ///
     /// # Errors
     ///
@@ -199,7 +199,7 @@ impl Ledger {
         self.with_lock(|state| Ok(state.values.len()))
     }
 
-    /// The lines that this ledger set aside since it was opened, or since this was last asked.
+    /// The lines that this ledger set aside since the last call, or since it was opened.
     #[must_use]
     pub fn take_damaged(&self) -> Vec<Damage> {
         std::mem::take(&mut self.state().damaged)
@@ -215,7 +215,7 @@ impl Ledger {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does `work` on the newest state while no other process and no other thread reads or writes the ledger.
+    /// Calls `work` with the newest state while no other process and no other thread reads or writes the ledger.
     fn with_lock<R>(
         &self,
         work: impl FnOnce(&mut State) -> Result<R, LedgerError>,
@@ -229,12 +229,12 @@ impl Ledger {
         unlocked.map(|()| result)
     }
 
-    /// Reads the lines that came since the last time, and sets aside what is damaged.
+    /// Reads the lines that were added since the last call, and sets damaged lines aside.
     fn read_on(&self, state: &mut State) -> Result<(), LedgerError> {
         let path = self.folder.join(CASES);
         let length = state.cases.metadata().map_err(error("read", &path))?.len();
         if length < state.offset {
-            // Somebody has cut the file; what it says now is what holds.
+            // Somebody has cut the file; its present content holds.
             (state.offset, state.line) = (0, 1);
             state.values.clear();
         }
@@ -260,7 +260,7 @@ impl Ledger {
             };
             match outcome {
                 Ok(None) => {}
-                // Of two lines for one case the first holds, for every reader.
+                // Of two lines for one case every reader takes the first.
                 Ok(Some((key, value))) => {
                     state.values.entry(key).or_insert(value);
                 }
@@ -282,7 +282,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Copies the damaged `ranges` of the `bytes` that start at `first` to the file for them, and blanks them.
+    /// Copies the damaged `ranges` of `bytes`, which start at `first`, to the file of damaged lines, and blanks them.
     fn set_aside(
         &self,
         first: u64,
@@ -318,7 +318,7 @@ impl Ledger {
         blank().map_err(error("mend", &path))
     }
 
-    /// Whether no case is under way but the one that `own` claims.
+    /// Whether no case is under way except the case that `own` claims.
     fn nobody_at_work(&self, own: Option<&Path>) -> Result<bool, LedgerError> {
         let claims = self.folder.join(CLAIMS);
         for entry in fs::read_dir(&claims).map_err(error("read", &claims))? {
@@ -328,7 +328,7 @@ impl Ledger {
             }
             let file = match File::open(&path) {
                 Ok(file) => file,
-                // Finished in the meantime.
+                // The case was finished in the meantime.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(source) => return Err(error("open", &path)(source)),
             };
@@ -361,14 +361,14 @@ impl Case<'_> {
             state.values.entry(self.key.clone()).or_insert_with(|| value.clone());
             Ok(())
         })?;
-        // Whoever locks the file in the meantime finds the case finished.
+        // A process that locks the file in the meantime finds the case finished.
         let _ = fs::remove_file(&self.path);
         Ok(())
     }
 
     /// Whether no other case was under way at any time since this one was claimed, in this process or another.
     ///
-    /// Times measured otherwise are those of a shared machine.
+    /// Times measured otherwise are times of a shared machine.
     ///
     /// # Errors
     ///
@@ -400,7 +400,7 @@ impl std::fmt::Debug for Ledger {
     }
 }
 
-/// The file at `path`, locked; `None` where somebody else has it.
+/// The file at `path`, locked; `None` where another process holds the lock.
 fn try_lock(path: &Path) -> Result<Option<File>, LedgerError> {
     let options = OpenOptions::new().read(true).append(true).create(true).open(path);
     let file = options.map_err(error("open", path))?;

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Text before the checksum, and text between the checksum and the content that it is the sum of.
+/// Text before the checksum, and text between the checksum and the content.
 const BEFORE: &str = "{\"sha256\":\"";
 const AFTER: &str = "\",";
 /// Hexadecimal digits of the checksum; one damaged line in 10^19 passes for a whole one.
@@ -21,7 +21,7 @@ pub(crate) fn write(key: &str, value: &Value) -> String {
     format!("{BEFORE}{}{AFTER}{content}\n", sum(content.as_bytes()))
 }
 
-/// Key and value of a line without its end, or what is wrong with it.
+/// Key and value of a line without its end, or the fault of the line.
 pub(crate) fn read(line: &[u8]) -> Result<(String, Value), &'static str> {
     let rest = line.strip_prefix(BEFORE.as_bytes()).ok_or(NO_CASE)?;
     let (found, rest) = rest.split_at_checked(DIGITS).ok_or(NO_CASE)?;
@@ -42,8 +42,7 @@ pub(crate) fn sum(bytes: &[u8]) -> String {
     digest.iter().take(DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// `value` as JSON without spaces, the members of objects in the order of their names: the same text for the same
-/// content.
+/// `value` as JSON without spaces, with the members of objects sorted by name, so that equal contents have equal texts.
 #[must_use]
 pub fn canonical(value: &Value) -> String {
     match value {

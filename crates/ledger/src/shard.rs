@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::{CASES, Damage, LedgerError, canonical, error, line};
 
-/// Which shard of how many, counted from 1.
+/// The number of a shard, from 1, and the number of all shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShardName {
     index: usize,
@@ -19,26 +19,27 @@ pub struct ShardName {
 }
 
 impl ShardName {
-    /// Shard `index` of `count`; none unless 1 <= `index` <= `count`.
+    /// Shard `index` of `count`; `None` unless 1 <= `index` <= `count`.
     #[must_use]
     pub fn new(index: usize, count: usize) -> Option<Self> {
         (1..=count).contains(&index).then_some(Self { index, count })
     }
 
-    /// How many shards there are.
+    /// The number of shards.
     #[must_use]
     pub fn count(self) -> usize {
         self.count
     }
 
-    /// Which of the cases with these costs are this shard's: from dear to cheap, each goes to the shard that has least so far.
+    /// Tells for each of the cases with these costs whether it belongs to this shard. Cases are dealt out from dear to cheap, each to
+    /// the shard with the least cost so far.
     ///
-    /// Every case is some shard's, and no other's.
+    /// Every case belongs to exactly one shard.
     #[must_use]
     pub fn own(self, costs: &[f64]) -> Vec<bool> {
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[b].total_cmp(&costs[a]));
-        // Cost and number of cases: those that cost nothing are spread as well.
+        // Cost and number of cases, so that cases without cost are spread as well.
         let mut loads = vec![(0.0, 0_usize); self.count];
         let mut own = vec![false; costs.len()];
         for case in order {
@@ -60,7 +61,7 @@ impl fmt::Display for ShardName {
     }
 }
 
-/// The finished cases of a folder, and the file that one shard appends its own to.
+/// The finished cases of a folder, and the file to which one shard appends its cases.
 ///
 /// ```
 /// use mmsmith_ledger::{Shard, ShardName};
@@ -87,19 +88,19 @@ struct State {
 }
 
 impl Shard {
-    /// Opens the file of the shard `name` in `folder`, both made where they are not there, and takes in what all shards and the
-    /// folder's ledger have finished.
+    /// Opens the file of the shard `name` in `folder`, creates both where they are missing, and reads the finished cases of all shards
+    /// and of the folder's ledger.
     ///
     /// # Errors
     ///
-    /// Where the folder or its files cannot be read or written, and where a shard is of another origin than `origin`, which says
-    /// what results depend on beside their keys.
+    /// Where the folder or its files cannot be read or written, and where a shard has another origin than `origin`, which states
+    /// everything that results depend on beside their keys.
     pub fn open(folder: &Path, name: ShardName, origin: &Value) -> Result<Self, LedgerError> {
         fs::create_dir_all(folder).map_err(error("make the folder", folder))?;
         let mut found = read_all(folder, origin)?;
         let cases = folder.join(CASES);
         match fs::read(&cases) {
-            // Its damaged lines are its own affair.
+            // The ledger itself reports its damaged lines.
             Ok(bytes) => {
                 lines(&bytes).filter_map(|(_, line)| line.ok()).for_each(|(key, value)| {
                     found.values.entry(key).or_insert(value);
@@ -122,7 +123,7 @@ impl Shard {
         Ok(shard)
     }
 
-    /// The value of the case of `key`, if that is finished.
+    /// The value of the case of `key`, if the case is finished.
     #[must_use]
     pub fn value(&self, key: &Value) -> Option<Value> {
         self.state().values.get(&canonical(key)).cloned()
@@ -132,7 +133,7 @@ impl Shard {
     ///
     /// # Errors
     ///
-    /// Where the line cannot be written whole, as on a full disk. A part of it that was written counts for nothing.
+    /// Where the line cannot be written whole, as on a full disk. A part of a line is ignored by readers.
     pub fn finish(&self, key: &Value, value: &Value) -> Result<(), LedgerError> {
         let key = canonical(key);
         self.append(&key, value)?;
@@ -140,7 +141,7 @@ impl Shard {
         Ok(())
     }
 
-    /// The damaged lines that were met since this was opened, or since this was last asked.
+    /// The damaged lines that were met since the last call, or since the shard was opened.
     #[must_use]
     pub fn take_damaged(&self) -> Vec<Damage> {
         std::mem::take(&mut self.state().damaged)
@@ -177,7 +178,7 @@ pub(crate) struct Found {
 ///
 /// # Errors
 ///
-/// Where they cannot be read, and where one is of another origin.
+/// Where a file cannot be read, or has another origin.
 pub(crate) fn read_all(folder: &Path, origin: &Value) -> Result<Found, LedgerError> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(error("read", folder))? {
@@ -187,7 +188,7 @@ pub(crate) fn read_all(folder: &Path, origin: &Value) -> Result<Found, LedgerErr
             paths.push(path);
         }
     }
-    // Of two lines for one case the first holds, for every reader.
+    // Of two lines for one case every reader takes the first.
     paths.sort();
     let stated = canonical(&json!(ORIGIN));
     let mut found = Found::default();
@@ -204,7 +205,7 @@ pub(crate) fn read_all(folder: &Path, origin: &Value) -> Result<Found, LedgerErr
                 Ok((key, value)) => {
                     found.values.entry(key).or_insert(value);
                 }
-                // Its shard may be writing it now, or was killed over it.
+                // The shard may be writing this line now, or was killed while it wrote.
                 Err(line::TORN) => {}
                 Err(problem) => found.damaged.push(Damage {
                     file: path.clone(),

@@ -28,7 +28,7 @@ fn value(case: u64) -> Value {
     json!({ "error": 1.0 / (case as f64 + 3.0), "text": "x".repeat((case % 7) as usize * 300) })
 }
 
-/// Finishes what it can of the study, calling `then` with each case that it finished itself.
+/// Finishes all free cases of the study, and calls `then` with each.
 fn work(folder: &Path, mut then: impl FnMut(u64)) {
     let ledger = Ledger::open(folder, &Value::Null).unwrap();
     for case in 0..CASES {
@@ -59,11 +59,11 @@ fn child() {
     }
 }
 
-/// A child and what it says.
+/// A child process and its messages.
 struct Working {
     child: Child,
     said: Lines<BufReader<ChildStdout>>,
-    /// Whether it has said that nothing is left; it then waits, and says no more.
+    /// Whether the child has said that nothing is left; it then waits, and says no more.
     is_idle: bool,
 }
 
@@ -83,7 +83,7 @@ impl Working {
         Self { child, said, is_idle: false }
     }
 
-    /// The next case that it finished; none where nothing is left, or where it has ended.
+    /// The next case that the child finished; `None` where nothing is left, or where it has ended.
     fn next(&mut self) -> Option<u64> {
         // The test harness writes its own words between, and one killed in the middle of a line leaves a part.
         while !self.is_idle {
@@ -97,7 +97,7 @@ impl Working {
         None
     }
 
-    /// All others.
+    /// All further cases of the child.
     fn rest(&mut self) -> Vec<u64> {
         std::iter::from_fn(|| self.next()).collect()
     }

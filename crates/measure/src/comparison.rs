@@ -12,24 +12,24 @@ use rayon::prelude::*;
 use crate::homes::{GROUP, Holder, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
-/// Runs of particles for which what depends on the time alone is computed once.
+/// Number of runs of particles that share the values which depend on the time alone.
 pub const RUNS: usize = 8;
-/// Particles in as many runs; what is compared of them fits into the first-level cache.
+/// Particles in [`RUNS`] runs. Their fields fit into the first-level cache.
 const CHUNK: usize = RUNS * BLOCK;
 
-/// Compares particles with the exact solution; what that needs of their reference positions alone is kept.
+/// Compares particles with the exact solution. Values that depend on the reference positions alone are kept.
 pub struct Comparison<'a, const D: usize> {
     exact: Box<dyn StateAtPoints<f64, D> + 'a>,
 }
 
 impl<'a, const D: usize> Comparison<'a, D> {
-    /// For particles that started at `X`.
+    /// For particles with the reference positions `X`.
     pub fn new<T: Real>(exact: &'a dyn Solution<f64, D>, X: &[SVector<T, D>]) -> Self {
         let X: Vec<_> = X.iter().map(|X| X.map(Real::to_f64)).collect();
         Self { exact: exact.state_at(&X) }
     }
 
-    /// The errors of all particles at `time`, those of the velocity `lag` earlier.
+    /// The errors of all particles at `time`; velocities are compared at a time that is earlier by `lag`.
     pub fn measure<T: Compared<D>>(
         &self,
         observed: (&Particles<T, D>, &Law<T, D>),
@@ -51,7 +51,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         PerField { u, v, F, P }
     }
 
-    /// As [`measure`](Self::measure) for one of several processes, of the particles of all of them; a call of all.
+    /// As [`measure`](Self::measure), for the particles of all processes. Collective.
     pub fn measure_all<T: Compared<D>>(
         &self,
         homes: &Homes,
@@ -62,7 +62,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         T::errors_of_all(self, homes, observed, (time, time - lag))
     }
 
-    /// The particle of largest position error at `time`, the first one without a number if there is such.
+    /// The particle with the largest position error at `time`, or the first particle whose error is not a number.
     pub fn worst_particle<T: Compared<D>>(
         &self,
         observed: (&Particles<T, D>, &Law<T, D>),
@@ -71,8 +71,8 @@ impl<'a, const D: usize> Comparison<'a, D> {
         T::worst_particle(self, observed, time).1
     }
 
-    /// The errors of the particles of all processes. Those at home here are compared here if they are here, group by group, and by
-    /// whoever holds them otherwise.
+    /// The errors of the particles of all processes. The process that holds a particle compares it; its home adds up the errors, group
+    /// by group.
     fn errors_of_all<T: Compared<D>>(
         &self,
         homes: &Homes,
@@ -84,7 +84,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         let room = || (Room::zero(), [[[0.0; BLOCK]; 4]; RUNS + 1]);
         let groups = tallies(count, room, |(room, here), first, rows: &mut [[Row<f64>; 4]]| {
             let places = first..count.min(first + rows.len() * BLOCK);
-            // Both have the order of the numbers, so those that are here follow each other.
+            // Both lists are in the order of the numbers, so that the places of particles held here are successive.
             let own = places.clone().filter_map(|place| match homes.holder(place) {
                 Holder::Here(p) => Some(p),
                 Holder::Other(_) => None,
@@ -135,7 +135,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         chunks.concat()
     }
 
-    /// As [`worst_particle`](Self::worst_particle) for one of several processes, of the particles `ids` here and those of all others.
+    /// As [`worst_particle`](Self::worst_particle), for the particles of all processes, of which this process holds `ids`. Collective.
     pub fn worst_of_all<T: Compared<D>>(
         &self,
         homes: &Homes,
@@ -144,10 +144,10 @@ impl<'a, const D: usize> Comparison<'a, D> {
         time: f64,
     ) -> usize {
         let (error, place) = T::worst_particle(self, observed, time);
-        // Not numbers first, then the largest, then the first one.
+        // Errors that are not numbers come first, then the largest error, then the smallest particle number.
         let rank = |error: f64| if error.is_nan() { u64::MAX } else { error.to_bits() };
         let largest = homes.ranks().largest(rank(error));
-        // A process without particles has none that is worst.
+        // A process without particles does not hold the worst particle.
         let id = ids.get(place).copied().unwrap_or(u64::MAX);
         let own = if rank(error) == largest { id } else { u64::MAX };
         !homes.ranks().largest(!own) as usize
@@ -174,8 +174,8 @@ impl<'a, const D: usize> Comparison<'a, D> {
         worst
     }
 
-    /// The magnitudes of the errors of u, v, F and P, for runs of particles from number `first` on; `times` are those of
-    /// positions and of velocities.
+    /// The magnitudes of the errors of u, v, F and P of the particles from number `first` on; `times` are the times of positions and of
+    /// velocities.
     fn magnitudes<T: Compared<D>>(
         &self,
         (particles, law): (&Particles<T, D>, &Law<T, D>),
@@ -198,9 +198,10 @@ impl<'a, const D: usize> Comparison<'a, D> {
     }
 }
 
-/// The numbers of the particles, `f64` or `f32`, in `D` dimensions. The comparison of each is compiled with this crate.
+/// The scalar type of the particles, `f64` or `f32`, in `D` dimensions. The comparison is compiled in this crate, once for each type
+/// and dimension.
 pub trait Compared<const D: usize>: Real + Stressed<D> {
-    /// The errors of all particles; `times` are those of positions and of velocities.
+    /// The errors of all particles; `times` are the times of positions and of velocities.
     fn errors(
         comparison: &Comparison<'_, D>,
         observed: (&Particles<Self, D>, &Law<Self, D>),
@@ -259,7 +260,7 @@ compared! {
     f32: 1 2 3;
 }
 
-/// Room for what is compared.
+/// Buffers of a comparison.
 struct Room<T, const D: usize> {
     exact: [StateRun<f64, D>; RUNS],
     run: Run<T, D>,
@@ -280,7 +281,7 @@ struct Run<T, const D: usize> {
     x: [Row<T>; D],
     v: [Row<T>; D],
     F: [[Row<T>; D]; D],
-    /// The stress that their law gives for `F`.
+    /// The stress of their law at `F`.
     P: [[Row<T>; D]; D],
 }
 
@@ -290,7 +291,7 @@ impl<T: Real, const D: usize> Run<T, D> {
         Self { X: vector, x: vector, v: vector, F: matrix, P: matrix }
     }
 
-    /// Takes the particles of the numbers `places`; what is left to spare repeats the last one.
+    /// Takes the particles with the numbers `places`. The last particle fills the rest of the run.
     fn pick(&mut self, particles: &Particles<T, D>, places: Range<usize>) {
         let Particles { X, x, v, F, .. } = particles;
         rows(&X[places.clone()], |n, X| (0..D).for_each(|i| self.X[i][n] = X[i]));
@@ -304,7 +305,7 @@ impl<T: Real, const D: usize> Run<T, D> {
     }
 }
 
-/// Shows `take` the items of a run with their places in it, the last one again and again to its end.
+/// Calls `take` with each item of a run and its place. The last item fills the rest of the run.
 #[inline(always)]
 fn rows<V>(items: &[V], mut take: impl FnMut(usize, &V)) {
     if let Some(items) = items.first_chunk::<BLOCK>() {
@@ -318,8 +319,7 @@ fn rows<V>(items: &[V], mut take: impl FnMut(usize, &V)) {
     }
 }
 
-/// The errors of a run as a loop over its rows. Only the width of the registers differs between processors: the bits are
-/// the same.
+/// The errors of a run as a loop over its rows. Processors differ in the width of their registers only; the bits are the same.
 struct Errors<'a, T, const D: usize> {
     run: &'a Run<T, D>,
     exact: &'a StateRun<f64, D>,
@@ -335,8 +335,7 @@ impl<T: Real, const D: usize> WithSimd for Errors<'_, T, D> {
     }
 }
 
-/// The magnitudes of the errors of u, v, F and P. As a function of its own, which tells the compiler that what is read and
-/// what is written are in different places.
+/// The magnitudes of the errors of u, v, F and P. A function of its own tells the compiler that input and output do not overlap.
 #[inline(always)]
 fn errors<T: Real, const D: usize>(
     run: &Run<T, D>,
@@ -360,7 +359,7 @@ fn errors<T: Real, const D: usize>(
         magnitudes[2][n] = distance(&run.F, &exact.F, n);
         magnitudes[3][n] = distance(&run.P, &exact.P, n);
     }
-    // Squares that have vanished or overflowed: once more, with a scale.
+    // Squares vanished or overflowed: the magnitudes are formed again, with a scale.
     for (field, magnitudes) in magnitudes.iter_mut().enumerate() {
         if magnitudes.iter().all(|magnitude| is_squarable(*magnitude)) {
             continue;
@@ -392,11 +391,11 @@ fn rescale<T: Real, const D: usize>(
     }
 }
 
-/// The place of each number below `count`, and the number of each place, where the numbers stand in as many runs as there are
-/// threads, each backwards.
+/// Maps numbers below `count` to places, and places back to numbers: the numbers are cut into `runs` runs, a run for each thread, and
+/// each run is reversed.
 ///
-/// A step goes through the particles upwards. Who then goes downwards meets first what still lies in the cache, and leaves
-/// there what the next step begins with.
+/// A step goes through the particles upwards. A loop that then goes downwards first meets the particles that are still in the cache,
+/// and leaves the particles there with which the next step begins.
 fn backwards(count: usize, runs: usize) -> impl Fn(usize) -> usize {
     let start = move |run| count * run / runs;
     move |number| {
@@ -406,16 +405,16 @@ fn backwards(count: usize, runs: usize) -> impl Fn(usize) -> usize {
     }
 }
 
-/// Results of `group` for each number below `count`, on the threads of the pool; through a reference, so that the threads'
-/// machinery is compiled once for each kind of result.
+/// Calls `group` for each number below `count`, on the threads of the pool. `group` is a reference, so that the code of the threads is
+/// compiled once for each type of result.
 pub fn each_group<R: Send>(count: usize, group: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
     (0..count).into_par_iter().map(group).collect()
 }
 
 /// The norms of `N` magnitudes over `count` particles.
 ///
-/// `magnitudes` is given some room, the number of a first particle, and the rows to write their magnitudes to, at most `RUNS`
-/// times `BLOCK` of them; what the last row has to spare does not matter. The result does not depend on the number of threads.
+/// `magnitudes` is called with a buffer, the number of the first particle, and the rows for the magnitudes, at most `RUNS` times
+/// `BLOCK` of them. The unused end of the last row is ignored. The result does not depend on the number of threads.
 pub fn over_particles<R, const N: usize>(
     count: usize,
     room: impl Fn() -> R + Sync,
@@ -424,7 +423,8 @@ pub fn over_particles<R, const N: usize>(
     joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
 }
 
-/// The norms of four magnitudes over the particles of all processes, where `groups` has the tallies of those at home here; a call of all.
+/// The norms of four magnitudes over the particles of all processes; `groups` has the tallies of the groups whose home is here.
+/// Collective.
 fn over_homes(homes: &Homes, groups: &[[Tally; 4]]) -> [PerNorm<f64>; 4] {
     let numbers: Vec<[f64; 4]> =
         groups.iter().flatten().map(|tally: &Tally| tally.numbers()).collect();
@@ -496,7 +496,7 @@ fn tallies<R, const N: usize>(
     (0..groups).map(|g| at_places[place(g)]).collect()
 }
 
-/// Magnitudes added to their tallies.
+/// Adds magnitudes to their tallies.
 struct Add<'a, const N: usize> {
     rows: &'a [[Row<f64>; N]],
     tallies: &'a mut [Tallies<BLOCK>; N],

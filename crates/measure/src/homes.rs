@@ -1,7 +1,7 @@
 //! Sums over the particles of several processes, to the bits of one.
 //!
-//! Sums go by groups of successive particle numbers. Each group has one process, its home, to which the others bring what they know of
-//! its particles. Groups mostly lie together in space, so nearly all particles are at home.
+//! Sums go by groups of successive particle numbers. Each group has a home: the process that adds it up, and to which other processes
+//! send values of its particles. Particles of a group mostly lie together in space, so that most particles are held by their home.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,35 +9,37 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use mmsmith_ranks::{Ranks, announce, exchange, total};
 
-/// Particles in the largest group of any sum; smaller groups divide it.
+/// Number of particles in the largest group of any sum; the sizes of smaller groups divide it.
 pub(crate) const GROUP: usize = 1024;
 
-/// Where the particles of this process have their homes, and which ones have it here.
+/// The homes of the particles that this process holds, and the holders of the particles whose home is here.
 pub struct Homes {
     ranks: Arc<dyn Ranks>,
-    /// Particles of all processes.
+    /// Number of particles of all processes.
     count: usize,
-    /// The numbers at home here.
+    /// The numbers of the particles whose home is here.
     here: Range<usize>,
-    /// The places of those that go to each process among this one's, and how many come from each.
+    /// For each process, the places of the particles held here whose home it is; and the number of particles held there whose home is
+    /// here.
     out: Vec<Range<usize>>,
     counts: Vec<usize>,
-    /// Number of particles of this process.
+    /// Number of particles held here.
     own: usize,
-    /// Where each particle at home here is: among this process's, or behind them, among those that come from others.
+    /// For each particle whose home is here its place: among the particles held here, or behind them, among the particles received from
+    /// other processes.
     order: Vec<u32>,
 }
 
-/// Which process holds a particle that has its home here.
+/// The process that holds a particle whose home is here.
 pub enum Holder {
-    /// This one, at this place among its particles.
+    /// This process, with the particle at this place among its particles.
     Here(usize),
-    /// Another one; what it says of the particle has this place among all that others [say](Homes::hear).
+    /// Another process. Its value for the particle has this place among all values [received](Homes::hear).
     Other(usize),
 }
 
 impl Homes {
-    /// For a process that holds the particles `ids`, ascending; a call of all.
+    /// For a process that holds the particles `ids`, in ascending order. Collective.
     pub fn new(ranks: Arc<dyn Ranks>, ids: &[u64]) -> Self {
         let count = total(&*ranks, ids.len() as u64) as usize;
         let groups = count.div_ceil(GROUP);
@@ -67,7 +69,7 @@ impl Homes {
         self.count
     }
 
-    /// The numbers of the particles at home here.
+    /// The numbers of the particles whose home is here.
     pub fn here(&self) -> Range<usize> {
         self.here.clone()
     }
@@ -77,15 +79,15 @@ impl Homes {
         &*self.ranks
     }
 
-    /// Who holds the particle of this place among those at home here.
+    /// The process that holds the particle at this place among the particles whose home is here.
     #[must_use]
     pub fn holder(&self, place: usize) -> Holder {
         let place = self.order[place] as usize;
         place.checked_sub(self.own).map_or(Holder::Here(place), Holder::Other)
     }
 
-    /// Values from other processes for the particles at home here, where `say` gives those of this process's particles that have their
-    /// home elsewhere, by their places; a call of all.
+    /// Receives values for particles whose home is here from the processes that hold them. `say` computes the values that this process
+    /// holds for other homes, from the places of the particles. Collective.
     pub fn hear<E: Pod>(&self, say: impl Fn(Range<usize>) -> Vec<E>) -> Vec<E> {
         let rank = self.ranks.rank();
         let of = |to: usize| if to == rank { Vec::new() } else { say(self.out[to].clone()) };
@@ -95,8 +97,8 @@ impl Homes {
         exchange(&*self.ranks, &out, &counts)
     }
 
-    /// Values from all processes for the particles at home here, in the order of the particles' numbers; `own` has the values of this
-    /// process's particles. A call of all.
+    /// Values of all particles whose home is here, in the order of the particles' numbers; `own` has the values of the particles held
+    /// here. Collective.
     pub fn bring<E: Pod>(&self, own: &[E]) -> Vec<E> {
         let others = self.hear(|places| own[places].to_vec());
         let of = |place| match self.holder(place) {

@@ -1,7 +1,7 @@
 //! Norms of the errors of a solver's particles against an exact solution.
 //!
-//! A run compares all its particles after every step, which is a fifth of its time. That loop is compiled here, for each precision
-//! and dimension; what a run does but once in a while is elsewhere, and is compiled with less effort.
+//! A run compares all its particles with the exact solution after every step, which is a fifth of its time. That loop is compiled here,
+//! for each precision and dimension. Code that a run needs only now and then lies in other crates, and is compiled with less effort.
 
 mod comparison;
 mod homes;

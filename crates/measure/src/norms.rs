@@ -27,12 +27,12 @@ pub enum Field {
 }
 
 impl Field {
-    /// All of them, in the order of [`PerField`].
+    /// All fields, in the order of [`PerField`].
     pub const ALL: [Self; 4] =
         [Self::Displacement, Self::Velocity, Self::DeformationGradient, Self::Stress];
 }
 
-/// Its letter.
+/// The letter of the field.
 impl fmt::Display for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
@@ -57,7 +57,7 @@ pub enum Norm {
 }
 
 impl Norm {
-    /// All of them, in the order of [`PerNorm`].
+    /// All norms, in the order of [`PerNorm`].
     pub const ALL: [Self; 3] = [Self::Linf, Self::L2, Self::L1];
 
     /// The name in captions.
@@ -143,12 +143,12 @@ impl<N> PerField<N> {
         Field::ALL.map(|field| (field, &self[field])).into_iter()
     }
 
-    /// Field by field, what `f` makes of the value.
+    /// Applies `f` to the value of each field.
     pub fn map<M>(&self, f: impl Fn(&N) -> M) -> PerField<M> {
         PerField::from_fn(|field| f(&self[field]))
     }
 
-    /// Field by field, what `f` makes of two values.
+    /// Combines two values of each field by `f`.
     pub fn combine<A, B>(a: &PerField<A>, b: &PerField<B>, f: impl Fn(&A, &B) -> N) -> Self {
         Self::from_fn(|field| f(&a[field], &b[field]))
     }
@@ -166,7 +166,7 @@ impl<V> PerNorm<V> {
         Norm::ALL.map(|norm| (norm, &self[norm])).into_iter()
     }
 
-    /// Norm by norm, what `f` makes of the value.
+    /// Applies `f` to the value of each norm.
     pub fn map<M>(&self, f: impl Fn(&V) -> M) -> PerNorm<M> {
         PerNorm::from_fn(|norm| f(&self[norm]))
     }
@@ -178,16 +178,16 @@ fn larger(a: f64, b: f64) -> f64 {
     if a >= b || a.is_nan() { a } else { b }
 }
 
-/// Between these, squares of magnitudes and their sums neither vanish nor overflow.
+/// Within this range, squares of magnitudes and their sums neither vanish nor overflow.
 const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
-/// The power of two that magnitudes are divided by before they are squared, where the largest of them is `max`: one unless
-/// their squares would vanish or overflow.
+/// The power of two by which magnitudes are divided before they are squared, where `max` is the largest magnitude: one unless squares
+/// would vanish or overflow.
 pub fn scale_of(max: f64) -> f64 {
     if max == 0.0 || !max.is_finite() || SQUARABLE.contains(&max) {
         return 1.0;
     }
-    // Its inverse is a number, too.
+    // Within these limits the inverse is finite, too.
     2.0_f64.powi(max.log2().floor().clamp(-1000.0, 1000.0) as i32)
 }
 
@@ -198,7 +198,7 @@ pub fn magnitude(components: impl Iterator<Item = f64> + Clone) -> f64 {
     scale * components.fold(0.0, |sum, c| sum + (c / scale) * (c / scale)).sqrt()
 }
 
-/// Whether squares have served well for a magnitude; for zero they may have vanished.
+/// Whether the square of a magnitude is accurate. A magnitude of zero may come from squares that vanished.
 #[inline(always)]
 pub fn is_squarable(magnitude: f64) -> bool {
     SQUARABLE.contains(&magnitude)
@@ -223,7 +223,7 @@ impl Tally {
     /// Appends the sums of the next group.
     pub fn join(&self, next: &Self) -> Self {
         if self.scale != next.scale {
-            // What has no magnitude has no scale.
+            // A sum of zeros takes the scale of the other.
             let scale = match (self.max == 0.0, next.max == 0.0) {
                 (true, _) => next.scale,
                 (_, true) => self.scale,
@@ -255,17 +255,17 @@ impl Tally {
         Self { scale, ..self }
     }
 
-    /// The power of two that these magnitudes have to be divided by before they are squared.
+    /// The power of two by which these magnitudes have to be divided before they are squared.
     pub fn scale_to_take(&self) -> f64 {
         scale_of(self.max)
     }
 
-    /// All that a tally says.
+    /// The numbers of the tally, as they are sent to another process.
     pub(crate) fn numbers(&self) -> [f64; 4] {
         [self.max, self.square, self.sum, self.scale]
     }
 
-    /// The tally that these numbers say.
+    /// The tally with these [numbers](Self::numbers).
     pub(crate) fn of_numbers([max, square, sum, scale]: [f64; 4]) -> Self {
         Self { max, square, sum, scale }
     }
@@ -281,7 +281,7 @@ impl Tally {
     }
 }
 
-/// The tallies of `N` sequences of particles side by side: every `N`-th particle belongs to the same one.
+/// The tallies of `N` interleaved sequences of particles: particle `n` belongs to sequence `n mod N`.
 #[derive(Clone, Copy, Debug)]
 pub struct Tallies<const N: usize> {
     max: [f64; N],
@@ -297,7 +297,7 @@ impl<const N: usize> Default for Tallies<N> {
 }
 
 impl<const N: usize> Tallies<N> {
-    /// Adds one magnitude to each.
+    /// Adds one magnitude to each sequence.
     #[inline(always)]
     pub fn add(&mut self, magnitudes: &[f64; N]) {
         for n in 0..N {
@@ -316,7 +316,7 @@ impl<const N: usize> Tallies<N> {
 }
 
 impl PerNorm<f64> {
-    /// Norm by norm, the larger of the two.
+    /// The larger of two values, norm by norm.
     pub fn larger(&self, other: &Self) -> Self {
         Self::from_fn(|norm| larger(self[norm], other[norm]))
     }

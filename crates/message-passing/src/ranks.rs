@@ -1,6 +1,6 @@
 //! Ranks of MPI.
 //!
-//! Bytes and nothing else go through it, in messages whose length both sides know, so that no type can be mistaken for another.
+//! Messages are plain bytes whose length both sides know, so that no type can be mistaken for another.
 
 #![allow(
     unsafe_code,
@@ -18,12 +18,12 @@ use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Equivalence};
 
 use mmsmith_ranks::Ranks;
 
-/// A message of more bytes goes in several.
+/// The most bytes of a message of MPI; longer messages are sent in several parts.
 const MOST: usize = 1 << 30;
 const TAG: i32 = 0;
 
 struct Mpi {
-    /// Whoever calls MPI holds this: it is started for one thread at a time.
+    /// Calls of MPI hold this lock: MPI is started for one thread at a time.
     inner: Mutex<Inner>,
     rank: usize,
     count: usize,
@@ -31,9 +31,9 @@ struct Mpi {
 
 struct Inner {
     world: SimpleCommunicator,
-    /// Sends that may be under way, with what they send.
+    /// Sends under way, with their bytes.
     sends: Vec<(ffi::MPI_Request, Box<[u8]>)>,
-    // Ends MPI when all else is gone.
+    // Ends MPI after all else is dropped.
     _universe: Universe,
 }
 
@@ -41,7 +41,8 @@ struct Inner {
 // (`Threading::Serialized`); the mutex around `Inner` sees to that.
 unsafe impl Send for Inner {}
 
-/// This process among those that were started together; none where MPI cannot be started for several threads, or was already.
+/// This process among the processes that were started together; `None` where MPI cannot be started for several threads, or was started
+/// already.
 #[must_use]
 pub fn start() -> Option<Arc<dyn Ranks>> {
     let (universe, threading) = mpi::initialize_with_threading(Threading::Serialized)?;
@@ -68,7 +69,7 @@ impl Mpi {
 }
 
 impl Inner {
-    /// Forgets the sends that are done, or all of them once they are.
+    /// Forgets the sends that are complete; with `wait`, all sends once they are complete.
     fn settle(&mut self, wait: bool) {
         self.sends.retain_mut(|(request, _)| {
             let mut done = 0;
@@ -88,7 +89,7 @@ impl Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        // What is under way is read from memory that would go.
+        // Sends under way read from memory that would be freed.
         self.settle(true);
     }
 }

@@ -16,15 +16,15 @@ struct InProcess {
 /// The messages of one rank.
 struct Incoming {
     receiver: Receiver<Message>,
-    /// The one that was looked at.
+    /// A message that was looked at and not taken yet.
     next: Option<Message>,
 }
 
-/// Calls `work` on as many threads as ranks, and gives what each makes, in the order of the ranks.
+/// Calls `work` on `count` threads, a thread for each rank, and returns the results in the order of the ranks.
 ///
 /// # Panics
 ///
-/// Where one of them does, and where one waits for a message of a rank that has ended, or of another length.
+/// Where `work` panics, and where a rank waits for a message of another length or of a rank that has ended.
 pub fn in_process<R: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> R + Sync) -> Vec<R> {
     let mut to: Vec<Vec<_>> = (0..count).map(|_| Vec::new()).collect();
     let mut from: Vec<Vec<_>> = (0..count).map(|_| Vec::new()).collect();
@@ -57,7 +57,7 @@ impl Ranks for InProcess {
 
     fn send(&self, to: usize, bytes: &[u8]) {
         let sender = self.to[to].lock().unwrap_or_else(PoisonError::into_inner);
-        // Who no longer listens has panicked, which its thread tells.
+        // A receiver that no longer listens has panicked, which its thread reports.
         let _ = sender.send(bytes.to_vec());
     }
 

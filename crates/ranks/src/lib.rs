@@ -1,7 +1,9 @@
 //! Messages between the processes of one run: plain bytes, of lengths that both sides know.
 //!
-//! A [`Ranks`] is one process among several. What the solver and the measurement ask of it is little: to send, to receive, and the
-//! largest of some whole numbers. Numbers with a fraction are never summed here: their sums would depend on who adds first.
+//! A [`Ranks`] is one process among several. The solver and the measurement need little of it: sending, receiving, and the largest of
+//! some whole numbers. Floating-point numbers are never summed here, since such a sum would depend on the order of the processes.
+//!
+//! A function called *collective* is called by all processes, in the same order.
 //!
 //! [`in_process()`] gives ranks that are threads of one process, for tests. The crate `mmsmith-message-passing` gives those of MPI.
 
@@ -15,31 +17,32 @@ pub use traffic::{Sent, Traffic, counted};
 
 /// One of the processes of a run.
 ///
-/// All of them make the same calls in the same order, as far as a call is one of all. Messages from one rank to another arrive in
-/// the order in which they were sent.
+/// Collective functions are called by all processes in the same order. Messages from one rank to another arrive in the order in which
+/// they were sent.
 pub trait Ranks: Send + Sync {
-    /// Which of them this is, from 0.
+    /// The number of this process, from 0.
     fn rank(&self) -> usize;
 
-    /// How many there are.
+    /// The number of processes.
     fn count(&self) -> usize;
 
     /// Sends a message, and does not wait for it to arrive.
     fn send(&self, to: usize, bytes: &[u8]);
 
-    /// Waits for the next message of another rank, which has just the length of `bytes`.
+    /// Waits for the next message of another rank, whose length must be the length of `bytes`.
     fn receive(&self, from: usize, bytes: &mut [u8]);
 
-    /// Whether a message of another rank has arrived that [`receive`](Self::receive) would not wait for.
+    /// Whether a message of another rank has arrived, so that [`receive`](Self::receive) would not wait.
     fn has_arrived(&self, from: usize) -> bool;
 
-    /// The largest of the numbers of all ranks; a call of all.
+    /// The largest number of all ranks. Collective.
     fn largest(&self, value: u64) -> u64;
 }
 
-/// Elements that each rank sent to this one, where `out` has those that this one sends to each: a call of all.
+/// Exchanges elements: `out` has the elements for each rank, and the result the elements from each rank, in the order of the ranks.
+/// Collective.
 ///
-/// Empty messages are not sent. `counts` says how many elements each rank sends here.
+/// Empty messages are not sent. `counts` has the number of elements that each rank sends here.
 pub fn exchange<E: NoUninit + AnyBitPattern>(
     ranks: &dyn Ranks,
     out: &[Vec<E>],
@@ -65,7 +68,7 @@ pub fn exchange<E: NoUninit + AnyBitPattern>(
     all
 }
 
-/// How many elements each rank will send here, where `out` says how many this one sends to each: a call of all.
+/// The number of elements that each rank will send here; `out` has the number that this rank sends to each. Collective.
 pub fn announce(ranks: &dyn Ranks, out: &[usize]) -> Vec<usize> {
     let own = ranks.rank();
     for (to, &count) in out.iter().enumerate().filter(|(to, _)| *to != own) {
@@ -82,7 +85,7 @@ pub fn announce(ranks: &dyn Ranks, out: &[usize]) -> Vec<usize> {
     (0..ranks.count()).map(receive).collect()
 }
 
-/// The elements of all ranks, one after the other, at rank 0; nothing at the others. A call of all.
+/// The elements of all ranks, one after the other, at rank 0; nothing at other ranks. Collective.
 pub fn gather<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, own: &[E]) -> Vec<E> {
     let to_first = |count: usize| {
         let mut counts = vec![0; ranks.count()];
@@ -95,7 +98,7 @@ pub fn gather<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, own: &[E]) -> Vec<
     exchange(ranks, &out, &counts)
 }
 
-/// Gives every rank the elements of one of them, as many as each has room for: a call of all.
+/// Copies the elements of the rank `from` to all ranks, which have the same number of elements. Collective.
 pub fn share<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, from: usize, elements: &mut [E]) {
     if ranks.rank() != from {
         ranks.receive(from, cast_slice_mut(elements));
@@ -106,7 +109,7 @@ pub fn share<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, from: usize, elemen
     }
 }
 
-/// The sum of the whole numbers of all ranks: a call of all.
+/// The sum of the whole numbers of all ranks. Collective.
 pub fn total(ranks: &dyn Ranks, own: u64) -> u64 {
     let mut total = [gather(ranks, &[own]).iter().sum()];
     share(ranks, 0, &mut total);

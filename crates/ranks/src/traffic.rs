@@ -23,7 +23,7 @@ impl Traffic {
     }
 }
 
-/// Messages, and the bytes in them. What all processes agree upon by [`Ranks::largest`] is none.
+/// The number of messages and of bytes in them. Calls of [`Ranks::largest`] are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
     /// Number of messages.

@@ -113,7 +113,7 @@ impl fmt::Display for Condition {
 /// A boundary condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Boundary {
-    /// Where.
+    /// The surface.
     pub surface: Surface,
     /// The condition.
     pub condition: Condition,

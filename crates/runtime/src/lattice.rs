@@ -1,16 +1,16 @@
 //! The body force at points that share coordinates.
 //!
-//! In a lattice of `n x m` points there are `n m` points and `n + m` coordinates. Where the body force is a short sum
-//! of products of functions of one coordinate and the time, as it is where each coordinate moves along itself only, these
-//! functions are evaluated once a layer, the points with one value of one coordinate, and a point takes a few products.
+//! In a lattice of `n x m` points there are `n m` points and `n + m` coordinates. A layer is the set of points with the same value of
+//! one coordinate. Where each coordinate moves along itself only, the body force is a short sum of products of functions of one
+//! coordinate and the time. These functions are then evaluated once a layer, and a point takes a few products.
 
 use crate::{BodyForceAtPoints, Real, Solution};
 use nalgebra::SVector;
 use std::collections::HashMap;
 
-/// A layer costs as much as some tens of points without it.
+/// The least number of points a layer that makes a lattice worthwhile: a layer costs as much as some tens of points without a lattice.
 pub(crate) const POINTS_A_LAYER: usize = 16;
-/// As many as short numbers tell apart.
+/// The most layers that 16-bit numbers can tell apart.
 const MOST_LAYERS: usize = 1 << 16;
 
 /// Points that share their coordinates with many others.
@@ -18,7 +18,7 @@ const MOST_LAYERS: usize = 1 << 16;
 pub struct Lattice<T, const D: usize> {
     /// For each axis the coordinates of its layers.
     coordinates: [Vec<T>; D],
-    /// The layers of each point, one an axis. Short numbers, since a solver reads them in every step.
+    /// The layers of each point, one for each axis. 16-bit numbers, since a solver reads them in every step.
     layers: Vec<[u16; D]>,
 }
 
@@ -30,13 +30,13 @@ impl<T: Real, const D: usize> Lattice<T, D> {
         Self::within(X, most).filter(|_| most > 0)
     }
 
-    /// The points `X` by their layers, where the body that they are a part of is a lattice; `None` for more than 65536 layers.
+    /// The points `X` by their layers, where they are a part of a body that is a lattice; `None` for more than 65536 layers.
     #[must_use]
     pub fn of_part(X: &[SVector<T, D>]) -> Option<Self> {
         Self::within(X, MOST_LAYERS)
     }
 
-    /// The most layers that so many points of a lattice may have.
+    /// The largest number of layers that a lattice of so many points may have.
     #[must_use]
     pub fn most_layers(points: usize) -> usize {
         (points / POINTS_A_LAYER).min(MOST_LAYERS)
@@ -68,13 +68,13 @@ impl<T: Real, const D: usize> Lattice<T, D> {
     ///
     /// # Panics
     ///
-    /// Panics for an axis that there is not.
+    /// Panics where there is no such axis.
     #[must_use]
     pub fn coordinates(&self, axis: usize) -> &[T] {
         &self.coordinates[axis]
     }
 
-    /// For each point the numbers of its layers, one an axis.
+    /// For each point the numbers of its layers, one for each axis.
     #[must_use]
     pub fn layers(&self) -> &[[u16; D]] {
         &self.layers
@@ -92,9 +92,8 @@ impl<T: Real, const D: usize> Lattice<T, D> {
     }
 }
 
-/// The body force at the points of a lattice: what `TIME` values it needs of the time, what `POINT` values of a coordinate,
-/// what `LAYER` values of a layer follow from these, and how it follows from the layers of a point. Generated solutions have
-/// it where it makes points cheap.
+/// The body force at the points of a lattice: `TIME` values of the time, `POINT` values of a coordinate, `LAYER` values of a layer that
+/// follow from both, and the body force from the layers of a point. Generated solutions have this form where it makes points cheap.
 pub trait BodyForceOnLattice<
     T: Real,
     const D: usize,
@@ -109,8 +108,8 @@ pub trait BodyForceOnLattice<
     fn lattice_coordinate(&self, axis: usize, X: &SVector<T, D>) -> [T; POINT];
     /// Values that depend on the time and on one coordinate.
     fn lattice_layer(&self, axis: usize, time: &[T; TIME], point: &[T; POINT]) -> [T; LAYER];
-    /// The body force per unit mass, from the values of one time and of a point's layers: equal to
-    /// [`Solution::body_force`] but for rounding, or not a number.
+    /// The body force per unit mass, from the values of one time and of a point's layers: equal to [`Solution::body_force`] but for
+    /// rounding, or NaN.
     fn lattice_body_force(&self, time: &[T; TIME], layers: [&[T; LAYER]; D]) -> SVector<T, D>;
 }
 
@@ -125,7 +124,7 @@ pub struct LatticePoints<
 > {
     solution: S,
     lattice: Lattice<T, D>,
-    /// For each axis what is kept of each coordinate.
+    /// For each axis the values kept of each coordinate.
     coordinates: [Vec<[T; POINT]>; D],
 }
 
@@ -134,7 +133,7 @@ impl<S, T: Real, const D: usize, const TIME: usize, const POINT: usize, const LA
 where
     S: BodyForceOnLattice<T, D, TIME, POINT, LAYER>,
 {
-    /// Computes what depends on the coordinates alone.
+    /// Computes the values that depend on the coordinates alone.
     #[must_use]
     pub fn new(solution: S, lattice: Lattice<T, D>) -> Self {
         let coordinates = std::array::from_fn(|axis| {
@@ -153,7 +152,7 @@ where
         self.coordinates.iter().map(Vec::len).sum()
     }
 
-    /// The body force of points with their numbers, at a time; `values` are those of the time and of the layers.
+    /// The body force of the points with these numbers, at one time; `values` are those of the time and of the layers.
     fn of_points<'a>(
         &self,
         values: &[T],

@@ -12,7 +12,7 @@ pub trait Real: RealField + Copy + ScalarFunctions {
     /// Whether this is a number, though it may be infinite.
     #[must_use]
     fn is_number(self) -> bool;
-    /// The value of a function that has a form for each precision, as those of [`libm`](crate::libm) do.
+    /// The value of a function with a form for each precision, such as the functions of [`libm`](crate::libm).
     #[must_use]
     fn apply(self, double: fn(f64) -> f64, single: fn(f32) -> f32) -> Self;
 }

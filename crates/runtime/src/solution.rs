@@ -50,16 +50,16 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D>;
     /// Body force `b` per unit mass, from `rho0 a = Div P + rho0 b`.
     fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D>;
-    /// The body force at many fixed points: what depends on the points alone is computed here, once, and kept; where they
-    /// [share their coordinates](crate::Lattice), what depends on one coordinate and the time is computed once for each.
+    /// The body force at many fixed points. Values that depend on the points alone are computed here, once, and kept. Where points
+    /// [share their coordinates](crate::Lattice), values of one coordinate and the time are computed once for each coordinate.
     ///
     /// Solutions that have no stages keep the positions and compute the rest at each evaluation.
     fn body_force_at(&self, X: &[SVector<T, D>]) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         let lattice = self.has_form_on_lattice().then(|| Lattice::of(X)).flatten();
         self.body_force_on(X, lattice)
     }
-    /// As [`body_force_at`](Self::body_force_at), at points whose lattice is known, or of which none is to be made use of: both ways
-    /// round in their own manner.
+    /// As [`body_force_at`](Self::body_force_at), with the lattice of the points given by the caller, or without a lattice. The two
+    /// ways round differently.
     fn body_force_on(
         &self,
         X: &[SVector<T, D>],
@@ -104,7 +104,7 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn density(&self) -> T;
     /// The speed that CFL numbers refer to, `sqrt(E/rho0)` unless the specification says otherwise.
     fn wave_speed(&self) -> T;
-    /// The time in which the motion repeats, or after which a study ends.
+    /// The time after which the motion repeats, or a study ends.
     fn period(&self) -> T;
 }
 
@@ -135,7 +135,7 @@ impl AnySolution<f64> {
     }
 }
 
-/// A point so often counts as a lattice.
+/// The number of copies of a point that count as a lattice.
 const ENOUGH_FOR_LATTICE: usize = 3 * POINTS_A_LAYER;
 
 fn each_field<const D: usize>(

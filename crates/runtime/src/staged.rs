@@ -10,28 +10,28 @@ use nalgebra::{SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 use std::array;
 
-/// The body force at many fixed points, as [`Solution::body_force_at`] prepares it.
+/// The body force at many fixed points, prepared by [`Solution::body_force_at`].
 pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     /// Writes into `b` the body force of the points `first .. first + b.len()` at time `t`.
     ///
-    /// The values are those of [`Solution::body_force`] but for rounding: what is done once a point is arranged in
-    /// another way than in a single call. Long runs are fastest where `first` is a multiple of [`BLOCK`]; any other split
-    /// gives the same values, to the last bit.
+    /// The values are those of [`Solution::body_force`] but for rounding: values that are computed once a point are arranged in another
+    /// way than in a single call. Long runs are fastest where `first` is a multiple of [`BLOCK`]; any other split gives the same
+    /// values, to the last bit.
     ///
     /// # Panics
     ///
     /// Panics where there are fewer than `first + b.len()` points.
     fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]);
 
-    /// Adds to `values` what [`evaluate_of`](Self::evaluate_of) needs of the time `t`.
+    /// Appends to `values` the values of the time `t` that [`evaluate_of`](Self::evaluate_of) needs.
     fn of_time(&self, t: T, values: &mut Vec<T>);
 
-    /// As [`evaluate`](Self::evaluate) for the points of the given numbers, in any order, at the time that
-    /// [`of_time`](Self::of_time) made `time` for; `b` is as long as `points`.
+    /// As [`evaluate`](Self::evaluate) for the points with the given numbers, in any order. [`of_time`](Self::of_time) made `time`; `b`
+    /// is as long as `points`.
     ///
     /// # Panics
     ///
-    /// Panics where a number is that of no point, or `time` was not made by this solution.
+    /// Panics where a number does not belong to a point, or another solution made `time`.
     fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]);
 
     /// The number of points.
@@ -46,16 +46,16 @@ pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
     fn bytes_per_point(&self) -> usize;
 }
 
-/// The exact state at many fixed points, to compare a simulation with, as [`Solution::state_at`] prepares it.
+/// The exact state at many fixed points, to compare a simulation with, prepared by [`Solution::state_at`].
 pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
-    /// Writes `u`, `F` and `P` at time `t`, and `v` at `velocity_time`, of the points from `BLOCK first` on. What a last run
-    /// has to spare repeats the last point.
+    /// Writes `u`, `F` and `P` at time `t`, and `v` at `velocity_time`, of the points from `BLOCK first` on. The last point fills the
+    /// rest of the last run.
     ///
     /// The values are those of the functions of [`Solution`], to the last bit.
     ///
     /// # Panics
     ///
-    /// Panics where there are fewer than `first + runs.len()` runs of [`BLOCK`] points, the last one begun.
+    /// Panics where there are fewer than `first + runs.len()` runs of [`BLOCK`] points, an incomplete run included.
     fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]);
 
     /// The memory that each point takes, in bytes.
@@ -67,7 +67,7 @@ pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
 pub struct State<T: Real, const D: usize> {
     /// Displacement, a length.
     pub u: SVector<T, D>,
-    /// Velocity, which schemes may store at a time of its own.
+    /// Velocity, which schemes may store for a time of its own.
     pub v: SVector<T, D>,
     /// Deformation gradient.
     pub F: SMatrix<T, D, D>,
@@ -133,8 +133,8 @@ impl<T: Real, const D: usize> StateRun<T, D> {
     }
 }
 
-/// The body force in three stages: what `TIME` values it needs of the time alone, what `POINT` values of the point
-/// alone, and how it follows from both. Every generated solution has them.
+/// The body force in three stages: `TIME` values that depend on the time alone, `POINT` values that depend on the point alone, and the
+/// body force from both. Every generated solution has these stages.
 ///
 /// ```
 /// use mmsmith_solutions::{BodyForceStages, Ring, RingParameters, Solution};
@@ -156,8 +156,7 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     /// The body force per unit mass, from the values of one time and of one point; equal to
     /// [`Solution::body_force`] but for rounding.
     ///
-    /// If `NEAR`, logarithms of ratios are [those near one](Real::ln_near_one): the result is the same to the last bit, or
-    /// not a number.
+    /// If `NEAR`, logarithms of ratios take [the form near one](Real::ln_near_one): the result is the same to the last bit, or NaN.
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; TIME],
@@ -165,9 +164,9 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     ) -> SVector<T, D>;
 }
 
-/// The exact state in stages, to compare a simulation with: the `TIME` values of the time alone, the `VELOCITY_TIME` values of the
-/// velocity's own time, the `POINT` values of the point alone, and how the state follows from these. Every generated solution has
-/// these stages.
+/// The exact state in stages, to compare a simulation with: `TIME` values that depend on the time alone, `VELOCITY_TIME` values that
+/// depend on the velocity's own time, `POINT` values that depend on the point alone, and the state from all of them. Every generated
+/// solution has these stages.
 pub trait StateStages<
     T: Real,
     const D: usize,
@@ -176,13 +175,13 @@ pub trait StateStages<
     const POINT: usize,
 >: Solution<T, D>
 {
-    /// Values of the time alone for displacement, deformation gradient and stress.
+    /// Values that depend on the time alone, for displacement, deformation gradient and stress.
     fn state_time(&self, t: T) -> [T; TIME];
-    /// Values of the time alone for the velocity.
+    /// Values that depend on the time alone, for the velocity.
     fn velocity_time(&self, t: T) -> [T; VELOCITY_TIME];
     /// Values that depend on the reference position alone.
     fn state_point(&self, X: &SVector<T, D>) -> [T; POINT];
-    /// The fields from the values of their times and of one point; those of [`Solution`]'s functions, to the last bit.
+    /// The fields from the values of their times and of a point, equal to the results of [`Solution`]'s functions to the last bit.
     /// `NEAR` is as in [`BodyForceStages::body_force_staged`].
     fn state_staged<const NEAR: bool>(
         &self,
@@ -192,16 +191,16 @@ pub trait StateStages<
     ) -> State<T, D>;
 }
 
-/// Points that are evaluated together. Each of the values kept for them is one run of this length, so that a run of
-/// points fills the vector registers of any processor, and is no longer than the two cache lines that are read at once:
-/// blocks come from memory in the order in which they lie there.
+/// Number of points that are evaluated together. Each value kept for them is a run of this length. A run fills the vector registers of
+/// any processor, and is no longer than the two cache lines that are read at once: blocks come from memory in the order in which they
+/// lie there.
 pub const BLOCK: usize = 16;
 
-/// Points whose body force is computed in one loop, which is long against what is done before and after it.
+/// Number of points whose body force is computed in one loop. The loop is long against the work before and after it.
 const RUN: usize = 4 * BLOCK;
 
-/// The values kept for points, in blocks: `blocks[n][m][i]` is value `m` of point `n BLOCK + i`. What a last block has to
-/// spare repeats its last point.
+/// The values kept for points, in blocks: `blocks[n][m][i]` is value `m` of point `n BLOCK + i`. The last point fills the rest of the
+/// last block.
 type Blocks<T, const POINT: usize> = Vec<[[T; BLOCK]; POINT]>;
 
 /// Results of `values` for each of the points `X`.
@@ -226,14 +225,14 @@ fn blocks<T: Real, const D: usize, const POINT: usize>(
 /// Values that the body force of a generated solution keeps of points.
 pub struct StagedPoints<S, T, const TIME: usize, const POINT: usize> {
     solution: S,
-    /// For each value an array over all points, so that a run of points may begin anywhere. The last point is repeated for
-    /// the runs that end beyond it.
+    /// For each value an array over all points, so that a run of points may begin anywhere. The last point is repeated for the runs
+    /// that end beyond it.
     values: [Vec<T>; POINT],
     len: usize,
 }
 
 impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME, POINT> {
-    /// Computes what depends on the points `X` alone.
+    /// Computes the values that depend on the points `X` alone.
     #[must_use]
     pub fn new<const D: usize>(solution: S, X: &[SVector<T, D>]) -> Self
     where
@@ -261,7 +260,7 @@ pub struct StagedStates<S, T, const TIME: usize, const VELOCITY_TIME: usize, con
 impl<S, T: Real, const TIME: usize, const VELOCITY_TIME: usize, const POINT: usize>
     StagedStates<S, T, TIME, VELOCITY_TIME, POINT>
 {
-    /// Computes what depends on the points `X` alone.
+    /// Computes the values that depend on the points `X` alone.
     #[must_use]
     pub fn new<const D: usize>(solution: S, X: &[SVector<T, D>]) -> Self
     where
@@ -281,18 +280,18 @@ fn point<T: Real, const POINT: usize>(block: &[[T; BLOCK]; POINT], i: usize) -> 
 /// Some points by their numbers.
 #[derive(Clone, Copy)]
 enum Numbers<'a> {
-    /// Successive ones from this one on.
+    /// Successive points from this number on.
     From(usize),
     Of(&'a [u32]),
 }
 
-/// Points as loops of fixed length over separate runs. There is an instance of it for each kind of vector registers, and the
-/// processor's own is chosen when the program runs; all give the same bits, since nothing is contracted or reordered.
+/// Points as loops of fixed length over separate runs. The loops are compiled for each kind of vector registers, and the processor's
+/// kind is chosen when the program runs. All give the same bits, since nothing is contracted or reordered.
 struct Runs<'a, S, T: Real, const D: usize, const TIME: usize, const POINT: usize> {
     solution: &'a S,
     time: &'a [T; TIME],
     values: &'a [Vec<T>; POINT],
-    /// How many points there are.
+    /// The number of points.
     len: usize,
     numbers: Numbers<'a>,
     b: &'a mut [SVector<T, D>],
@@ -333,7 +332,7 @@ where
     }
 }
 
-/// The first of points with successive numbers; `None` for others.
+/// The first of successive numbers; `None` for numbers that are not successive.
 #[inline(always)]
 fn successive(points: &[u32]) -> Option<usize> {
     let &first = points.first()?;
@@ -344,7 +343,7 @@ fn successive(points: &[u32]) -> Option<usize> {
     (apart == 0).then_some(first as usize)
 }
 
-/// The values of a run of points from number `first` on, which is that of a point.
+/// The values of a run of points from number `first` on, which is the number of a point.
 #[inline(always)]
 fn run<T, const POINT: usize>(values: &[Vec<T>; POINT], first: usize) -> [&[T; RUN]; POINT] {
     array::from_fn(|m| match values[m][first..].first_chunk() {
@@ -354,7 +353,7 @@ fn run<T, const POINT: usize>(values: &[Vec<T>; POINT], first: usize) -> [&[T; R
     })
 }
 
-/// The values of a run that begins with these points. Mostly some of them have successive numbers.
+/// The values of a run that begins with these points. Some of them usually have successive numbers.
 #[inline(always)]
 fn pick<T: Real, const POINT: usize>(
     values: &[Vec<T>; POINT],
@@ -400,9 +399,9 @@ fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize
     }
 }
 
-/// Whether all values are numbers: if not, a ratio was not near one, or there is no force. As a function of its own, which
-/// tells the compiler that the arrays are in different places. Generic instead of taking a closure, which is not always
-/// inlined: the loop then goes point by point.
+/// Returns whether all values are numbers. If not, a ratio was not near one, or there is no force. A function of its own tells the
+/// compiler that the arrays do not overlap. It is generic instead of taking a closure, which is not always inlined: the loop would then
+/// go point by point.
 #[inline(always)]
 fn spread<const NEAR: bool, S, T: Real, const D: usize, const TIME: usize, const POINT: usize>(
     solution: &S,
@@ -467,7 +466,7 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
     }
 }
 
-/// As [`Runs`].
+/// Blocks of points as loops of fixed length, as [`Runs`].
 struct BlocksOfStates<
     'a,
     S,
@@ -522,8 +521,7 @@ where
     }
 }
 
-/// Whether all stresses are numbers. As a function of its own, which tells the compiler that `block` and `run` are in different
-/// places.
+/// Returns whether all stresses are numbers. A function of its own tells the compiler that `block` and `run` do not overlap.
 #[inline(always)]
 fn fill<
     const NEAR: bool,
@@ -551,7 +549,7 @@ where
     numbers
 }
 
-/// The positions of points, for solutions that keep nothing else.
+/// The positions of points, for solutions that keep no other values.
 pub(crate) struct PlainPoints<'a, S: ?Sized, T, const D: usize> {
     pub(crate) solution: &'a S,
     pub(crate) X: Vec<SVector<T, D>>,

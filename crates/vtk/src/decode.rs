@@ -16,8 +16,8 @@ use crate::{Array, Error, Frame, Provenance, Values};
 /// Text that introduces an array in the file.
 const ARRAY: &str = "<DataArray";
 
-/// The arrays of every file that are not quantities over the particles: time, step, points and three for the cells. The
-/// time of the velocities may be one more, and the solution as many more as it has parameters, and one.
+/// The number of arrays in every file beside the quantities of particles: time, step, points and three arrays of the cells. The time of
+/// the velocities adds one array, the solution one array, and each of its parameters one array.
 const FIXED_ARRAYS: usize = 6;
 
 /// Reads a `.vtu` file that [`to_bytes`](crate::to_bytes) or [`Series`](crate::Series) wrote; the frame equals the
@@ -39,7 +39,7 @@ pub fn read(path: &Path) -> Result<Frame, Error> {
     Ok(frame)
 }
 
-/// The frame, or what was expected.
+/// The frame, or a message with the expected content.
 fn decode(text: &str) -> Result<Frame, String> {
     if !text.starts_with(HEADER) {
         return Err(format!("it does not begin with {HEADER}"));
@@ -79,7 +79,7 @@ fn decode(text: &str) -> Result<Frame, String> {
     };
     let arrays: Vec<Array> =
         piece.data.point.into_iter().map(array).collect::<Result<_, String>>()?;
-    // vtkio leaves out, without a word, what it cannot read.
+    // vtkio leaves out, without a message, the arrays that it cannot read.
     if arrays.len() + fixed_arrays != array_count {
         let (expected, found) = (array_count.saturating_sub(fixed_arrays), arrays.len());
         return Err(format!("{found} of {expected} arrays over the particles can be read"));
@@ -90,7 +90,7 @@ fn decode(text: &str) -> Result<Frame, String> {
 /// Makes sure that every array holds base64 for at least the eight bytes of its length, without which vtkio would
 /// panic, and returns how many arrays there are.
 fn check_array_texts(text: &str) -> Result<usize, String> {
-    // vtkio would take these for arrays too.
+    // vtkio would take such elements for arrays, too.
     if text.contains(":DataArray") {
         return Err("an array's tag has a namespace".into());
     }

@@ -9,10 +9,10 @@ use vtkio::xml::{Compressor, Data, DataArray, EncodingInfo, ScalarType, VTKFile}
 
 use crate::{Error, Frame, Provenance, Values};
 
-/// How every file begins: of the variants of the format, the one that no reader loses anything of.
+/// The beginning of every file. The variant of the format is the variant that every reader reads without loss.
 pub(crate) const HEADER: &str = r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#;
 
-/// The element that encloses the data; what belongs to the whole frame goes right behind it.
+/// The element that encloses the data; data of the whole frame come right behind it.
 const GRID: &str = "<UnstructuredGrid>";
 
 /// The tag that is followed by the frame's time.
@@ -27,16 +27,16 @@ pub(crate) const CYCLE: &str =
 pub(crate) const VELOCITY_TIME: &str =
     r#"<DataArray type="Float64" Name="VelocityTime" NumberOfTuples="1" format="binary">"#;
 
-/// The tag of a parameter of the solution begins so; its name follows.
+/// The beginning of the tag of a parameter; the parameter's name follows.
 pub(crate) const PARAMETER: &str = r#"<DataArray type="Float64" Name="parameter_"#;
 
-/// How the tag of a parameter ends.
+/// The end of the tag of a parameter.
 pub(crate) const PARAMETER_END: &str = r#"" NumberOfTuples="1" format="binary">"#;
 
-/// The tag of the solution's name begins so; how many bytes it has follows.
+/// The beginning of the tag of the solution's name; the number of its bytes follows.
 pub(crate) const SOLUTION: &str = r#"<DataArray type="UInt8" Name="solution" NumberOfTuples=""#;
 
-/// How numbers become text.
+/// The form of numbers in the text.
 pub(crate) const ENCODING: EncodingInfo = EncodingInfo {
     byte_order: ByteOrder::LittleEndian,
     header_type: ScalarType::UInt64,
@@ -81,7 +81,7 @@ fn grid(frame: &Frame) -> Vtk {
         file_path: None,
         data: DataSet::inline(UnstructuredGridPiece {
             points: IOBuffer::F64(frame.points.as_flattened().to_vec()),
-            // One vertex a particle: meshio drops the cells of the shorter form, one poly-vertex for all.
+            // Each particle is a vertex cell of its own: meshio drops the shorter form, in which a single cell has all particles.
             cells: Cells {
                 cell_verts: VertexNumbers::XML {
                     connectivity: (0..particles).collect(),
@@ -96,8 +96,8 @@ fn grid(frame: &Frame) -> Vtk {
 
 /// Removes the attributes `RangeMin` and `RangeMax`, which readers do not need.
 ///
-/// vtkio takes them over all components of an array, and the sign of a zero among them depends on the machine, so that
-/// one frame could give two files.
+/// vtkio takes them over all components of an array. The sign of a zero among them depends on the machine, so that one frame could give
+/// two files.
 fn without_ranges(xml: &str) -> Result<String, Error> {
     let mut parts = xml.split(r#" RangeMin=""#);
     let mut kept = String::with_capacity(xml.len() + 512);

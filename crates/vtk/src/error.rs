@@ -12,7 +12,7 @@ pub enum Error {
     /// The format counts particles in 32 bits.
     #[error("the frame has {particles} particles; a file holds at most {}", u32::MAX)]
     TooManyParticles {
-        /// How many there are.
+        /// The number of particles.
         particles: usize,
     },
     /// The frame's time is infinite or not a number.
@@ -33,7 +33,7 @@ pub enum Error {
         /// The name.
         name: String,
     },
-    /// The name of the solution has other characters.
+    /// The name of the solution has characters that are not allowed.
     #[error("solution name {name:?}: use letters, digits, underscores and hyphens, at least one")]
     SolutionName {
         /// The name.
@@ -53,7 +53,7 @@ pub enum Error {
         /// The name.
         name: String,
     },
-    /// An array has not exactly one entry a particle.
+    /// The number of entries of an array is not the number of particles.
     #[error("array `{array}` has {found} entries for {particles} particles")]
     Length {
         /// The array.
@@ -84,10 +84,10 @@ pub enum Error {
         /// The name.
         name: String,
     },
-    /// The frame could not be laid out as XML.
+    /// The frame could not be written as XML.
     #[error("the frame cannot be laid out as a .vtu file: {cause}")]
     Encode {
-        /// The obstacle that was met.
+        /// The message of the writer.
         cause: String,
     },
     /// The file system refused.

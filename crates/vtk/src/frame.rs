@@ -33,7 +33,7 @@ impl Values {
         self.len() == 0
     }
 
-    /// The components of all particles one after the other, and how many a particle has; none for whole numbers.
+    /// The components of all particles one after the other, and the number of components of a particle; `None` for whole numbers.
     fn floats(&self) -> Option<(&[f64], usize)> {
         match self {
             Self::Scalar(values) => Some((values, 1)),
@@ -73,7 +73,7 @@ pub struct Frame {
     /// The time to which the velocities belong, where it is known; `VelocityTime` in the file. Schemes that stagger
     /// positions and velocities hold them for different times.
     pub velocity_time: Option<f64>,
-    /// The solution that it is compared with, where there is one.
+    /// The solution with which the frame is compared, if there is one.
     pub provenance: Option<Provenance>,
     /// The particles' positions, Cartesian; at least one.
     pub points: Vec<[f64; 3]>,

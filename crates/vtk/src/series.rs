@@ -42,11 +42,11 @@ impl Series {
         Ok(series)
     }
 
-    /// The series for a process that writes [pieces](Self::write_piece) to it: another process starts the series.
+    /// The series for a process that writes [pieces](Self::write_piece) of its frames; another process starts the series.
     ///
     /// # Errors
     ///
-    /// Where the name is none, as for [`create`](Self::create).
+    /// Where the name is not valid, as for [`create`](Self::create).
     pub fn of_pieces(folder: &Path, name: &str) -> Result<Self, Error> {
         let misplaced = |c: char| c == '/' || c == '\\' || c.is_control();
         if name.is_empty() || name.starts_with('.') || name.contains(misplaced) {
@@ -56,8 +56,8 @@ impl Series {
         Ok(Self { folder: folder.to_owned(), name: name.to_owned(), pvd, listed: vec![] })
     }
 
-    /// Takes the frames that an earlier run wrote to this folder into the list, one for each time; the next frame comes after
-    /// them. They were written whole before the state that a run goes on from, by one process or by several.
+    /// Adds the frames that an earlier run wrote to this folder to the list, a frame for each time; the next frame comes after them.
+    /// Such frames were written whole before the state from which the run goes on, by one process or by several.
     pub fn take_up(&mut self, times: &[f64]) {
         let written = |n: usize| {
             let joined = self.joined(n);
@@ -75,7 +75,7 @@ impl Series {
         format!("{}-{number:06}.pvtu", self.name)
     }
 
-    /// Removes the file that an earlier run has written for the next frame in another form. One that stays is not listed.
+    /// Removes the file that an earlier run wrote for the next frame in another form. A file that stays is not listed.
     fn remove(&self, file: &str) {
         let _ = fs::remove_file(self.folder.join(file));
     }
@@ -102,7 +102,7 @@ impl Series {
         Ok(path)
     }
 
-    /// Writes the next frame's piece of one of several processes, beside which [`join`](Self::join) has to be called by one of them.
+    /// Writes a process's piece of the next frame. One of the processes then calls [`join`](Self::join).
     ///
     /// # Errors
     ///
@@ -112,8 +112,8 @@ impl Series {
         whole_file::replace(&path, &to_bytes(piece)?)
     }
 
-    /// Adds the frame that the `pieces` of some processes make to the list; returns the path of the file that joins them. `like` has
-    /// the arrays of each piece.
+    /// Adds the frame that consists of the `pieces` of some processes to the list; returns the path of the file that joins them. `like`
+    /// has the arrays of each piece.
     ///
     /// # Errors
     ///
@@ -157,7 +157,7 @@ impl Series {
     }
 }
 
-/// The file of a frame in pieces.
+/// The text of the file that joins the pieces of a frame.
 fn text_of_joined(like: &Frame, sources: impl Iterator<Item = String>) -> String {
     let array = |name: &str, number: &str, components: usize| {
         format!(

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::Error;
 
-/// Writes `bytes` to `path`. Whatever goes wrong, a file that was there before remains as it was.
+/// Writes `bytes` to `path`. Where a write fails, an earlier file stays as it was.
 ///
 /// The bytes go to a temporary file in the same folder, reach the disk, and only then take the name `path`.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -19,7 +19,7 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     })
 }
 
-/// Finds out whether [`replace`] can write `path`, without touching what is there.
+/// Tests that [`replace`] can write `path`, without touching an earlier file.
 pub(crate) fn probe(path: &Path) -> Result<(), Error> {
     let temporary = temporary(path);
     write_to_disk(&temporary, b"probe").and_then(|()| fs::remove_file(&temporary)).map_err(
@@ -37,7 +37,7 @@ fn temporary(path: &Path) -> PathBuf {
 }
 
 fn write_to_disk(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A killed run may have left one behind. Creating it anew, instead of opening what is there, follows no link.
+    // A killed run may have left this file behind. Creating it anew, instead of opening it, follows no link.
     match fs::remove_file(path) {
         Err(cause) if cause.kind() != io::ErrorKind::NotFound => return Err(cause),
         _ => {}

@@ -28,7 +28,7 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-/// Decodes everything that there is; how many numbers that was.
+/// Decodes all arrays, and returns how many numbers they have.
 fn decode(frame: &FrameFile) -> Result<usize, String> {
     let words = |error: mmsmith_vtk::foreign::ReadError| error.to_string();
     let snapshot = Snapshot::open(frame).map_err(words)?;
@@ -74,7 +74,7 @@ fn damage_is_refused_or_harmless() {
                 0 => damaged.truncate(random(bytes.len())),
                 1 => damaged[random(bytes.len())] = random(256) as u8,
                 2 => {
-                    // A digit more often makes another valid file.
+                    // A repeated digit makes another valid file.
                     let digits: Vec<_> =
                         (0..bytes.len()).filter(|at| bytes[*at].is_ascii_digit()).collect();
                     damaged[digits[random(digits.len())]] = b'0' + random(10) as u8;

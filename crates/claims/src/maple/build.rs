@@ -10,13 +10,13 @@ use thiserror::Error;
 /// double it with every line.
 const MOST_BITS: u64 = 4096;
 
-/// Why a listing has no meaning in a graph.
+/// The reason why a listing has no meaning in a graph.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{message}")]
 pub struct BuildError {
     /// The mistake, and its correction.
     pub message: String,
-    /// Where, in bytes from the start of the listing.
+    /// The place, in bytes from the start of the listing.
     pub span: Range<usize>,
 }
 

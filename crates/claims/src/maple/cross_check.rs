@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// Digits to which both sides are computed where precision has to be raised for them.
 const SETTLED_DIGITS: usize = 60;
-/// Digits beyond which two values count as the same: those that [`Oracle::settle`] makes sure of.
+/// Digits beyond which two values count as equal: the digits that [`Oracle::settle`] makes sure of.
 const MOST_DIGITS: f64 = SETTLED_DIGITS as f64;
 /// Agreement to this many digits at every point verifies a component.
 const VERIFIED_DIGITS: f64 = 40.0;
@@ -39,7 +39,7 @@ pub struct Target {
     pub derived: Expr,
 }
 
-/// Why nothing could be compared.
+/// The reason why nothing could be compared.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CrossCheckError {
     /// The listing has no meaning in the graph.
@@ -50,7 +50,7 @@ pub enum CrossCheckError {
     Missing {
         /// The entry.
         entry: String,
-        /// The names that the listing assigns, temporaries left out where there are entries with indices.
+        /// The names that the listing assigns; temporaries are left out where there are entries with indices.
         assigned: String,
     },
     /// One side has no value at a point.
@@ -60,7 +60,7 @@ pub enum CrossCheckError {
         entry: String,
         /// The point.
         place: String,
-        /// Why.
+        /// The reason.
         cause: Box<OracleError>,
     },
     /// The precision is not offered.
@@ -74,9 +74,9 @@ pub enum CrossCheckError {
 /// Results, component by component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// One for each target, in order.
+    /// An outcome for each target, in their order.
     pub components: Vec<Component>,
-    /// Entries with indices that the listing assigns and no target names.
+    /// Entries with indices that the listing assigns without a target.
     pub unchecked: Vec<String>,
 }
 
@@ -107,9 +107,9 @@ impl fmt::Display for Report {
 pub struct Component {
     /// The entry, such as `b[0]`.
     pub entry: String,
-    /// At how many points it was compared.
+    /// The number of points at which it was compared.
     pub points: usize,
-    /// Whether the two are equal.
+    /// The outcome of the comparison.
     pub verdict: Verdict,
 }
 
@@ -125,7 +125,7 @@ pub enum Verdict {
     Refuted {
         /// The digits to which they agree at the worst point; negative where they differ by more than their size.
         digits: f64,
-        /// At how many points they differ.
+        /// The number of points at which they differ.
         differing: usize,
         /// The worst point: inputs by name with their values.
         place: Vec<(String, f64)>,
@@ -255,7 +255,7 @@ fn place(graph: &Graph, values: &[(Expr, Rational)]) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// `-log10(|a - b| / max(|a|, |b|))`, no more than was computed.
+/// `-log10(|a - b| / max(|a|, |b|))`, at most the number of computed digits.
 fn digits_in_common(a: &Rational, b: &Rational) -> f64 {
     let difference = (a - b).abs();
     if difference.is_zero() {

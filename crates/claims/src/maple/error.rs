@@ -1,16 +1,16 @@
-//! Why text is not a listing, and where.
+//! Reasons why text is not a listing, and their places.
 
 use mmsmith_expr::Function;
 use std::ops::Range;
 use thiserror::Error;
 
-/// Why text is not a listing.
+/// The reason why text is not a listing.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{problem}")]
 pub struct ListingError {
     /// The mistake, and its correction.
     pub problem: Problem,
-    /// Where, in bytes from the start of the text.
+    /// The place, in bytes from the start of the text.
     pub span: Range<usize>,
 }
 
@@ -32,7 +32,7 @@ pub enum Problem {
         first: String,
         /// The second part.
         second: String,
-        /// Both.
+        /// Both parts together.
         joined: String,
     },
     /// Two values on one line with nothing between them.
@@ -47,7 +47,7 @@ pub enum Problem {
         /// The start of the next assignment.
         before: String,
     },
-    /// Something else than what the grammar asks for.
+    /// The grammar asks for another part.
     #[error("{wanted} is expected here, not {found}")]
     Expected {
         /// The part that the grammar asks for.
@@ -58,18 +58,18 @@ pub enum Problem {
     /// A temporary or an entry is used that is assigned further down, or in this very statement.
     #[error("{name} is used before it is assigned")]
     UsedBeforeAssigned {
-        /// Which.
+        /// The name of the temporary or entry.
         name: String,
     },
     /// Two assignments to one target.
     #[error("{name} is assigned twice, first on line {first_line}")]
     AssignedTwice {
-        /// Which.
+        /// The target.
         name: String,
         /// The line of the first assignment, from 1.
         first_line: usize,
     },
-    /// A function that is not known.
+    /// An unknown function.
     #[error("no function is called '{name}'; there are {}", function_names())]
     UnknownFunction {
         /// Its name.
@@ -85,7 +85,7 @@ pub enum Problem {
         /// The number given.
         given: usize,
     },
-    /// A quotient of integers, which C truncates.
+    /// A quotient of integers, which C would truncate.
     #[error("a quotient of integers, which C rounds towards zero; write {first}.0/{second}.0")]
     IntegerQuotient {
         /// The dividend.
@@ -99,10 +99,10 @@ pub enum Problem {
         /// The number.
         number: String,
     },
-    /// A number that is not one, or beyond the limits on digits and exponents.
+    /// A malformed number, or a number beyond the limits on digits and exponents.
     #[error("{message}")]
     Number {
-        /// Why.
+        /// The reason.
         message: String,
     },
     /// `^`, which is no power in C.
@@ -111,7 +111,7 @@ pub enum Problem {
     /// A character that has no meaning in a listing.
     #[error("the character '{}' has no meaning in a listing", character.escape_debug())]
     Character {
-        /// Which.
+        /// The character.
         character: char,
     },
     /// A comment without an end.

@@ -1,7 +1,7 @@
 //! Mistakes that solvers make, each with fields that have the opposite mistake.
 //!
-//! A solver that makes the mistake becomes right when it is given these fields, and its errors fall with the order of its method. So
-//! a mistake is found without a look at the code.
+//! A solver that makes the mistake becomes right when it is given these fields, and its errors fall with the order of its method. The
+//! mistake is thus found without a look at the code.
 
 mod planting;
 mod table;
@@ -21,7 +21,7 @@ pub struct Cause {
     pub name: &'static str,
     /// The mistake in a line.
     pub mistake: &'static str,
-    /// Where to look in the code.
+    /// The place to look at in the code.
     pub look: &'static str,
     /// The fields that show the mistake.
     pub counter: Counter,
@@ -34,7 +34,7 @@ pub enum Counter {
     Fields(fn(&mut Planting<'_>)),
     /// A field at another time.
     Time {
-        /// Which field.
+        /// The field.
         of: Timed,
         /// How much later, in time steps.
         steps: f64,
@@ -43,17 +43,17 @@ pub enum Counter {
     Place(Placed),
     /// Another motion where it is prescribed, after the start.
     Motion(Moved),
-    /// A field so many cells away along every axis.
+    /// A field at a point that lies some cells away along every axis.
     Cell {
-        /// How far.
+        /// The number of cells.
         cells: f64,
     },
-    /// A body force that in the first time step gives a body at rest the velocity that it should have had.
+    /// A body force that gives a body at rest, in the first time step, the velocity that it should have had at the start.
     Impulse {
-        /// The length of that push in time steps.
+        /// The duration of the push, in time steps.
         steps: f64,
     },
-    /// Nothing: the result does not depend on this field, though it should.
+    /// A field on which the result does not depend, though it should.
     Unused(Unused),
 }
 
@@ -72,7 +72,7 @@ pub enum Timed {
     BoundaryVelocity,
     /// The velocity at the start.
     InitialVelocity,
-    /// All of them: the result then belongs to another time than it says.
+    /// All fields: the result then belongs to another time than it states.
     Everything,
 }
 
@@ -189,14 +189,14 @@ impl Steps {
 }
 
 impl Cause {
-    /// The cause of that name.
+    /// The cause with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Cause> {
         CAUSES.iter().find(|cause| cause.name == name)
     }
 
-    /// The rank of what is changed first, where there are several changes: the law, its constants and the strain, then the stress, then
-    /// what the balance makes of both.
+    /// The rank of the change among several changes: first the law, its constants and the strain, then the stress, then quantities of
+    /// the momentum balance.
     fn rank(&self) -> usize {
         let rank = |starts: &[&str]| starts.iter().any(|start| self.name.starts_with(start));
         match self.counter {
@@ -208,7 +208,7 @@ impl Cause {
         }
     }
 
-    /// Whether other fields than those of the first time step stay as they are.
+    /// Whether the mistake shows in the first time step alone.
     fn shows_at_start_alone(&self) -> bool {
         matches!(
             self.counter,
@@ -234,12 +234,12 @@ impl Cause {
         causes.into_iter().try_for_each(|cause| cause.plant(spec, fields, steps))
     }
 
-    /// Changes the fields of `spec` to those with the opposite mistake. That a solver uses a field shows where the field is larger by a
-    /// hundredth.
+    /// Changes the fields of `spec` to fields with the opposite mistake. To find out whether a solver uses a field at all, the field
+    /// becomes larger by a hundredth.
     ///
     /// # Errors
     ///
-    /// [`NoEffect`] where all fields stay as they are: then nothing can be said of the mistake with this solution.
+    /// [`NoEffect`] where all fields stay as they are: this solution then cannot show the mistake.
     pub fn plant(&self, spec: &Spec, fields: &mut Fields, steps: Steps) -> Result<(), NoEffect> {
         let change = |fields: &mut Fields| match self.counter {
             Counter::Fields(change) => change(&mut Planting::new(spec, fields)),
@@ -265,7 +265,7 @@ impl Cause {
     }
 }
 
-/// Fields for a solver that act inside the body; tractions where these are all that is changed.
+/// The changed fields that a solver is given, before and after: fields inside the body, or tractions where these alone change.
 fn handed(before: &Fields, after: &Fields) -> [Vec<Expr>; 2] {
     let inside = |fields: &Fields| [&fields.u[..], &fields.v, &fields.b].concat();
     let tractions = |fields: &Fields| {

@@ -10,13 +10,13 @@ type Matrix = Vec<Vec<Expr>>;
 /// A factor: a quotient of whole numbers times a power of the density.
 pub(super) type Factor = [i64; 3];
 
-/// The fields of a solution while they are changed.
+/// The fields of a solution, to be changed.
 pub struct Planting<'a> {
     spec: &'a Spec,
     fields: &'a mut Fields,
 }
 
-/// A law in Lame's constants at one deformation, with what stresses are made of.
+/// A law with Lame's constants at one deformation, and the quantities from which stresses are made.
 pub(super) struct Deformed<'a> {
     graph: &'a mut Graph,
     pub(super) F: Matrix,
@@ -78,7 +78,7 @@ impl<'a> Planting<'a> {
         }
     }
 
-    /// `b` at so many times the time.
+    /// `b` at the time times a number.
     pub(super) fn scale_time_of_force(&mut self, numerator: i64, denominator: i64) {
         let Fields { graph, b, .. } = &mut *self.fields;
         let t = graph.symbol("t");
@@ -99,7 +99,7 @@ impl<'a> Planting<'a> {
 
     fn place_force(&mut self, place: &BTreeMap<Expr, Expr>) {
         let Fields { graph, definitions, b, .. } = &mut *self.fields;
-        // First what other symbols mean, as the radius, so that it moves with the coordinates.
+        // First the meanings of other symbols, such as the radius, so that they move with the coordinates.
         let definitions: BTreeMap<Expr, Expr> = definitions.iter().copied().collect();
         for b in b {
             let explicit = graph.replace(*b, &definitions);
@@ -119,7 +119,7 @@ impl<'a> Planting<'a> {
         swap_first_two(&mut self.fields.v);
     }
 
-    /// `b`, `P` and tractions of another stress at the same deformation.
+    /// Replaces the stress at the same deformation, and with it `b`, `P` and tractions.
     pub(super) fn stress(&mut self, of: impl Fn(&mut Deformed<'_>) -> Matrix) {
         let Fields { graph, H, F, J, P, .. } = &mut *self.fields;
         let mut deformed = Deformed { F: F.clone(), H: H.clone(), J: *J, P: P.clone(), graph };
@@ -127,14 +127,14 @@ impl<'a> Planting<'a> {
         self.take(stress);
     }
 
-    /// As [`Planting::stress`], of a law in Lame's constants; nothing where the law has none.
+    /// As [`Planting::stress`], for a stress in Lame's constants; a law without them stays.
     pub(super) fn law(&mut self, of: impl Fn(&mut Deformed<'_>, Expr, Expr) -> Matrix) {
         if let Some([lambda, mu]) = lame(self.spec) {
             self.stress(|deformed| of(deformed, lambda, mu));
         }
     }
 
-    /// As [`Planting::stress`], by the neo-Hookean law of another deformation gradient; nothing where the law is another one.
+    /// As [`Planting::stress`], for the neo-Hookean law at another deformation gradient; other laws stay.
     pub(super) fn neo_hookean_of(&mut self, other: impl Fn(&mut Deformed<'_>) -> Matrix) {
         if self.spec.material.name() == "neo-hookean" {
             self.law(|deformed, lambda, mu| {
@@ -162,13 +162,13 @@ impl<'a> Planting<'a> {
         self.derive_from(changed);
     }
 
-    /// As [`Planting::stress`], of the motion with a displacement so many times as large.
+    /// As [`Planting::stress`], for the motion whose displacement is multiplied by a number.
     pub(super) fn gradient(&mut self, numerator: i64, denominator: i64) {
         let mut changed = Spec { graph: self.fields.graph.clone(), ..self.spec.clone() };
         let number = changed.graph.number(Rational::new(numerator.into(), denominator.into()));
         let larger = |u: &Expr| changed.graph.mul(number, *u);
         changed.displacement = self.spec.displacement.iter().map(larger).collect();
-        // Slopes that were solved for are those of the displacement as it was.
+        // Slopes that were solved for belong to the displacement before the change.
         changed.solved = None;
         self.derive_from(changed);
     }
@@ -320,13 +320,13 @@ impl Deformed<'_> {
         self.graph.number(Rational::new(numerator.into(), denominator.into()))
     }
 
-    /// The entries beside the diagonal times a number.
+    /// The matrix with its entries beside the diagonal multiplied by a number.
     pub(super) fn shear_scaled(&mut self, A: &Matrix, numerator: i64, denominator: i64) -> Matrix {
         let number = self.number(numerator, denominator);
         self.filled(|graph, i, j| if i == j { A[i][j] } else { graph.mul(number, A[i][j]) })
     }
 
-    /// The determinant of `F`, whichever this is now.
+    /// The determinant of the present `F`.
     fn determinant(&mut self) -> Expr {
         let F = self.F.clone();
         let mut minor = |[i, j]: [usize; 2], [k, l]: [usize; 2]| {

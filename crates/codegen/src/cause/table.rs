@@ -6,7 +6,7 @@ use mmsmith_expr::{Expr, Graph, Rational};
 
 macro_rules! causes {
     ($($name:literal: $mistake:literal, $look:literal, $counter:expr;)+) => {
-        /// Every mistake that is looked for; first the likelier ones.
+        /// Every mistake that is looked for, the likelier mistakes first.
         pub const CAUSES: &[Cause] = &[$(Cause {
             name: $name,
             mistake: $mistake,

@@ -6,10 +6,10 @@ use mmsmith_expr::{Expr, Function, Graph, Rational};
 use mmsmith_spec::Fields;
 use std::collections::BTreeMap;
 
-/// Steps towards a reference position, each of which multiplies the error by the displacement gradient. What is written out grows with
-/// them.
+/// The number of iterations towards a reference position. Each multiplies the error by the displacement gradient; the text of the field
+/// grows with their number.
 const SOUGHT: usize = 6;
-/// How sharply "at the start" ends: so large that the function that tells it is zero or one to the last bit at every time step.
+/// The steepness of the switch at the start: so large that the switch is zero or one to the last bit at every time step.
 const SHARP: i64 = 1000;
 
 fn number(graph: &mut Graph, value: f64) -> Expr {
@@ -118,7 +118,7 @@ pub(super) fn push(fields: &mut Fields, length: f64, Steps { dt, start, .. }: St
     let at_start = earlier(graph, start);
     let duration = number(graph, length * dt);
     let rate = graph.div(at_start, duration);
-    // A staggered scheme has no velocity at t = 0, but half a step before it.
+    // The first velocity of a staggered scheme belongs to half a step before t = 0.
     let t = graph.symbol("t");
     let back = number(graph, if length < 1.0 { 0.0 } else { -dt / 2.0 });
     let before = graph.add(t, back);
@@ -130,7 +130,7 @@ pub(super) fn push(fields: &mut Fields, length: f64, Steps { dt, start, .. }: St
     }
 }
 
-/// A field at the reference position that the motion takes to the position given, by steps that are written out.
+/// A field at the reference position that the motion takes to the given position, found by iterations that are written out.
 pub(super) fn seek(fields: &mut Fields, placed: Placed) {
     let n = fields.u.len();
     let definitions: BTreeMap<Expr, Expr> = fields.definitions.iter().copied().collect();
@@ -166,7 +166,7 @@ pub(super) fn seek(fields: &mut Fields, placed: Placed) {
     }
 }
 
-/// The body force at points that lie so far along every axis.
+/// The body force at points that are shifted by a distance along every axis.
 pub(super) fn beside(fields: &mut Fields, by: f64) {
     let n = fields.u.len();
     let definitions: BTreeMap<Expr, Expr> = fields.definitions.iter().copied().collect();
@@ -194,7 +194,7 @@ pub(super) fn nudge(fields: &mut Fields, unused: Unused, start: f64) {
             let earlier = earlier(graph, start);
             graph.mul(hundredth, earlier)
         }
-        // It may be zero, which no factor changes.
+        // The field may be zero, which no factor changes.
         Unused::InitialVelocity => return shift(fields, Timed::InitialVelocity, start, start),
     };
     let factor = graph.add(Graph::ONE, share);

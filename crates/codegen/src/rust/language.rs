@@ -10,23 +10,23 @@ use quote::quote;
 use std::borrow::Cow;
 use std::cell::RefCell;
 
-/// Stands for the statements of a block, by its number, until the rest is formatted.
+/// A placeholder, with the number of a block, for the statements of the block until the rest is formatted.
 const PLACEHOLDER: &str = "let statements_of_block = ";
 
-/// Writes blocks in Rust, given how the parameters are called.
+/// Writes blocks in Rust, given the names of the parameters.
 ///
-/// Blocks are by far the largest part of a solution, and simple; formatting them as tokens would take longer than
-/// to derive them. So they are written as lines, of checked names and numbers alone.
+/// Blocks are by far the largest part of a solution, and have a simple form. Formatting them as tokens would take longer than deriving
+/// them. They are therefore written as lines, of checked names and numbers alone.
 #[derive(Clone)]
 pub(crate) struct Translator<'a> {
-    /// Where the parameters are: `parameters` itself, or `self.parameters`.
+    /// The place of the parameters: `parameters` itself, or `self.parameters`.
     parameters: &'static str,
     names: Vec<Ident>,
     /// The path to the crate `mmsmith_runtime`.
     runtime: String,
-    /// The blocks that placeholders stand for; `None` where tokens are wanted.
+    /// The blocks behind placeholders; `None` where tokens are wanted.
     blocks: Option<&'a RefCell<Vec<String>>>,
-    /// Whether a constant `NEAR` tells if logarithms of ratios may be the short ones.
+    /// Whether a constant `NEAR` says that logarithms of ratios may take their short form.
     tells_near: bool,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Translator<'a> {
         (statements, outputs.iter().map(|output| tokens(output)).collect())
     }
 
-    /// As [`statements`](Self::statements), where a constant `NEAR` tells whether logarithms of ratios may be the short ones.
+    /// As [`statements`](Self::statements), with a constant `NEAR` that says whether logarithms of ratios may take their short form.
     pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
         Translator { tells_near: true, ..self.clone() }.statements(block)
     }
@@ -143,7 +143,7 @@ impl Target for Translator<'_> {
     }
 }
 
-/// `text` with the lines of `blocks` in the places of their placeholders, as far to the right as these.
+/// `text` with each placeholder replaced by the lines of its block, with the same margin.
 ///
 /// Text from a specification is always within a comment or a literal, so that no line of it starts as a placeholder.
 pub(crate) fn fill(text: &str, blocks: &[String]) -> String {
@@ -165,12 +165,12 @@ pub(crate) fn fill(text: &str, blocks: &[String]) -> String {
     filled
 }
 
-/// Names and numbers with what joins them always are tokens.
+/// Names, numbers and the signs between them are always tokens.
 fn tokens(text: &str) -> TokenStream {
     text.parse().unwrap_or_default()
 }
 
-/// A literal for any double; negative ones with a minus sign before it.
+/// A literal for any double; negative numbers begin with a minus sign.
 pub(crate) fn float(value: f64) -> TokenStream {
     let sign = value.is_sign_negative().then(|| quote!(-));
     if value.is_infinite() {

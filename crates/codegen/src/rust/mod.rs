@@ -15,7 +15,7 @@ use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::cell::RefCell;
 
-/// The items of a solution; `runtime` is the path to the crate `mmsmith_runtime`, or to one that has all of it.
+/// The items of a solution; `runtime` is the path to the crate `mmsmith_runtime`, or to a crate that has all its items.
 ///
 /// # Errors
 ///
@@ -25,7 +25,7 @@ pub fn items(spec: &Spec, runtime: &TokenStream) -> Result<TokenStream, DeriveEr
 }
 
 impl Code<'_> {
-    /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_runtime`, or to one that has all of it.
+    /// The items of the solution in Rust; `runtime` is the path to the crate `mmsmith_runtime`, or to a crate that has all its items.
     #[must_use]
     pub fn items(&self, runtime: &TokenStream) -> TokenStream {
         self.items_with(runtime, None)
@@ -78,9 +78,9 @@ struct Generator<'a> {
     staged: &'a Staged,
     spec: &'a Spec,
     runtime: &'a TokenStream,
-    /// For functions of the solution itself.
+    /// The translator for functions of the solution itself.
     translator: Translator<'a>,
-    /// As in [`Translator`].
+    /// The blocks behind placeholders, as in [`Translator`].
     blocks: Option<&'a RefCell<Vec<String>>>,
 }
 
@@ -205,7 +205,7 @@ impl Generator<'_> {
 /// A parameter name as an identifier; names that are Rust keywords become raw identifiers. (Specifications refuse the
 /// words that cannot be raw, as `self`.)
 fn identifier(name: &str) -> Ident {
-    // Reserved since edition 2024, which the parser does not know.
+    // `gen` is reserved since edition 2024, which the parser does not know.
     if name == "gen" || syn::parse_str::<Ident>(name).is_err() {
         Ident::new_raw(name, Span::call_site())
     } else {

@@ -6,7 +6,7 @@ use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
 impl Generator<'_> {
-    /// The functions of the trait `BodyForceStages`, and how many values there are of the time and of the point.
+    /// The functions of the trait `BodyForceStages`, and the numbers of values of the time and of the point.
     pub(super) fn body_force_stages(&self) -> (TokenStream, Literal, Literal) {
         let vector = self.vector();
         let stages = &self.staged.body_force;
@@ -30,8 +30,8 @@ impl Generator<'_> {
         (items, time, point)
     }
 
-    /// Where the body force has a form for lattices: the statement that takes it for points that are one, and the
-    /// implementation of the trait `BodyForceOnLattice`.
+    /// The statement that uses a body force's form for lattices at points that form a lattice, and the implementation of the trait
+    /// `BodyForceOnLattice`; empty for other body forces.
     pub(super) fn body_force_on_lattice(
         &self,
         solution: &Ident,
@@ -47,7 +47,7 @@ impl Generator<'_> {
         let of_time = lattice.layers().first()?;
         let (time_statements, time_values) =
             self.translator.statements(&self.staged.time_stage(of_time));
-        // One array type for all axes: what one has to spare is zero.
+        // All axes have an array of the same type; the elements that an axis does not use are zero.
         let of_axes = |count: usize, blocks: Vec<Block<'_>>| {
             let arms = blocks.iter().enumerate().map(|(axis, block)| {
                 let axis = Literal::usize_unsuffixed(axis);
@@ -110,8 +110,7 @@ impl Generator<'_> {
         Some((choice, items))
     }
 
-    /// The functions of the trait `StateStages`, and how many values there are of the time, of the time of the velocity,
-    /// and of the point.
+    /// The functions of the trait `StateStages`, and the numbers of values of the time, of the time of the velocity, and of the point.
     pub(super) fn state_stages(&self) -> (TokenStream, Literal, Literal, Literal) {
         let runtime = self.runtime;
         let n = Literal::usize_unsuffixed(self.spec.dimension);
@@ -138,7 +137,7 @@ impl Generator<'_> {
                 velocity_time: &[T; #velocity_time],
                 point: &[T; #point],
             ) -> #runtime::State<T, #n> {
-                // In a block of its own: its values belong to another time.
+                // In a block of its own, since its values belong to another time.
                 let v = {
                     let time = velocity_time;
                     #v_statements
@@ -151,7 +150,7 @@ impl Generator<'_> {
         (items, time, velocity_time, point)
     }
 
-    /// A function for what `stages` keep of the time, and how many values these are.
+    /// A function for the values that `stages` keep of the time, and the number of these values.
     fn time_stage(&self, name: &str, stages: &Stages) -> (TokenStream, Literal) {
         let (name, count) =
             (format_ident!("{name}"), Literal::usize_unsuffixed(stages.time_count()));
@@ -166,7 +165,7 @@ impl Generator<'_> {
         (function, count)
     }
 
-    /// A function for what `stages` keep of a point, and how many values these are.
+    /// A function for the values that `stages` keep of a point, and the number of these values.
     fn point_stage(&self, name: &str, stages: &Stages) -> (TokenStream, Literal) {
         let (name, count) =
             (format_ident!("{name}"), Literal::usize_unsuffixed(stages.point_count()));

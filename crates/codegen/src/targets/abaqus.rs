@@ -43,6 +43,6 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         .replace("CORNER_HIGH", high)
         .replace("INSIDE", inside)
         .replace("    TRACTIONS\n", &tractions);
-    // The first line tells Intel's compiler that lines are free.
+    // The first line tells Intel's compiler that the source has free form.
     Ok(with_head(code, REMARKS, "!DIR$ FREEFORM\n") + &module(code) + &routines)
 }

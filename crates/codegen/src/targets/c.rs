@@ -115,7 +115,7 @@ impl Code<'_> {
     }
 }
 
-/// A function that is the same in every header that has it.
+/// A function of `runtime.txt`, the same in every header that has it.
 fn routine(routine: &Routine) -> String {
     let guard = format!("MMSMITH_{}", routine.name.to_ascii_uppercase());
     let arguments: Vec<String> =
@@ -149,7 +149,7 @@ fn entries(array: &str, count: usize) -> Vec<String> {
     (0..count).map(|index| format!("{array}[{index}] = ")).collect()
 }
 
-/// The declaration of a value.
+/// The declaration of an argument.
 fn argument(name: &str, shape: Shape, count: usize) -> String {
     match shape {
         Shape::Scalar => format!("double {name}"),
@@ -157,21 +157,21 @@ fn argument(name: &str, shape: Shape, count: usize) -> String {
     }
 }
 
-/// Puts values where they belong; an array without any has a zero.
+/// Assigns values to their places; an array without values has a zero.
 fn results_in(values: &[String], places: Vec<String>) -> String {
     let values = values.iter().map(String::as_str).chain(std::iter::repeat("0.0"));
     places.iter().zip(values).map(|(place, value)| format!("    {place}{value};\n")).collect()
 }
 
-/// C, given what the parameters are called.
+/// C, with the names of the parameters as members of their structure.
 struct C {
     members: Vec<String>,
 }
 
 impl C {
-    /// The lines of a function with the arguments `given`, whose values go to `places`.
+    /// The lines of a function with the arguments `given` that writes its values to `places`.
     fn body(&self, given: &[&str], block: &Block<'_>, places: Vec<String>) -> String {
-        // So that compilers do not warn.
+        // Arguments that are not read are named, so that compilers do not warn.
         let unread = given.iter().filter(|given| !block.reads(|o| origin(o).contains(given)));
         let mut text: String = unread.map(|name| format!("    (void){name};\n")).collect();
         let Written { lines, outputs } = self.block(block, "    ", "s->par.");
@@ -179,10 +179,10 @@ impl C {
         text + &results_in(&outputs, places)
     }
 
-    /// A function of the solution, and of a position and a time where its values depend on them.
+    /// A function of the solution; it takes a position and a time where its values depend on them.
     fn item(&self, code: &Code<'_>, item: &Item, prefix: &str) -> String {
         let (name, d, count) = (&item.name, code.spec.dimension, item.outputs().len());
-        // Results go to an argument that is called as the quantity.
+        // The argument for results has the name of the quantity.
         let result = name.rsplit('_').next().unwrap_or(name);
         let joint = if result == name { ", " } else { ",\n    " };
         let (given, read) = match item.given {
@@ -205,7 +205,7 @@ impl C {
     }
 }
 
-/// The arguments in which an operand is found.
+/// The arguments of a function that contain an operand.
 fn origin(operand: Operand<'_>) -> &'static [&'static str] {
     match operand {
         Operand::Coordinate(_) => &["X"],

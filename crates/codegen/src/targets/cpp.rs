@@ -133,7 +133,7 @@ std::array<std::array<T, d>, d> solved(std::array<std::array<T, d>, d> A, std::a
 #endif
 "#;
 
-/// C++, given what the parameters are called.
+/// C++, with the names of the parameters.
 struct Cpp {
     members: Vec<String>,
 }
@@ -199,7 +199,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     text += &format!(
         "#ifndef {guard}\n#define {guard} 1\n{SUPPORT}\nnamespace mms {{\nnamespace {space} {{\n\n"
     );
-    // Beside those that argument-dependent look-up finds for types of a host.
+    // Beside the functions that argument-dependent look-up finds for types of a host.
     let library = [
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "erf", "exp",
         "expm1", "log", "log1p", "pow", "sin", "sinh", "sqrt", "tan", "tanh",

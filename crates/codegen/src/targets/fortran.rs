@@ -17,7 +17,7 @@ only: ring_b => b. Matrices have rows first: P(i, J).
 Results are those of the C header bit for bit where the compiler keeps every rounding (gfortran: -ffp-contract=off where the processor fuses \
 products and sums, and neither -ffast-math nor -Ofast).";
 
-/// Fortran, given what the components of the type of the parameters are called.
+/// Fortran, with the names of the parameters as components of their type.
 struct Fortran {
     members: Vec<String>,
 }
@@ -72,7 +72,7 @@ impl WithRuntime for Fortran {
     }
 }
 
-/// Names of components: small and capital letters are the same, and a name starts with a letter.
+/// Names of components. Fortran does not distinguish small and capital letters, and a name starts with a letter.
 fn members(parameters: &[Parameter]) -> Vec<String> {
     let mut taken: Vec<String> = Vec::new();
     for parameter in parameters {
@@ -100,7 +100,7 @@ fn string(text: &str) -> String {
 }
 
 const REFUSAL: Refusal = Refusal {
-    // Bounds hold for infinite numbers, and none for what is no number.
+    // A bound that holds for finite numbers, and neither for infinite numbers nor for NaN.
     finite: "abs(#) <= huge(1.0_dp)",
     and: ".and.",
     side: "#",
@@ -122,7 +122,8 @@ pub(super) fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
     start.to_owned() + &commented(&code.head_for_host(remarks), "!", 110)
 }
 
-/// User subroutines of a host around the module: `template` with the solution of the defaults that they share, and the names.
+/// User subroutines of a host around the module: `template` with the solution of the default parameters, which they share, and with
+/// names.
 pub(super) fn user_subroutines(code: &Code<'_>, template: &str) -> String {
     template
         .replace("  PREPARED\n", include_str!("prepared.f90"))

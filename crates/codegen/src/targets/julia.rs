@@ -37,7 +37,7 @@ impl Target for Julia {
 
     fn function(&self, function: Called) -> Cow<'static, str> {
         match function {
-            // Numbers that are not positive have no logarithm here, where other languages give what is no number.
+            // Julia's logarithm throws for negative numbers, where other languages return NaN.
             Called::Support("far_logarithm") | Called::Library("log") => "mmsmith_log(#)".into(),
             Called::Library("pow") => "#^#".into(),
             Called::Library("atan2") => "atan(#, #)".into(),
@@ -70,7 +70,7 @@ impl WithRuntime for Julia {
             Primitive::Equal => "(# == #)",
             Primitive::Abs => "abs(#)",
             Primitive::Nearest => "round(#)",
-            // Nothing calls them: the logarithm is Julia's own.
+            // Never called: the logarithm is Julia's own.
             Primitive::Exponent | Primitive::Scaled => "",
         }
     }

@@ -38,7 +38,7 @@ def _vector(x, t, entries):
 def _matrix(x, t, rows):
     return np.stack([_vector(x, t, row) for row in rows], axis=-2)
 ",
-    // Both sides of a choice are computed.
+    // NumPy computes both values of a choice.
     decorator: "@np.errstate(all=\"ignore\")\n",
     demands: "",
     cauchy: "        return np.einsum(\"...ik,...jk->...ij\", P, F) / J[..., None, None]\n",

@@ -8,7 +8,7 @@ use crate::text::{digits, one_line, push_index};
 use mmsmith_stage::{Operand, Shape, Stage};
 use std::borrow::Cow;
 
-/// Python with a library.
+/// Python with an array library.
 pub(crate) struct Python {
     /// Calls of functions, with `#` for each argument.
     pub(crate) function: fn(Called) -> Cow<'static, str>,
@@ -66,7 +66,7 @@ impl WithRuntime for Python {
     }
 }
 
-/// A call of a function of the file's own.
+/// A call of a function that the file defines.
 pub(crate) fn own_call(function: Called, name: &str) -> Cow<'static, str> {
     format!("_{name}({})", if function.takes_two() { "#, #" } else { "#" }).into()
 }
@@ -153,7 +153,7 @@ impl Python {
     }
 
     fn item(&self, code: &Code<'_>, item: &Item) -> String {
-        // A word of Python.
+        // `lambda` is a word of Python.
         let name = if item.name == "lambda" { "lambda_" } else { &item.name };
         let given = if item.given == Given::Nothing { "self" } else { "self, X, t" };
         let mut text = format!("\n    def {name}({given}):\n        # {}\n", item.about);

@@ -19,7 +19,7 @@ pub(crate) struct Strings {
     pub(crate) host: &'static str,
     /// The host's names of the coordinates.
     pub(crate) coordinates: [&'static str; 3],
-    /// Functions of `math.h` that it has, with its names for them.
+    /// Functions of `math.h` that the host has, with the host's names.
     pub(crate) functions: &'static [(&'static str, &'static str)],
     /// Whether an expression can name values before it: `t5 := x*y; ...`.
     pub(crate) names_values: bool,
@@ -30,7 +30,7 @@ pub(crate) struct Field {
     pub(crate) name: String,
     /// The field in words.
     pub(crate) about: String,
-    /// Row by row.
+    /// The entries, row by row.
     pub(crate) entries: Vec<Entry>,
 }
 
@@ -41,10 +41,10 @@ pub(crate) struct Entry {
     pub(crate) text: String,
 }
 
-/// Value in an expression.
+/// The value of an operation in an expression.
 #[derive(Clone)]
 enum Value {
-    /// Nothing but zero, with which products and sums are shorter.
+    /// Exactly zero, which shortens products and sums.
     Zero,
     Text(String),
 }
@@ -63,7 +63,7 @@ impl Value {
 }
 
 impl Strings {
-    /// The fields, what is formed from them, and the tractions, with a word about each.
+    /// The fields, further quantities formed from them, and the tractions, each with a description.
     pub(crate) fn fields(&self, code: &Code<'_>) -> Result<Vec<Field>, Unwritable> {
         let mut all = Vec::new();
         let density = number(self.constant(code, "density"));
@@ -153,7 +153,7 @@ impl Strings {
         values.and_then(|values| values.first().copied()).unwrap_or(f64::NAN)
     }
 
-    /// An expression of some outputs, `join` of what each of them is.
+    /// An expression of some outputs: `join` receives the expression of each.
     fn joined(
         &self,
         code: &Code<'_>,
@@ -177,7 +177,7 @@ impl Strings {
             let operands: Vec<Value> =
                 operation.operands().map(|slot| value(&known, block.operand(slot))).collect();
             let result = match (operation, operands.as_slice()) {
-                // What rounding takes is less than what these expressions lose.
+                // The rounding error of a sum or a product is smaller than the loss of these expressions.
                 (Operation::SumError(..) | Operation::ProductError(..), _)
                 | (Operation::Mul(..), [Value::Zero, _] | [_, Value::Zero]) => Value::Zero,
                 (Operation::Add(..) | Operation::Sub(..), [value, Value::Zero])

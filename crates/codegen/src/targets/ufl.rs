@@ -52,7 +52,7 @@ fn function(called: Called) -> Cow<'static, str> {
         Called::Support(name) => return own_call(called, name),
         Called::Library("pow") => return "(#)**#".into(),
         Called::Library("log1p") => return "_log_1p(#)".into(),
-        // Functions that UFL lacks, by those of a half so that small arguments keep their digits.
+        // UFL lacks these functions. They are formed by functions of half the argument, so that small arguments keep their digits.
         Called::Library("expm1") => {
             return "(lambda x: 2.0 * ufl.sinh(x / 2.0) * ufl.exp(x / 2.0))(#)".into();
         }
@@ -79,7 +79,7 @@ fn primitive(primitive: Primitive) -> &'static str {
         Primitive::AtMost => "ufl.le(#, #)",
         Primitive::Equal => "ufl.eq(#, #)",
         Primitive::Abs => "abs(#)",
-        // Nothing calls them: the functions that would are UFL's own.
+        // Never called: UFL has the functions that would call these primitives.
         Primitive::Nearest | Primitive::Exponent | Primitive::Scaled => "",
     }
 }

@@ -10,7 +10,7 @@ pub(super) const POINTS: &str = "Points";
 /// The name of the array that holds reference positions given by `X`, `Y`, `Z`.
 pub(super) const REFERENCE: &str = "X";
 
-/// One array as it is offered: its components, each from an array of the file, or zero.
+/// An array as it is offered: each component comes from an array of the file, or is zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Joined {
     pub(super) name: String,
@@ -24,14 +24,14 @@ pub(super) struct Source {
     pub(super) component: usize,
 }
 
-/// Scalars whose names promise a vector or a tensor of which components are missing.
+/// Scalars whose names promise a vector or a tensor that lacks components.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Incomplete {
     pub(super) name: String,
     pub(super) members: Vec<String>,
 }
 
-/// Where a component stands.
+/// The place of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Component {
     Index(usize),
@@ -39,17 +39,17 @@ enum Component {
     Tensor(usize, usize),
 }
 
-/// Beginnings of names behind which a component may stand without a sign between: `u1`, `ux`, `dispx`.
+/// Names of vectors that a component may follow without a separator: `u1`, `ux`, `dispx`.
 const VECTORS: [&str; 9] = ["u", "v", "U", "V", "disp", "displacement", "vel", "velocity", "coord"];
-/// Beginnings of names of tensors, likewise: `F11`, `S12`, `sigmaxx`.
+/// Names of tensors that a component may follow without a separator: `F11`, `S12`, `sigmaxx`.
 const TENSORS: [&str; 10] = ["F", "P", "S", "s", "H", "sigma", "tau", "stress", "cauchy", "pk1"];
 /// Names of vectors whose components are coordinates of the points.
 const POSITIONS: [&str; 7] =
     ["coord", "coords", "coordinate", "position", "pos", "point", "points"];
-/// Normal stresses under these names have their shear stresses under those of [`SHEARS`], as engineers write them.
+/// Names of normal stresses whose shear stresses have the names in [`SHEARS`], as engineers write them.
 const STRESSES: [&str; 4] = ["stress", "sigma", "s", "S"];
 const SHEARS: [&str; 3] = ["tau", "shear", "shear_stress"];
-/// Names that are incomplete only by mistake.
+/// Names whose missing components are a mistake for certain.
 const CERTAIN: [&str; 6] = [POINTS, REFERENCE, "u", "v", "F", "P"];
 
 fn axis(letter: u8) -> Option<usize> {
@@ -81,7 +81,7 @@ fn split(name: &str) -> Option<(&str, Component)> {
         }
         _ => (),
     }
-    // As ParaView's table writer and many scripts name components.
+    // ParaView's table writer and many scripts name components so.
     if let Some((base, index)) = name.rsplit_once(':') {
         let index = index.parse().ok().map(Component::Index);
         return index.or_else(|| component(&name[base.len() + 1..])).map(|c| (placed(base), c));
@@ -128,7 +128,7 @@ fn capital(name: &str) -> Option<(&str, Component)> {
     Some((placed(base), component))
 }
 
-/// The name of the array, which is that of the points where it says so.
+/// The name of the array; a name for positions is that of the points.
 fn placed(base: &str) -> &str {
     match POSITIONS.iter().any(|name| name.eq_ignore_ascii_case(base)) {
         true => POINTS,
@@ -136,7 +136,7 @@ fn placed(base: &str) -> &str {
     }
 }
 
-/// The components in their order, where they make a vector or a tensor.
+/// The components in their order, if they form a vector or a tensor.
 fn whole(members: &[(Component, usize)]) -> Option<Vec<Option<usize>>> {
     let Component::Tensor(..) = members[0].0 else { return whole_vector(members) };
     let mut entries = BTreeMap::new();
@@ -153,7 +153,7 @@ fn whole(members: &[(Component, usize)]) -> Option<Vec<Option<usize>>> {
     if full(size) {
         return Some((0..size * size).map(|k| at(k / size, k % size)).collect());
     }
-    // Plane strain: the third direction by itself.
+    // The third direction of plane strain stands apart.
     if size == 3 && in_plane && count == 5 && at(2, 2).is_some() {
         return Some((0..9).map(|k| at(k / 3, k % 3)).collect());
     }
@@ -200,7 +200,7 @@ fn whole_vector(members: &[(Component, usize)]) -> Option<Vec<Option<usize>>> {
     counts.then(|| members.iter().map(|(_, index)| Some(*index)).collect())
 }
 
-/// Shear stresses beside normal ones under another name are taken to them.
+/// Joins shear stresses with normal stresses that have another name.
 fn join_shears(members: &mut BTreeMap<&str, Vec<(Component, usize)>>) {
     let diagonal = |members: &[(Component, usize)], is: bool| {
         members.iter().all(|(c, _)| matches!(c, Component::Tensor(i, j) if (i == j) == is))
@@ -235,7 +235,7 @@ fn join_uvw(names: &[&str], members: &mut BTreeMap<&str, Vec<(Component, usize)>
     members.insert("u", vector.collect());
 }
 
-/// The arrays that arrays of these names and numbers of components make, in their order, and what is incomplete.
+/// The arrays formed by arrays with these names and numbers of components, in their order, and the incomplete arrays.
 pub(super) fn join(arrays: &[(&str, usize)]) -> (Vec<Joined>, Vec<Incomplete>) {
     let mut order: Vec<&str> = vec![];
     let mut members: BTreeMap<&str, Vec<(Component, usize)>> = BTreeMap::new();
@@ -274,7 +274,7 @@ pub(super) fn join(arrays: &[(&str, usize)]) -> (Vec<Joined>, Vec<Incomplete>) {
             let members = indices.iter().map(|index| names[*index].to_owned()).collect();
             incomplete.push(Incomplete { name: base.to_owned(), members });
         }
-        // Names that end like components but are none.
+        // Names that end like components but form no array.
         joined.extend(indices.into_iter().map(|index| alone(arrays, index)));
     }
     (joined, incomplete)

@@ -11,7 +11,7 @@ pub(super) struct Contents {
     pub(super) appended: Option<Appended>,
     /// Numbers that belong to the file as a whole, such as its time.
     pub(super) fields: Vec<Entry>,
-    /// Parts of the cloud, to be put one behind the other.
+    /// Parts of the cloud of points, in their order.
     pub(super) pieces: Vec<Piece>,
 }
 
@@ -41,18 +41,18 @@ pub(super) struct Cells {
     pub(super) kinds: Kinds,
 }
 
-/// How a file lists the nodes of its cells.
+/// The form in which a file lists the nodes of its cells.
 #[derive(Clone, Debug)]
 pub(super) enum Nodes {
-    /// Before the nodes of each cell stands their number.
+    /// The number of its nodes stands before the nodes of each cell.
     Counted(Entry),
-    /// The place behind each cell's last node.
+    /// The end of each cell's nodes.
     Ends { ends: Entry, nodes: Entry },
-    /// The place of each cell's first node, and the number of all.
+    /// The start of each cell's nodes, and the number of all nodes.
     Offsets { offsets: Entry, nodes: Entry },
 }
 
-/// Where the kinds of cells stand, as VTK numbers them.
+/// The place of the kinds of cells, in VTK's numbering.
 #[derive(Clone, Debug)]
 pub(super) enum Kinds {
     /// In an array.
@@ -68,7 +68,7 @@ pub(super) enum Kinds {
 #[derive(Debug)]
 pub(super) struct Appended {
     pub(super) is_base64: bool,
-    /// Where offsets count from.
+    /// The place from which offsets count.
     pub(super) start: usize,
     pub(super) end: usize,
 }
@@ -79,21 +79,21 @@ pub(super) struct Entry {
     pub(super) name: String,
     pub(super) kind: Kind,
     pub(super) components: usize,
-    /// How many tuples of `components` numbers it must have.
+    /// The number of tuples of `components` numbers that the array must have.
     pub(super) tuples: usize,
     pub(super) place: Place,
 }
 
-/// Where and how the numbers of an array stand.
+/// The place and form of the numbers of an array.
 #[derive(Clone, Debug)]
 pub(super) enum Place {
     /// Numbers between blanks.
     Ascii(Range<usize>),
     /// Base64 of header and data.
     Base64(Range<usize>),
-    /// Nothing but the numbers.
+    /// The numbers alone, without a header.
     Plain(Range<usize>),
-    /// From this offset of the appended data.
+    /// This offset of the appended data.
     Appended(usize),
 }
 

@@ -5,7 +5,7 @@ use super::table::{Filled, Rows, Table};
 /// The beginning of every frame.
 pub(super) const BEGINNING: &[u8] = b"ITEM: TIMESTEP";
 
-/// Columns of words.
+/// Names of columns that hold words.
 const WORDS: [&str; 1] = ["element"];
 
 /// Reads all frames of a dump. Its `TIMESTEP` is a number of steps, no time; a time is told by `ITEM: TIME` alone.
@@ -61,7 +61,7 @@ fn atoms<'a>(
     lines: &mut impl Iterator<Item = (u64, &'a str)>,
     count: usize,
 ) -> Result<(), String> {
-    // Words tell nothing that is compared.
+    // Words are not compared.
     let is_word: Vec<bool> =
         filled.names().iter().map(|name| WORDS.contains(&name.as_str())).collect();
     for found in 0..count {

@@ -10,7 +10,7 @@ use super::{ReadError, dump, extension, read, xml};
 
 /// Endings of text dumps of LAMMPS and Karamelo.
 const DUMPS: [&str; 4] = ["lammps", "lammpstrj", "lammpsdump", "dump"];
-/// Endings of files that list others of one time.
+/// Endings of files that list other files of the same time.
 pub(super) const PARTED: [&str; 4] = ["pvtu", "pvtp", "vtm", "vtmb"];
 /// Endings of VTK files with points.
 const POINTED: [&str; 3] = ["vtu", "vtp", "vtk"];
@@ -26,7 +26,7 @@ pub struct FrameFile {
     pub(super) location: Location,
 }
 
-/// Where the arrays live that are offered.
+/// The items, points or cells, whose arrays are offered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Location {
     Points,
@@ -38,9 +38,9 @@ pub(super) enum Location {
 pub(super) enum Source {
     /// A file.
     File,
-    /// Parts of the points, or of the arrays where the points are the same.
+    /// Files with parts of the points, or with further arrays over the same points.
     Parts(Vec<PathBuf>),
-    /// Arrays over the same points, a file each.
+    /// Files with an array each, over the same points.
     Attributes(Vec<PathBuf>),
     /// Rows of a table, by the number of the frame.
     Rows(Arc<Table>, usize),
@@ -51,7 +51,8 @@ impl FrameFile {
         Self { path, time: None, source: Source::File, location: Location::Points }
     }
 
-    /// The frame with its cells for particles: at their centres, with the arrays over cells. A table has no cells and stays.
+    /// The frame with its cells in place of particles: at their centres, with the arrays over cells. A table has no cells and stays
+    /// unchanged.
     #[must_use]
     pub fn at_cell_centres(self) -> Self {
         Self { location: Location::CellCentres, ..self }
@@ -71,8 +72,8 @@ fn is_frame(path: &Path) -> bool {
     is_vtk(path) || table::is_csv(path) || is_dump(path)
 }
 
-/// The frames of the files, lists and folders of a recording, in order. Files that differ in the words of their names alone, and have
-/// the same number, are the arrays of one frame.
+/// The frames of the files, lists and folders of a recording, in order. Files with the same number, whose names differ in words only,
+/// are the arrays of one frame.
 ///
 /// # Errors
 ///
@@ -125,7 +126,7 @@ fn folder(path: &Path) -> Result<Vec<FrameFile>, ReadError> {
     }
     let frames: Vec<_> = files.iter().filter(|file| is_frame(file)).collect();
     if frames.is_empty() {
-        // XDMF has its numbers in an HDF5 file beside it.
+        // XDMF keeps its numbers in an HDF5 file beside it.
         let is_convertible = |file: &PathBuf| !super::converted(file).is_empty();
         let foreign =
             files.into_iter().filter(is_convertible).min_by_key(|file| extension(file) == "h5");
@@ -162,7 +163,7 @@ fn times(table: &Table) -> Option<Vec<f64>> {
     (table.names().len() > 1 && table.names().iter().all(is_clock)).then(|| times.to_vec())
 }
 
-/// The frames with the times beside them, where these are as many.
+/// The frames with the times of a file beside them, if there are as many times as frames.
 fn timed(mut frames: Vec<FrameFile>, times: &[f64]) -> Vec<FrameFile> {
     if frames.len() == times.len() && frames.iter().all(|frame| frame.time.is_none()) {
         for (frame, time) in frames.iter_mut().zip(times) {
@@ -172,7 +173,7 @@ fn timed(mut frames: Vec<FrameFile>, times: &[f64]) -> Vec<FrameFile> {
     frames
 }
 
-/// The numbers of a column of a table: of the one called `time` or `t`, or of the only one.
+/// The numbers of a column of a table: the column called `time` or `t`, or the only column.
 ///
 /// # Errors
 ///
@@ -275,8 +276,8 @@ fn numbered(path: &Path) -> Option<(String, String)> {
     (words.len() < stem.len()).then(|| (words.to_owned(), stem[words.len()..].to_owned()))
 }
 
-/// Files of one folder that have the same number and other words, `displacements03.vtp` and `stresses03.vtp`, are one frame; nothing is
-/// joined unless all numbers have files of the same words.
+/// Files of one folder with the same number and different words, `displacements03.vtp` and `stresses03.vtp`, are one frame. Nothing is
+/// joined unless every number has files with the same words.
 fn by_number(frames: Vec<FrameFile>) -> Vec<FrameFile> {
     let mut groups: BTreeMap<String, Vec<&FrameFile>> = BTreeMap::new();
     let mut words: BTreeSet<String> = BTreeSet::new();

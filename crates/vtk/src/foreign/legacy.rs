@@ -24,7 +24,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
     let mut arrays = vec![];
     let mut cells = vec![];
     let mut cell_arrays = vec![];
-    // The tuples of the arrays that come next, and whether they belong to points.
+    // The number of tuples of the arrays that come next, and whether they belong to points.
     let mut section: Option<(usize, bool)> = None;
     while let Some(keyword) = scan.keyword()? {
         let keyword = keyword.to_ascii_uppercase();
@@ -68,7 +68,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                     let Some(entry) = scan.field()? else { continue };
                     match section {
                         None => fields.push(entry),
-                        // VTK puts fields of the whole file among those of the points where it has no other place.
+                        // VTK writes fields of the whole file among the arrays of points where it has no other place.
                         Some((tuples, true)) if entry.tuples == tuples => arrays.push(entry),
                         Some((_, true)) if entry.tuples == 1 => fields.push(entry),
                         Some((tuples, true)) => {
@@ -219,7 +219,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// One of the two arrays that list cells in files of version 5.
+    /// Reads one of the two arrays that list cells in files of version 5.
     fn part(&mut self, part: &str, count: usize) -> Result<Entry, String> {
         let found = self.word()?;
         if !found.eq_ignore_ascii_case(part) {
@@ -301,7 +301,7 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// VTK writes blanks and other special characters of names as `%20`.
+/// Decodes a name: VTK writes blanks and other special characters as `%20`.
 fn unescape(name: &str) -> String {
     let mut bytes = Vec::with_capacity(name.len());
     let mut rest = name.as_bytes();

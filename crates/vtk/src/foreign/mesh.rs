@@ -7,7 +7,7 @@ use super::numbers::to_index;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Mesh {
     kinds: Vec<u8>,
-    /// Where the nodes of each cell begin, and the number of all.
+    /// The start of each cell's nodes, and the number of all nodes.
     offsets: Vec<usize>,
     nodes: Vec<usize>,
 }
@@ -39,13 +39,13 @@ impl Mesh {
             .map(|(kind, ends)| Cell { kind: *kind, nodes: &self.nodes[ends[0]..ends[1]] })
     }
 
-    /// Whether a cell is more than points, so that the file holds a mesh and not particles alone.
+    /// Whether the file has cells other than points, so that it holds a mesh and not particles alone.
     #[must_use]
     pub fn has_elements(&self) -> bool {
         self.kinds.iter().any(|kind| !VERTICES.contains(kind))
     }
 
-    /// Reads the cells of a piece, whose points come behind `first` others.
+    /// Reads the cells of a piece whose points come behind `first` other points.
     pub(super) fn append(
         &mut self,
         contents: &Contents,
@@ -140,7 +140,7 @@ impl Mesh {
     }
 }
 
-/// The ends and the nodes of cells before each of which their number stands.
+/// Reads a list in which each cell's nodes follow their number: the ends and the nodes of the cells.
 fn counted(list: &[usize], cells: usize) -> Result<(Vec<usize>, Vec<usize>), String> {
     let (mut ends, mut nodes, mut rest) = (vec![], vec![], list);
     while let Some((count, after)) = rest.split_first() {

@@ -5,8 +5,8 @@
 //! one, by name. XML files may be in text, base64 or appended, raw or compressed with zlib, with headers of 32 or 64
 //! bits, in either byte order, in several pieces; legacy files in text or binary, of versions 1 to 5.
 //!
-//! Nothing is allocated on the word of a file: sizes that a file declares are held against each other and against what
-//! is there before the numbers are decoded. Files beyond [`LARGEST_FILE`] are refused unread.
+//! Sizes that a file declares are compared with each other and with the bytes that are there before memory is allocated and numbers are
+//! decoded. Files beyond [`LARGEST_FILE`] are refused unread.
 
 mod components;
 mod contents;
@@ -43,7 +43,7 @@ pub enum ReadError {
         /// The answer of the file system.
         cause: io::Error,
     },
-    /// The file is larger than what is read.
+    /// The file is larger than [`LARGEST_FILE`].
     #[error("{} has {bytes} bytes; files of at most {LARGEST_FILE} are read", path.display())]
     TooLarge {
         /// The file.
@@ -51,7 +51,7 @@ pub enum ReadError {
         /// Its size.
         bytes: u64,
     },
-    /// The name ends with nothing that is known.
+    /// The ending of the name is not known.
     #[error(
         "{}: expected a .vtu, .vtp, .vtk, .csv, .pvd, .pvtu, .pvtp, .vtm or LAMMPS dump file, or a folder of them{}",
         path.display(),
@@ -61,7 +61,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
     },
-    /// A folder, or a list, without frames.
+    /// A folder or a list without frames.
     #[error(
         "{} holds no frame: expected a .pvd file, or .vtu, .vtp, .vtk, .csv, .pvtu, .pvtp, .vtm or LAMMPS dump files{}",
         path.display(),
@@ -89,7 +89,7 @@ pub enum ReadError {
         /// The time.
         time: f64,
     },
-    /// Files of one number that hold other points.
+    /// Files with the same number that hold different points.
     #[error(
         "{} and {} seem to be attributes of one frame, by their names, but have other points: name the files of one recording alone",
         path.display(),
@@ -98,7 +98,7 @@ pub enum ReadError {
     OtherPoints {
         /// The first file.
         path: PathBuf,
-        /// The other one.
+        /// The other file.
         other: PathBuf,
     },
     /// The file is damaged, or in a layout that is not read.
@@ -121,7 +121,7 @@ pub enum ReadError {
     },
 }
 
-/// How a file of a kind that is not read becomes one that is: a hint to be added to a message.
+/// A hint for a message: how a file of an unknown kind is converted to a known kind.
 fn converted(path: &Path) -> String {
     let name = path.display();
     match extension(path).as_str() {
@@ -135,10 +135,10 @@ fn converted(path: &Path) -> String {
     }
 }
 
-/// Beginnings of all files that are not CSV.
+/// Beginnings of XML files.
 const XML_BEGINNINGS: [&[u8]; 2] = [b"<?xml", b"<VTKFile"];
 
-/// Reads a file whose beginning promises what its name does.
+/// Reads a file whose beginning agrees with the ending of its name.
 fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     let fail = |cause| ReadError::FileSystem { path: path.to_owned(), cause };
     let mut file = File::open(path).map_err(fail)?;
@@ -166,12 +166,12 @@ fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
         "csv" if text.contains(&0) => return Err(malformed("it holds bytes that are no text")),
         _ => (),
     }
-    // Exactly as much as there is; growing step by step would take twice that.
+    // Exactly as much as there is: growing step by step would take twice the memory.
     let rest = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(content.len());
     if content.try_reserve_exact(rest + 1).is_err() {
         return Err(malformed(&format!("there is no memory for its {bytes} bytes")));
     }
-    // A file that grows while it is read, or a pipe, has no size to go by.
+    // A file that grows while it is read, or a pipe, has no known size.
     file.take(LARGEST_FILE).read_to_end(&mut content).map_err(fail)?;
     if content.len() as u64 > LARGEST_FILE {
         return Err(ReadError::TooLarge { path: path.to_owned(), bytes: content.len() as u64 });

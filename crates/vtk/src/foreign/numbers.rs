@@ -4,7 +4,7 @@ use std::io::{self, Read};
 
 use flate2::read::ZlibDecoder;
 
-/// The most numbers that one array may have: a gibibyte of them in double precision.
+/// The largest number of values of an array: a gibibyte in double precision.
 pub(super) const MOST_NUMBERS: usize = 1 << 27;
 
 /// The kind of an array's numbers.
@@ -23,7 +23,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// By its name in XML files.
+    /// The kind with this name in XML files.
     pub(super) fn of_xml(name: &str) -> Option<Self> {
         Some(match name {
             "Float32" => Self::F32,
@@ -40,7 +40,7 @@ impl Kind {
         })
     }
 
-    /// By its name in legacy files, in any case: MATLAB scripts write `FLOAT`, and VTK reads it.
+    /// The kind with this name in legacy files, in any case: MATLAB scripts write `FLOAT`, and VTK reads it.
     pub(super) fn of_legacy(name: &str) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_str() {
             "float" => Self::F32,
@@ -49,7 +49,7 @@ impl Kind {
             "unsigned_char" => Self::U8,
             "short" => Self::I16,
             "unsigned_short" => Self::U16,
-            // VTK writes its own identities as 32 bits, whatever it was built with.
+            // VTK writes its own identities as 32 bits, however it was built.
             "int" | "vtkidtype" => Self::I32,
             "unsigned_int" => Self::U32,
             "long" | "long_long" | "vtktypeint64" => Self::I64,
@@ -79,7 +79,7 @@ pub(super) enum ByteOrder {
     Big,
 }
 
-/// A type that numbers are wanted as: whole numbers keep all their digits as `i64`.
+/// A type into which numbers are read: whole numbers keep all their digits as `i64`.
 pub(super) trait Number: Sized + Copy {
     fn decode(kind: Kind, order: ByteOrder, bytes: &[u8]) -> Result<Self, String>;
     fn parse(text: &str) -> Result<Self, String>;
@@ -133,7 +133,7 @@ impl Number for i64 {
     }
 }
 
-/// A number that was stored as a float but means a whole one.
+/// Converts a float that stands for a whole number.
 pub(super) fn to_whole(value: f64) -> Result<i64, String> {
     if value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 {
         Ok(value as i64)
@@ -142,7 +142,7 @@ pub(super) fn to_whole(value: f64) -> Result<i64, String> {
     }
 }
 
-/// A place in a list.
+/// Converts a number to an index of a list.
 pub(super) fn to_index(value: i64) -> Result<usize, String> {
     usize::try_from(value).map_err(|_| format!("{value} is no place in a list"))
 }
@@ -179,7 +179,7 @@ pub(super) fn parse<N: Number>(text: &[u8], expected: usize) -> Result<Vec<N>, S
 pub(super) struct Base64<'a> {
     text: &'a [u8],
     ready: [u8; 3],
-    /// The part of `ready` that was not handed out yet.
+    /// The start of the part of `ready` that was not handed out yet.
     from: usize,
     to: usize,
 }
@@ -305,7 +305,7 @@ impl Packing {
         if declared != expected as u128 {
             return Err(format!("its header promises {declared} bytes; its size says {expected}"));
         }
-        // The list grows with what is read, not with what is promised.
+        // Memory grows with the bytes that are read, not with the bytes that are promised.
         let mut packed = vec![];
         for _ in 0..blocks {
             packed.push(self.header_number(&mut source)?);
@@ -327,7 +327,7 @@ impl Packing {
                 ));
             }
             let before = bytes.len();
-            // One byte more than promised would tell that the block is too long.
+            // A further byte shows that the block is longer than promised.
             ZlibDecoder::new(&block[..]).take(size + 1).read_to_end(&mut bytes).map_err(
                 |cause| format!("block {} of {blocks} does not inflate: {cause}", index + 1),
             )?;

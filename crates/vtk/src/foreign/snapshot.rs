@@ -14,19 +14,19 @@ use super::numbers::{Kind, Number};
 use super::table::Table;
 use super::{ReadError, extension, legacy, read, xml};
 
-/// Files that list files that list files.
+/// The depth to which files may list files that list files.
 const DEEPEST: usize = 8;
 
-/// Facts of an array that are known before it is decoded.
+/// Properties of an array that are known before it is decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArrayHead {
     /// Its name in the file, or the common part of the names of its components.
     pub name: String,
-    /// Numbers for each particle.
+    /// The number of components of each particle.
     pub components: usize,
     /// Whether the file holds them as 32-bit floats.
     pub is_single: bool,
-    /// The significant digits of its longest number, where it is text of a table and has enough numbers to tell.
+    /// The significant digits of its longest number; `None` unless it is text of a table with enough numbers to tell.
     pub digits: Option<usize>,
 }
 
@@ -49,7 +49,7 @@ enum Data {
 #[derive(Debug)]
 struct Files {
     files: Vec<OpenFile>,
-    /// Whether the files hold arrays over the same points, and not parts of the points.
+    /// Whether the files hold arrays over the same points, instead of parts of the points.
     share_points: bool,
     location: Location,
     raw: Vec<Raw>,
@@ -119,7 +119,7 @@ impl OpenFile {
     }
 }
 
-/// The files that a file stands for: itself, or those that it lists.
+/// The files that a file stands for: itself, or the files that it lists.
 fn members(path: &Path, depth: usize, all: &mut Vec<PathBuf>) -> Result<(), ReadError> {
     if !PARTED.contains(&extension(path).as_str()) {
         all.push(path.to_owned());
@@ -155,7 +155,7 @@ impl Files {
         self.files.iter().flat_map(OpenFile::pieces)
     }
 
-    /// The number of points, or of cells where those are offered.
+    /// The number of points, or of cells where cells are offered.
     fn count(&self) -> Result<usize, ReadError> {
         match self.location {
             Location::CellCentres => Ok(self.pieces().map(|(_, piece)| piece.cell_count()).sum()),
@@ -192,7 +192,7 @@ impl Files {
         Ok(mesh)
     }
 
-    /// The means of the nodes of each cell.
+    /// The mean position of the nodes of each cell.
     fn centres(&self) -> Result<Vec<f64>, ReadError> {
         let positions = self.positions()?;
         let width = self.pieces().next().map_or(3, |(_, piece)| piece.points.components).max(1);
@@ -252,7 +252,7 @@ impl Files {
     }
 }
 
-/// The arrays that all parts of the particles have, and those that they make.
+/// The arrays that all parts of the particles have, and the vectors and tensors that they form.
 fn arrays(
     files: &[OpenFile],
     share_points: bool,
@@ -276,7 +276,7 @@ fn arrays(
             *count += usize::from(*components == entry.components);
         }
     }
-    // Arrays that only some pieces have, or in different shape, are none over all particles.
+    // An array that is missing in a piece, or has another shape there, is no array over all particles.
     let is_whole = |entry: &&Entry| share_points || found[entry.name.as_str()].1 == pieces;
     let raw = |entry: &Entry| Raw {
         name: entry.name.clone(),
@@ -291,7 +291,7 @@ fn arrays(
     Ok((raw, joined))
 }
 
-/// The facts of arrays that scalars and others make.
+/// The properties of arrays as they are offered.
 fn heads(raw: &[Raw], joined: &[Joined]) -> Vec<ArrayHead> {
     let head = |array: &Joined| ArrayHead {
         name: array.name.clone(),
@@ -302,7 +302,7 @@ fn heads(raw: &[Raw], joined: &[Joined]) -> Vec<ArrayHead> {
     joined.iter().map(head).collect()
 }
 
-/// Whether several files hold the same points; an error where they must and do not.
+/// Whether several files hold the same points. It is an error if they must and do not.
 fn shares_points(files: &[OpenFile], must_share: bool) -> Result<bool, ReadError> {
     let [first, others @ ..] = files else { return Ok(false) };
     if others.is_empty() {
@@ -358,7 +358,7 @@ impl Snapshot {
         Ok(Self { path, particles, arrays, data: Data::Files(files) })
     }
 
-    /// The arrays over cells; empty where those are offered already, for a table, and where the pieces do not fit together.
+    /// The arrays over cells; empty where cells are offered already, for a table, and where the pieces do not fit together.
     #[must_use]
     pub fn cell_arrays(&self) -> Vec<ArrayHead> {
         let Data::Files(files) = &self.data else { return vec![] };
@@ -369,7 +369,7 @@ impl Snapshot {
         }
     }
 
-    /// The cells over the points; `None` where there are none but points, as in files of particles.
+    /// The cells over the points; `None` where all cells are points, as in files of particles.
     ///
     /// # Errors
     ///
@@ -407,8 +407,8 @@ impl Snapshot {
         self.arrays.iter().find(|array| array.name == name)
     }
 
-    /// The points of the grid, whatever they mean: components and whether they are single precision. A CSV file need
-    /// not have any.
+    /// The properties of the points of the grid, whether reference or current positions: components, and whether they are single
+    /// precision. A CSV file may lack points.
     #[must_use]
     pub fn points(&self) -> Option<ArrayHead> {
         match &self.data {
@@ -422,7 +422,7 @@ impl Snapshot {
         }
     }
 
-    /// The coordinates of the points, one point after the other; nothing where there are none.
+    /// The coordinates of the points, one point after the other; nothing in a file without points.
     ///
     /// # Errors
     ///
@@ -441,7 +441,7 @@ impl Snapshot {
     ///
     /// # Errors
     ///
-    /// [`ReadError::Array`] where they cannot be decoded, or are not as many as there should be.
+    /// [`ReadError::Array`] where they cannot be decoded, or their number is wrong.
     pub fn floats(&self, name: &str) -> Result<Option<Vec<f64>>, ReadError> {
         match &self.data {
             Data::Files(files) => files.numbers(name),
@@ -455,7 +455,7 @@ impl Snapshot {
     ///
     /// # Errors
     ///
-    /// [`ReadError::Array`] where they cannot be decoded, or are no whole numbers.
+    /// [`ReadError::Array`] where they cannot be decoded, or are not whole numbers.
     pub fn integers(&self, name: &str) -> Result<Option<Vec<i64>>, ReadError> {
         match &self.data {
             Data::Files(files) => files.numbers(name),
@@ -466,7 +466,7 @@ impl Snapshot {
         }
     }
 
-    /// The first number of a field of the whole file, such as `TimeValue`; `None` where there is none that can be read.
+    /// The first number of a field of the whole file, such as `TimeValue`; `None` where no number can be read.
     #[must_use]
     pub fn field(&self, name: &str) -> Option<f64> {
         let Data::Files(files) = &self.data else { return None };
@@ -474,8 +474,8 @@ impl Snapshot {
         file.contents.numbers::<f64>(&file.bytes, entry).ok()?.first().copied()
     }
 
-    /// The solution and the parameters that the file tells: its field `solution`, and those whose names begin with `parameter_`.
-    /// `None` where it tells no solution; a parameter without a number is left out.
+    /// The solution and the parameters that the file states: its field `solution`, and the fields whose names begin with `parameter_`.
+    /// `None` where it states no solution; a parameter without a number is left out.
     #[must_use]
     pub fn provenance(&self) -> Option<Provenance> {
         let Data::Files(files) = &self.data else { return None };

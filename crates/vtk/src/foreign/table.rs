@@ -8,13 +8,13 @@ use std::path::Path;
 use super::components::{Incomplete, Joined, Source, join};
 use super::numbers::to_whole;
 
-/// The columns of a CSV file, and the rows that belong to one time each.
+/// The columns of a CSV file, and the rows of each time.
 #[derive(Debug)]
 pub(super) struct Table {
     pub(super) arrays: Vec<Joined>,
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
-    /// How many digits the numbers of each column have.
+    /// The number of digits in each column.
     digits: Vec<Digits>,
     /// The frames, in order.
     pub(super) frames: Vec<Rows>,
@@ -23,7 +23,7 @@ pub(super) struct Table {
 /// The rows of one frame.
 #[derive(Debug, PartialEq)]
 pub(super) struct Rows {
-    /// The frame's time, if there is a column of it.
+    /// The frame's time, where a column gives it.
     pub(super) time: Option<f64>,
     pub(super) range: Range<usize>,
 }
@@ -87,7 +87,7 @@ impl Table {
         Some(self.floats(name, rows)?.into_iter().map(to_whole).collect())
     }
 
-    /// The digits of the longest number of an array, where its columns tell.
+    /// The digits of the longest number of an array, if its columns show them.
     pub(super) fn digits(&self, array: &Joined) -> Option<usize> {
         let columns = array.components.iter().flatten();
         columns.filter_map(|source| self.digits[source.array].most()).max()
@@ -118,7 +118,7 @@ impl Filled {
         Ok(Self { names, columns, digits })
     }
 
-    /// Puts rows in the order of a column, and leaves those of one value in theirs.
+    /// Sorts rows by a column; rows with equal values keep their order.
     fn sort(&mut self, by: usize) {
         let mut order: Vec<usize> = (0..self.columns[by].len()).collect();
         order.sort_by(|one, other| self.columns[by][*one].total_cmp(&self.columns[by][*other]));
@@ -165,10 +165,10 @@ impl Filled {
     }
 }
 
-/// More columns than a table of particles has.
+/// A limit that no table of particles reaches.
 const MOST_COLUMNS: usize = 10_000;
 
-/// The text with its header as the first line and one character between columns, and that character.
+/// The text with its header as the first line and a single separator between columns, and that separator.
 ///
 /// `numpy.savetxt` writes the header as a comment, and blanks between columns by default.
 fn prepared(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, u8), String> {
@@ -192,7 +192,7 @@ fn prepared(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, u8), String> {
     Ok((Cow::Owned(spaced), b'\t'))
 }
 
-/// The text from its header on, where that is a comment: the last one before a line that begins with a number.
+/// The text from its header on, where the header is a comment: the last comment before a line that begins with a number.
 fn uncommented(bytes: &[u8]) -> &[u8] {
     let mut comment = None;
     let mut at = 0;
@@ -214,13 +214,13 @@ fn uncommented(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// The character between the columns: comma, semicolon or tab, the one that the header has most often, else a blank.
+/// The separator of columns: comma, semicolon or tab, whichever the header has most often, else a blank.
 fn delimiter(bytes: &[u8]) -> Result<u8, String> {
     let lines = bytes.split(|byte| *byte == b'\n');
     let header = lines.into_iter().find(|line| !line.trim_ascii().is_empty() && line[0] != b'#');
     let header = header.unwrap_or_default().trim_ascii();
     let count = |delimiter: u8| header.iter().filter(|byte| **byte == delimiter).count();
-    // Of equals the last one is taken, which is the comma.
+    // Of equal counts the last is taken, which is the comma.
     let (count, delimiter) = [b'\t', b';', b',']
         .map(|delimiter| (count(delimiter), delimiter))
         .into_iter()
@@ -235,8 +235,8 @@ fn delimiter(bytes: &[u8]) -> Result<u8, String> {
     }
 }
 
-/// A number with a decimal point, or with a decimal comma where commas do not separate columns; else the reason, to be added
-/// to the refusal.
+/// A number with a decimal point, or with a decimal comma where commas do not separate columns; else the reason, as text for the
+/// message.
 fn number(word: &str, delimiter: u8) -> Result<f64, &'static str> {
     if let Ok(value) = word.parse() {
         return Ok(value);
@@ -244,7 +244,7 @@ fn number(word: &str, delimiter: u8) -> Result<f64, &'static str> {
     if delimiter != b',' && word.contains(',') {
         return word.replacen(',', ".", 1).parse().map_err(|_| "");
     }
-    // A whole line in one column.
+    // The whole line stands in one column.
     Err(match word.contains(';') {
         true => {
             "; columns are separated by the character that the header has: write the header with semicolons too"
@@ -253,7 +253,7 @@ fn number(word: &str, delimiter: u8) -> Result<f64, &'static str> {
     })
 }
 
-/// The reader's own words, and the likeliest reason where lines have more columns than the header.
+/// The message of the reader, and the likeliest reason where lines have more columns than the header.
 fn damage(cause: &csv::Error, header: &csv::StringRecord) -> String {
     let decimal_commas = match cause.kind() {
         csv::ErrorKind::UnequalLengths { len, .. } => *len > header.len() as u64,
@@ -267,23 +267,23 @@ fn damage(cause: &csv::Error, header: &csv::StringRecord) -> String {
     }
 }
 
-/// How many significant digits numbers have, as they are written.
+/// The significant digits of numbers, as they are written.
 ///
-/// Multiples of a power of two, as the coordinates of many grids are, have few digits and lose none: they are left out.
+/// Multiples of a power of two, such as the coordinates of many grids, have few digits without any loss, and are left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Digits {
     /// Numbers with a fraction or an exponent.
     fractions: usize,
-    /// The most digits that one of them has.
+    /// The largest number of digits of a number.
     most: usize,
-    /// The numbers that have the most digits.
+    /// How many numbers have the largest number of digits.
     longest: usize,
 }
 
 impl Digits {
-    /// As many numbers with a fraction tell the digits of all: fewer may happen to be short.
+    /// The number of fractions that tell the digits of all: fewer may be short by chance.
     const ENOUGH: usize = 8;
-    /// Fewer digits are those of a grid, such as 0.05.
+    /// Numbers with fewer digits are those of a grid, such as 0.05.
     const FEWEST: usize = 4;
 
     pub(super) fn count(&mut self, word: &str, value: f64) {
@@ -303,7 +303,7 @@ impl Digits {
         self.longest += usize::from(significant == self.most);
     }
 
-    /// The digits of the longest number, where there are enough to tell and half of them are as long: these have been cut.
+    /// The digits of the longest number, if enough numbers are known and half of them are as long: the numbers have then been cut.
     pub(super) fn most(self) -> Option<usize> {
         let is_cut = self.most >= Self::FEWEST && 2 * self.longest >= self.fractions;
         (self.fractions >= Self::ENOUGH && is_cut).then_some(self.most)
@@ -316,8 +316,8 @@ fn is_whole(mantissa: &str, value: f64) -> bool {
     !mantissa.ends_with('0') && (value * FINEST).fract() == 0.0
 }
 
-/// Whether rows of all times are mixed, as where each particle has its rows together, or none have an order. Where they stand in long
-/// pieces, and a time has two, two recordings may be in one file.
+/// Whether rows of all times are mixed: each particle has its rows together, or rows have no order. Where rows stand in long pieces,
+/// and a time has two pieces, the file may hold two recordings.
 fn is_mixed(times: &[f64]) -> bool {
     const SHORT: usize = 4;
     let pieces = times.chunk_by(|one, other| one.to_bits() == other.to_bits()).count();
@@ -325,7 +325,7 @@ fn is_mixed(times: &[f64]) -> bool {
     pieces > different.len() && SHORT * pieces > times.len()
 }
 
-/// Successive rows of one time are a frame.
+/// Cuts the rows into frames: successive rows with the same time.
 fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
     let Some(times) = times else { return Ok(vec![Rows { time: None, range: 0..rows }]) };
     let mut frames: Vec<Rows> = vec![];
@@ -351,7 +351,7 @@ fn frames(times: Option<&[f64]>, rows: usize) -> Result<Vec<Rows>, String> {
     Ok(frames)
 }
 
-/// Whether a path names such a file.
+/// Whether a path names a CSV file.
 pub(super) fn is_csv(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }

@@ -8,7 +8,7 @@ use quick_xml::events::{BytesStart, Event};
 use super::contents::{Appended, Cells, Contents, Entry, Kinds, Nodes, Piece, Place};
 use super::numbers::{ByteOrder, Kind, Packing};
 
-/// More attributes than an element of a VTK file has.
+/// A limit that no element of a VTK file reaches.
 const MOST_ATTRIBUTES: usize = 1000;
 
 /// The attributes of an element.
@@ -19,7 +19,7 @@ struct Tag {
 impl Tag {
     fn new(element: &BytesStart<'_>) -> Result<Self, String> {
         let mut attributes = HashMap::new();
-        // Its own search for attributes that are given twice takes the square of their number.
+        // The reader's own search for repeated attributes takes time in proportion to the square of their number.
         for attribute in element.attributes().with_checks(false) {
             if attributes.len() == MOST_ATTRIBUTES {
                 return Err(format!("an element has more than {MOST_ATTRIBUTES} attributes"));
@@ -54,7 +54,7 @@ enum Section {
     Field,
     Points,
     PointData,
-    /// The nodes of cells: a list of them is open.
+    /// The nodes of cells; a list of cells is open.
     Cells,
     CellData,
     Other,
@@ -83,7 +83,7 @@ fn count_of(element: &[u8], piece: &Tag) -> Result<usize, String> {
     Ok(piece.count(key)?.unwrap_or(0))
 }
 
-/// The arrays of a list of cells, as far as they have been met.
+/// The arrays of a list of cells that were found so far.
 struct List {
     count: usize,
     kinds: Kinds,
@@ -101,7 +101,7 @@ impl List {
         }
     }
 
-    /// A list that lacks an array is none.
+    /// The cells; `None` where an array is missing.
     fn cells(self) -> Option<Cells> {
         let (nodes, ends) = self.nodes.zip(self.ends)?;
         let nodes = Nodes::Ends { ends, nodes };
@@ -109,7 +109,7 @@ impl List {
     }
 }
 
-/// A piece under way.
+/// A piece that is being read.
 struct Open {
     tag: Tag,
     particles: usize,
@@ -145,7 +145,7 @@ impl Open {
         match section {
             Section::Points => self.points = Some(entry(tag, text, self.particles)?),
             Section::PointData => self.arrays.push(entry(tag, text, self.particles)?),
-            // Texts and other things without numbers are no fields.
+            // Texts and other arrays without numbers are no fields.
             Section::CellData => self.cell_arrays.extend(entry(tag, text, cells()).ok()),
             Section::Cells => {
                 if let Some(list) = self.lists.last_mut() {
@@ -208,7 +208,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 };
                 match (section, &mut piece) {
                     (Section::Field, _) => {
-                        // Texts among the fields, and what else is not understood, is no time.
+                        // A text among the fields, or a field that cannot be read, is no time.
                         let tuples = tag.count("NumberOfTuples")?.unwrap_or(1);
                         contents.fields.extend(entry(&tag, text, tuples).ok());
                     }
@@ -221,7 +221,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                     return Err("<AppendedData> stands outside of <VTKFile>".into());
                 };
                 contents.appended = Some(appended(&Tag::new(element)?, bytes, position(&reader))?);
-                // What follows need not be XML.
+                // Bytes behind the end need not be XML.
                 is_complete = true;
                 break;
             }
@@ -283,7 +283,7 @@ fn root(tag: &Tag) -> Result<Contents, String> {
 
 fn close(piece: Option<Open>, contents: Option<&mut Contents>) -> Result<(), String> {
     let (Some(piece), Some(contents)) = (piece, contents) else { return Ok(()) };
-    // Pieces without particles are what parallel programs write where they have none; they may lack everything.
+    // Parallel programs write pieces without particles, which may lack every array.
     if piece.particles == 0 && piece.points.is_none() {
         return Ok(());
     }
@@ -299,7 +299,7 @@ fn close(piece: Option<Open>, contents: Option<&mut Contents>) -> Result<(), Str
     Ok(())
 }
 
-/// Where the text of the element is that the reader has just entered; it leaves the element.
+/// The range of the text of the element that the reader has just entered; the reader leaves the element.
 fn text(reader: &mut Reader<&[u8]>) -> Result<std::ops::Range<usize>, String> {
     let start = position(reader);
     let mut found = start..start;
@@ -358,7 +358,7 @@ fn appended(tag: &Tag, bytes: &[u8], from: usize) -> Result<Appended, String> {
         return Err("the appended data do not begin with an underscore".into());
     }
     let start = from + blanks + 1;
-    // Raw data may hold anything, the end tag included: only what each array promises is read of them.
+    // Raw data may hold any bytes, the end tag included: only the promised bytes of each array are read.
     let end = match is_base64 {
         false => bytes.len(),
         true => {
@@ -399,7 +399,7 @@ pub(super) fn members(bytes: &[u8]) -> Result<Vec<String>, String> {
     }
 }
 
-/// Whether a piece of a list of blocks is a block itself, which lists its files within.
+/// Whether a member of a multi-block file is itself a block, whose files stand inside it.
 fn is_block(tag: &Tag) -> bool {
     tag.get("Source").is_none()
 }
