@@ -74,13 +74,13 @@ pub enum Transfer {
 
 /// How particles take the grid's velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Taken {
-    /// Its change.
-    Change,
-    /// It.
-    Whole,
-    /// It, filtered.
-    Filtered(Filter),
+pub(crate) enum VelocityUpdate {
+    /// The change of the grid's velocity is added.
+    Increment,
+    /// The grid's velocity takes the place of the particle's.
+    Replace,
+    /// The filtered velocity of the grid takes the place of the particle's.
+    FilteredReplace(Filter),
 }
 
 /// A filter of the grid's velocity: see `xpic.rs`.
@@ -94,11 +94,11 @@ impl Transfer {
     const HIGHEST_ORDER: u32 = 100;
 
     /// How particles take the grid's velocity.
-    pub(crate) fn taken(self) -> Taken {
+    pub(crate) fn velocity_update(self) -> VelocityUpdate {
         match self {
-            Self::Flip => Taken::Change,
-            Self::Pic | Self::Apic => Taken::Whole,
-            Self::Xpic(order) => Taken::Filtered(Filter { order }),
+            Self::Flip => VelocityUpdate::Increment,
+            Self::Pic | Self::Apic => VelocityUpdate::Replace,
+            Self::Xpic(order) => VelocityUpdate::FilteredReplace(Filter { order }),
         }
     }
 
@@ -111,7 +111,7 @@ impl Transfer {
     /// Whether a step goes to particles and back to filter velocities.
     #[must_use]
     pub fn is_filtered(self) -> bool {
-        matches!(self.taken(), Taken::Filtered(filter) if filter.order > 1)
+        matches!(self.velocity_update(), VelocityUpdate::FilteredReplace(filter) if filter.order > 1)
     }
 }
 

@@ -25,7 +25,7 @@ use crate::particles::body::Body;
 use crate::particles::columns::Shares;
 use crate::particles::mesh::{Interpolation, Mesh};
 use crate::processes::decomposition::{Arrangement, Part, Share, admit};
-use crate::scheme::{Settings, Taken};
+use crate::scheme::{Settings, VelocityUpdate};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome};
@@ -159,9 +159,15 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
             all.filter_map(|corner| invalidity_of_corner(&state.constants, corners, corner))
         });
         let worst = of_particles.chain(of_corners).min();
-        let outcome = state.agree(Outcome { failure: worst, resort: false });
+        let outcome = state.reduce_outcome(Outcome { failure: worst, resort: false });
         if let Some((invalid, particle)) = outcome.failure {
-            return Err(SetupError::InitialState(tell(&state, invalid, particle, 0, T::zero())));
+            return Err(SetupError::InitialState(error_on_all_ranks(
+                &state,
+                invalid,
+                particle,
+                0,
+                T::zero(),
+            )));
         }
         state.sort();
         state.start_affine();
@@ -184,7 +190,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         if let Some((invalid, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);
-            let error = tell(&self.state, invalid, particle, step, time);
+            let error = error_on_all_ranks(&self.state, invalid, particle, step, time);
             self.failed = Some(error.clone());
             return Err(error);
         }
@@ -312,7 +318,8 @@ fn check<T: Lanes, const D: usize>(
     };
     positive(&|| "the time step".into(), settings.time_step)?;
     positive(&|| "the grid spacing".into(), grid.spacing)?;
-    if matches!(settings.transfer.taken(), Taken::Filtered(filter) if filter.order == 0) {
+    if matches!(settings.transfer.velocity_update(), VelocityUpdate::FilteredReplace(filter) if filter.order == 0)
+    {
         let quantity = "the order of XPIC".into();
         return Err(SetupError::NotPositive { quantity, value: 0.0 });
     }
@@ -501,7 +508,7 @@ fn allocate<T: Lanes, const D: usize>(
 }
 
 /// The error for an invalid particle, at all processes; `particle` is its number in the whole body.
-fn tell<T: Lanes, const D: usize>(
+fn error_on_all_ranks<T: Lanes, const D: usize>(
     state: &State<T, D>,
     invalid: Invalid,
     particle: usize,
@@ -509,13 +516,15 @@ fn tell<T: Lanes, const D: usize>(
     time: T,
 ) -> StepError {
     match &state.part {
-        None => describe(state, invalid, particle, step, time),
-        Some(part) => part.tell(particle, |own| describe(state, invalid, own, step, time)),
+        None => error_of(state, invalid, particle, step, time),
+        Some(part) => {
+            part.error_on_all_ranks(particle, |own| error_of(state, invalid, own, step, time))
+        }
     }
 }
 
 /// The error for an invalid particle, with the figures of its present state.
-fn describe<T: Lanes, const D: usize>(
+fn error_of<T: Lanes, const D: usize>(
     state: &State<T, D>,
     invalid: Invalid,
     particle: usize,

@@ -197,12 +197,12 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             } else {
                 from_grid((c, corners), &self.buffers, nodes, first, values);
             }
-            corners.follow(c, first, values, next);
+            corners.advect(c, first, values, next);
         });
         if let Some(halo) = &corners.halo {
             halo.exchange(at_corners);
         }
-        corners.follow(c, own, &at_corners.nodes[own..], other_next);
+        corners.advect(c, own, &at_corners.nodes[own..], other_next);
     }
 }
 

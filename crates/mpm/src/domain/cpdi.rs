@@ -25,7 +25,7 @@ pub(crate) struct Parallelograms<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Parallelograms<T, D> {
-    /// Those with these half-edges; boxes of these half-sizes where there are none.
+    /// Parallelograms with these half-edges; boxes of these half-sizes where there are none.
     pub(crate) fn new(half_edges: Vec<SMatrix<T, D, D>>, half_size: &SVector<T, D>) -> Self {
         let half_edges = match half_edges.is_empty() {
             true => HalfEdges::Same(SMatrix::from_diagonal(half_size)),

@@ -39,7 +39,7 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
     /// [`diagnose`](Self::diagnose), which has to tell for the others.
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool;
 
-    /// What belongs to each of the `before` particles here moves with them to other processes; a call of all. Default: nothing does.
+    /// Data of each of the `before` particles here move with them to other processes; collective. Default: there are none.
     fn follow(&mut self, _moved: &Move, _before: usize) {}
 
     /// The first node that a particle reaches along the last axis, and about the first one along the others.

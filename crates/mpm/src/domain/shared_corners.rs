@@ -34,10 +34,10 @@ pub(crate) struct SharedCorners<T, const D: usize> {
     /// Positions at the end of a step.
     pub(crate) next: Vec<SVector<T, D>>,
     /// Polygons: whether shares and areas are those of the positions.
-    is_measured: bool,
+    are_shares_current: bool,
     pub(crate) measured: Measured<T, D>,
     /// Cells: whether a particle begins with the corners with which the one before it ends.
-    pub(crate) goes_on: Vec<bool>,
+    pub(crate) shares_face_with_previous: Vec<bool>,
     /// Particles whose contributions are summed together.
     pub(crate) chunks: Vec<Chunk>,
     /// For each place in the list of corners which of its chunk's sums is that of its corner.
@@ -199,9 +199,9 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         ends.pop();
         let mut all = Self {
             next: mesh.x.clone(),
-            is_measured: false,
+            are_shares_current: false,
             measured: Measured::new(&mesh),
-            goes_on: continuations(&mesh),
+            shares_face_with_previous: continuations(&mesh),
             chunks,
             sum_at,
             sums,
@@ -211,20 +211,20 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
             own,
             halo,
         };
-        all.measure();
+        all.recompute_shares();
         all
     }
 
     /// The positions, which the caller may overwrite.
-    pub(crate) fn positions(&mut self) -> &mut [SVector<T, D>] {
-        self.is_measured = false;
+    pub(crate) fn positions_mut(&mut self) -> &mut [SVector<T, D>] {
+        self.are_shares_current = false;
         &mut self.mesh.x
     }
 
     /// Polygons: computes shares and areas at the current positions, if they are of others.
-    pub(crate) fn measure(&mut self) {
-        let Self { mesh, measured, is_measured, .. } = self;
-        if std::mem::replace(is_measured, true) {
+    pub(crate) fn recompute_shares(&mut self) {
+        let Self { mesh, measured, are_shares_current, .. } = self;
+        if std::mem::replace(are_shares_current, true) {
             return;
         }
         let particles = mesh.of_particles.len();
@@ -341,7 +341,7 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     }
 
     /// Writes the positions after a step of corners from `first` on, which have these velocities.
-    pub(crate) fn follow(
+    pub(crate) fn advect(
         &self,
         c: &Constants<T, D>,
         first: usize,
@@ -365,10 +365,10 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
     }
 
     /// Puts the corners at their new places, at which shares are known or not.
-    pub(crate) fn arrive(&mut self, is_measured: bool) {
+    pub(crate) fn commit_positions(&mut self, are_shares_current: bool) {
         std::mem::swap(&mut self.mesh.x, &mut self.next);
-        self.is_measured = is_measured;
-        self.measure();
+        self.are_shares_current = are_shares_current;
+        self.recompute_shares();
     }
 }
 
@@ -378,12 +378,13 @@ fn continuations<T: Lanes, const D: usize>(mesh: &Mesh<T, D>) -> Vec<bool> {
         return Vec::new();
     }
     let cells = || mesh.corners.chunks(1 << D);
-    let of_pairs = cells().zip(cells().skip(1)).map(|(before, own)| goes_on(before, own));
+    let of_pairs =
+        cells().zip(cells().skip(1)).map(|(before, own)| shares_face_with_previous(before, own));
     std::iter::once(false).chain(of_pairs).collect()
 }
 
 /// Whether a cell begins with the corners with which the one before it ends, and no corner is among them twice.
-fn goes_on(before: &[u32], own: &[u32]) -> bool {
+fn shares_face_with_previous(before: &[u32], own: &[u32]) -> bool {
     let pairs = &PAIRS[..own.len() / 2];
     let mut all: Vec<u32> = before.to_vec();
     all.extend(pairs.iter().map(|[_, last]| own[*last]));

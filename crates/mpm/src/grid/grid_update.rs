@@ -17,7 +17,7 @@ use crate::grid::node::Node;
 use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::parallel::coloring::Shared;
 use crate::parallel::disjoint::Partition;
-use crate::scheme::{Taken, Transfer};
+use crate::scheme::{Transfer, VelocityUpdate};
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
@@ -60,10 +60,10 @@ pub(crate) enum NodeVectors {
 
 impl NodeVectors {
     pub(crate) fn of(transfer: Transfer) -> Self {
-        match transfer.taken() {
-            Taken::Change => Self::VelocityAndAcceleration,
-            Taken::Whole => Self::VelocityTwice,
-            Taken::Filtered(_) => Self::StartAndAcceleration,
+        match transfer.velocity_update() {
+            VelocityUpdate::Increment => Self::VelocityAndAcceleration,
+            VelocityUpdate::Replace => Self::VelocityTwice,
+            VelocityUpdate::FilteredReplace(_) => Self::StartAndAcceleration,
         }
     }
 

@@ -11,14 +11,14 @@ use crate::kernel::beyond;
 use crate::shape::one_axis::{Hat, ShapeFunction, index};
 
 /// The nodes around a point.
-struct Around<T, const D: usize> {
+struct HatStencil<T, const D: usize> {
     /// Index of the first one.
     first: usize,
     /// The hat functions of both nodes along each axis.
     S: [[T; 2]; D],
 }
 
-impl<T: Lanes, const D: usize> Around<T, D> {
+impl<T: Lanes, const D: usize> HatStencil<T, D> {
     #[inline(always)]
     fn new(c: &Constants<T, D>, x: &SVector<T, D>) -> Self {
         let (mut first, mut S, xi) = (0, [[T::one(); 2]; D], c.in_cells(x));
@@ -90,7 +90,7 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
         let mut kept = [[Lane8::zero(); 2]; MOST_ROWS];
         let mut kept_at = None;
         for &corner in ids {
-            let around = Around::new(c, &corners.at(corner as usize));
+            let around = HatStencil::new(c, &corners.at(corner as usize));
             let own_at = around.first.wrapping_sub(first);
             if kept_at != Some(own_at) {
                 if let Some(at) = kept_at {
@@ -201,7 +201,7 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
     fn run<V: Vectors>(self, vectors: V) {
         let Self { c, corners, nodes, first, values, moments } = self;
         for (k, own) in values.iter_mut().enumerate() {
-            let around = Around::new(c, &corners.at(first + k));
+            let around = HatStencil::new(c, &corners.at(first + k));
             let [near, far] = around.S[0];
             let mut value = Lane8::zero();
             let mut slopes = [Lane8::zero(); D];

@@ -166,7 +166,7 @@ struct Adding<'a, 'b, T, const D: usize, const AFFINE: bool> {
 }
 
 /// The flux of a particle to each of its corners.
-struct Giving<T, const D: usize> {
+struct ParticleFlux<T, const D: usize> {
     value: Lane8<T>,
     /// `-V0 tau` along each axis.
     fluxes: [Lane8<T>; D],
@@ -174,7 +174,7 @@ struct Giving<T, const D: usize> {
     affine: [Lane8<T>; D],
 }
 
-impl<T: Lanes, const D: usize> Giving<T, D> {
+impl<T: Lanes, const D: usize> ParticleFlux<T, D> {
     #[inline(always)]
     fn new<V: Vectors, const AFFINE: bool>(
         vectors: V,
@@ -240,7 +240,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
         if !mesh.is_of_cells() {
             let start = mesh.places(first).start;
             for k in 0..count {
-                let given = Giving::new::<V, AFFINE>(vectors, contributions, k, spacing);
+                let given = ParticleFlux::new::<V, AFFINE>(vectors, contributions, k, spacing);
                 let mut centre = SVector::<T, D>::zeros();
                 if AFFINE {
                     for place in mesh.places(first + k) {
@@ -283,11 +283,14 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
             let arms = if AFFINE { Some(arms(&x, &shares, inverse_spacing)) } else { None };
             let sum_at = &corners.sum_at[(first + group) << D..][..of_group << D];
             for n in 0..of_group {
-                let given = Giving::new::<V, AFFINE>(vectors, contributions, group + n, spacing);
+                let given =
+                    ParticleFlux::new::<V, AFFINE>(vectors, contributions, group + n, spacing);
                 let own_sums = &sum_at[n << D..][..1 << D];
                 let k = group + n;
-                let goes_on = k > 0 && corners.goes_on[first + k];
-                let next_goes_on = k + 1 < count && corners.goes_on[first + k + 1];
+                let shares_face_with_previous =
+                    k > 0 && corners.shares_face_with_previous[first + k];
+                let next_shares_face =
+                    k + 1 < count && corners.shares_face_with_previous[first + k + 1];
                 for pair in 0..1 << (D - 1) {
                     for (place, corner) in PAIRS[pair].into_iter().enumerate() {
                         let sum = own_sums[corner] as usize;
@@ -299,13 +302,13 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
                             }
                         }
                         let share = (shares.w[corner].lanes.0[n], g, arm);
-                        let known = match place == 0 && goes_on {
+                        let known = match place == 0 && shares_face_with_previous {
                             true => kept[pair],
                             false => vectors.load8(&sums[sum].values),
                         };
                         let affine_sum = affine_sums.get_mut(sum);
                         let new = given.add::<V, AFFINE>(vectors, share, known, affine_sum);
-                        if place == 1 && next_goes_on {
+                        if place == 1 && next_shares_face {
                             kept[pair] = new;
                         } else {
                             sums[sum].values = new.0;
@@ -344,12 +347,12 @@ impl<T: Lanes, const D: usize> FromCorners<'_, T, D> {
 struct Interpolating<'a, T, const D: usize, const AFFINE: bool>(FromCorners<'a, T, D>);
 
 /// Values of corners over a particle, and their slopes along each axis.
-struct Over<T, const D: usize> {
+struct InterpolatedValue<T, const D: usize> {
     value: Lane8<T>,
     slopes: [Lane8<T>; D],
 }
 
-impl<T: Lanes, const D: usize> Over<T, D> {
+impl<T: Lanes, const D: usize> InterpolatedValue<T, D> {
     #[inline(always)]
     fn zero() -> Self {
         Self { value: Lane8::zero(), slopes: [Lane8::zero(); D] }
@@ -384,7 +387,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
         if !mesh.is_of_cells() {
             let start = mesh.places(first).start;
             for (k, own) in receiver.iter_mut().enumerate() {
-                let mut over = Over::zero();
+                let mut over = InterpolatedValue::zero();
                 for place in mesh.places(first + k) {
                     let Share { w, g } = shares[place - start];
                     let node = &values.nodes[mesh.corners[place] as usize];
@@ -419,7 +422,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
             let corners = &mesh.corners[particles.0 << D..][..particles.1 << D];
             for (n, own) in receiver.iter_mut().enumerate() {
                 let own_corners = &corners[n << D..][..1 << D];
-                let mut over = Over::zero();
+                let mut over = InterpolatedValue::zero();
                 for corner in 0..1 << D {
                     let node = &values.nodes[own_corners[corner] as usize];
                     let mut g = [T::zero(); D];

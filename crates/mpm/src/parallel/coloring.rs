@@ -134,7 +134,7 @@ impl Schedule {
     /// The order of taking: each band of the second colour soon after its neighbours, whose elements still lie in the cache.
     /// The `part`-th of `parts` threads begins at a place of its own, so that each stays among neighbours for long.
     ///
-    /// Bands that those of other processes wait for come first of all, and those that send what other processes wait for.
+    /// Bands shared with other processes are taken first, since those processes wait for them.
     fn order(&self, (part, parts): (usize, usize)) -> impl Iterator<Item = usize> + use<> {
         let Held { bands, all } = self.of.clone();
         // A band of the second colour has the place two after its number, next after that of its upper neighbour.

@@ -29,7 +29,7 @@ pub struct Share {
 pub struct Arrangement<'a> {
     /// Their numbers in the whole body, ascending.
     pub ids: &'a Arc<Vec<u64>>,
-    /// Another number each time that they are others.
+    /// Incremented whenever the set of particles of this process changes.
     pub version: u64,
 }
 
@@ -38,15 +38,15 @@ pub(crate) struct Part {
     pub(crate) ranks: Arc<dyn Ranks>,
     /// The numbers of the particles here, ascending.
     pub(crate) ids: Arc<Vec<u64>>,
-    /// Where some of these are here for corners that they share with others: those that this process holds.
-    pub(crate) own: Option<Own>,
+    /// The particles that this process owns, where others are present for corners that they share.
+    pub(crate) own: Option<Owned>,
     pub(crate) version: u64,
     /// The first bin of each process, and the number of bins.
     pub(crate) cuts: Vec<usize>,
 }
 
 /// The particles that this process owns, among those that are present as halo.
-pub(crate) struct Own {
+pub(crate) struct Owned {
     /// Their places, ascending.
     pub(crate) places: Vec<u32>,
     /// Their numbers in the whole body.
@@ -95,7 +95,7 @@ impl Part {
     }
 
     /// The outcome of all processes; a failed particle has its number in the whole body.
-    pub(crate) fn agree(&self, outcome: Outcome) -> Outcome {
+    pub(crate) fn reduce_outcome(&self, outcome: Outcome) -> Outcome {
         // The worst and first failure is the largest number; a new sort is less than any failure.
         const KIND: u32 = 60;
         const IDS: u64 = (1 << KIND) - 1;
@@ -115,7 +115,11 @@ impl Part {
     }
 
     /// The error that the process of particle `id` tells, `describe(number here)`, at all of them.
-    pub(crate) fn tell(&self, id: usize, describe: impl FnOnce(usize) -> StepError) -> StepError {
+    pub(crate) fn error_on_all_ranks(
+        &self,
+        id: usize,
+        describe: impl FnOnce(usize) -> StepError,
+    ) -> StepError {
         let own = self.ids.binary_search(&(id as u64)).ok();
         let holder = self.ranks.largest(own.map_or(0, |_| self.ranks.rank() as u64));
         let mut numbers = [0.0; StepError::NUMBERS];

@@ -279,7 +279,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         self.particles.replace_moving(saved.columns);
         let (x, keys) = (points.fetch(&saved.corner_x), points.fetch(&saved.keys));
         if let Some(corners) = &mut self.corners {
-            corners.shared.positions().copy_from_slice(&x);
+            corners.shared.positions_mut().copy_from_slice(&x);
         }
         Ok(keys)
     }

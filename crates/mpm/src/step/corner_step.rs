@@ -44,7 +44,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             corners.follow(&self.constants, &self.nodes);
         }
         let outcome = self.g2p_and_to_corners(body_force, times.end);
-        let outcome = self.agree(outcome);
+        let outcome = self.reduce_outcome(outcome);
         // A sort may bring other particles here, and after a failure the sums are of no use.
         self.is_ahead = outcome.is_clean();
         self.resort_if(outcome)
@@ -99,7 +99,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         });
         each(pieces.collect(), &|piece| pass.advance(piece));
         shared.measured = measured;
-        shared.arrive(true);
+        shared.commit_positions(true);
         let outcome = corner_exchange::check(&c, shared, bins.bin_of());
         if !is_in_doubt.into_inner() {
             return outcome;

@@ -26,7 +26,7 @@ use crate::parallel::bins::Bins;
 use crate::parallel::chunks::each;
 use crate::particles::Particles;
 use crate::particles::columns::Moving;
-use crate::scheme::{Taken, Transfer};
+use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::{State, invalidity};
 
@@ -145,7 +145,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Self { particles, constants, bins, corners, .. } = self;
         if let Some(corners) = corners {
             let Corners { shared, .. } = &mut **corners;
-            shared.arrive(false);
+            shared.commit_positions(false);
             found.add(corner_exchange::check(constants, shared, bins.bin_of()));
             if is_in_doubt {
                 found.add(check_all(particles, (constants, shared)));
@@ -289,13 +289,13 @@ fn take_velocity<T: Lanes, const D: usize>(
     v: &mut [SVector<T, D>],
     affine: &mut [SMatrix<T, D, D>],
 ) {
-    match transfer.taken() {
-        Taken::Change => {
+    match transfer.velocity_update() {
+        VelocityUpdate::Increment => {
             for (v, interpolated) in v.iter_mut().zip(interpolated) {
                 *v += interpolated.second * c.time_step;
             }
         }
-        Taken::Whole | Taken::Filtered(_) => {
+        VelocityUpdate::Replace | VelocityUpdate::FilteredReplace(_) => {
             for (v, interpolated) in v.iter_mut().zip(interpolated) {
                 *v = interpolated.second;
             }

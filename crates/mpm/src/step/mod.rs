@@ -16,7 +16,7 @@ pub(crate) mod xpic;
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 
-use crate::scheme::{Integrator, Taken, Transfer};
+use crate::scheme::{Integrator, Transfer, VelocityUpdate};
 use crate::step::body_force::BodyForce;
 use crate::step::health::Outcome;
 use crate::step::state::State;
@@ -36,7 +36,7 @@ pub(crate) struct StepTimes<T> {
 pub(crate) fn is_fused(integrator: Integrator, transfer: Transfer) -> bool {
     integrator.early() == 0.0
         && !integrator.reprojects()
-        && !matches!(transfer.taken(), Taken::Filtered(_))
+        && !matches!(transfer.velocity_update(), VelocityUpdate::FilteredReplace(_))
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -48,7 +48,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         times: StepTimes<T>,
     ) -> Outcome {
         if let Some(corners) = &mut self.corners {
-            corners.shared.measure();
+            corners.shared.recompute_shares();
         }
         if is_fused(integrator, self.transfer) {
             return match self.corners {
@@ -62,7 +62,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if early > 0.0 {
             self.p2g_momentum();
             let outcome = self.g2p_stretch(dt * real(early));
-            let outcome = self.agree(outcome);
+            let outcome = self.reduce_outcome(outcome);
             if outcome.failure.is_some() {
                 std::mem::swap(&mut self.particles.F, &mut self.F_early);
                 return outcome;
@@ -71,7 +71,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         } else {
             self.p2g(body_force, times);
         }
-        if let Taken::Filtered(filter) = self.transfer.taken() {
+        if let VelocityUpdate::FilteredReplace(filter) = self.transfer.velocity_update() {
             self.filter(filter);
         }
         if let Some(corners) = &mut self.corners {
@@ -84,7 +84,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         } else {
             self.g2p(late)
         };
-        let outcome = self.agree(outcome);
+        let outcome = self.reduce_outcome(outcome);
         self.resort_if(outcome)
     }
 
@@ -94,7 +94,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.p2g(body_force, times);
         }
         let outcome = self.g2p2g(body_force, times.end);
-        let outcome = self.agree(outcome);
+        let outcome = self.reduce_outcome(outcome);
         // After a sort or a failure the partial sums on the grid are of no use.
         self.is_ahead = outcome.is_clean();
         self.resort_if(outcome)

@@ -66,8 +66,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
     }
 
     /// The outcome of all processes.
-    pub(crate) fn agree(&self, outcome: Outcome) -> Outcome {
-        self.part.as_ref().map_or(outcome, |part| part.agree(outcome))
+    pub(crate) fn reduce_outcome(&self, outcome: Outcome) -> Outcome {
+        self.part.as_ref().map_or(outcome, |part| part.reduce_outcome(outcome))
     }
 
     /// Sorts the particles into bins, those of other processes too.

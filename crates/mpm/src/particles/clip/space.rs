@@ -303,7 +303,7 @@ fn assemble<T: RealField + Copy, const D: usize>(
     let vector = |X: Vector3<f64>| SVector::<T, D>::from_fn(|a, _| real(X[a]));
     const NONE: u32 = u32::MAX;
     let mut renumbered = vec![NONE; corners.X.len()];
-    let mut own = Mesh::none(Interpolation::Triangles, turn_of(*turn));
+    let mut own = Mesh::empty(Interpolation::Triangles, turn_of(*turn));
     let mut boundary = Vec::new();
     let (mut X, mut volume, mut mass) = (Vec::new(), Vec::new(), Vec::new());
     // Among the corners of the polyhedron at hand.

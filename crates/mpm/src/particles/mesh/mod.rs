@@ -132,12 +132,12 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
             corners,
             ends: (1..=cells).map(|cell| cell << D).collect(),
             of_particles: (1..=cells).collect(),
-            ..Self::none(Interpolation::Cell, None)
+            ..Self::empty(Interpolation::Cell, None)
         }
     }
 
-    /// None yet, of a whole body.
-    pub(crate) fn none(interpolation: Interpolation, turn: Option<SMatrix<T, D, D>>) -> Self {
+    /// An empty mesh.
+    pub(crate) fn empty(interpolation: Interpolation, turn: Option<SMatrix<T, D, D>>) -> Self {
         Self {
             interpolation,
             X: Vec::new(),

@@ -59,7 +59,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
         (interpolation, turn): (Interpolation, Option<SMatrix<T, D, D>>),
         is_behind: impl Fn(usize, usize) -> bool,
     ) -> (Mesh<T, D>, Vec<[usize; 2]>) {
-        let mut own = Mesh::none(interpolation, turn);
+        let mut own = Mesh::empty(interpolation, turn);
         // The number in the whole body of each place's corner, particle after particle.
         let mut numbers = Vec::new();
         let mut found: HashMap<u64, [usize; 2]> = HashMap::new();

@@ -11,7 +11,7 @@ use crate::domain::shared_corners::SharedCorners;
 use crate::particles::mesh::Mesh;
 use crate::particles::mesh::part::{LoadRecords, Records};
 use crate::processes::corner_halo::CornerHalo;
-use crate::processes::decomposition::{Lists, Move, Own};
+use crate::processes::decomposition::{Lists, Move, Owned};
 use crate::step::state::State;
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -84,12 +84,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
 }
 
 /// The particles whose first corner is among those that this process sorts, the first `own` ones.
-fn own_particles<T, const D: usize>(mesh: &Mesh<T, D>, own: usize, ids: &[u64]) -> Own
+fn own_particles<T, const D: usize>(mesh: &Mesh<T, D>, own: usize, ids: &[u64]) -> Owned
 where
     T: Lanes,
 {
     let is_own = |p: &usize| (mesh.corners[mesh.places(*p).start] as usize) < own;
     let places: Vec<u32> = (0..ids.len()).filter(is_own).map(|p| p as u32).collect();
     let ids = places.iter().map(|&p| ids[p as usize]).collect();
-    Own { places, ids: Arc::new(ids) }
+    Owned { places, ids: Arc::new(ids) }
 }
