@@ -156,6 +156,7 @@ mod parallel;
 mod particles;
 mod processes;
 mod scheme;
+mod set_up;
 mod shape;
 mod simulation;
 mod solver;

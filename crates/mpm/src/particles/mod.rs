@@ -66,6 +66,14 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
         self.X.len()
     }
 
+    /// Mass and volume of every particle, where they are uniform.
+    pub(crate) fn uniform(&self) -> Option<(T, T)> {
+        let (&m, &V) = self.mass.first().zip(self.volume.first())?;
+        let is_uniform = self.mass.iter().all(|mass| *mass == m)
+            && self.volume.iter().all(|volume| *volume == V);
+        is_uniform.then_some((m, V))
+    }
+
     /// Whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.X.is_empty()

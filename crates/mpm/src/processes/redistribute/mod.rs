@@ -55,15 +55,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
         domain.follow(&moved, before);
         // Weights in buffers may hold domains of particles that were here.
         self.buffers = BufferPool::new();
-        let Particles { x, mass, volume, internal, .. } = &self.particles;
+        let Particles { x, internal, .. } = &self.particles;
         if self.keeps_F_early {
             self.F_early.resize(x.len(), SMatrix::identity());
             self.internal_early.resize(internal.len(), T::zero());
         }
-        let (first_mass, first_volume) = (mass.first().copied(), volume.first().copied());
-        self.uniform = first_mass.zip(first_volume).filter(|(m, V)| {
-            mass.iter().all(|mass| mass == m) && volume.iter().all(|volume| volume == V)
-        });
+        self.uniform = self.particles.uniform();
         Some(moved)
     }
 

@@ -1,0 +1,284 @@
+//! The checks of a scene, and all memory of its run.
+
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_lanes::tensor::determinant;
+use mmsmith_laws::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::domain::corners::Corners;
+use crate::domain::shared_corners::SharedCorners;
+use crate::domain::{self, Shape};
+use crate::error::SetupError;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
+use crate::grid::{Grid, Layout};
+use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
+use crate::kernel::buffers::BufferPool;
+use crate::parallel::bins::Bins;
+use crate::particles::Particles;
+use crate::particles::body::Body;
+use crate::particles::columns::Shares;
+use crate::particles::mesh::Interpolation;
+use crate::processes::decomposition::{Part, Share, admit};
+use crate::scheme::{Settings, VelocityUpdate};
+use crate::step::is_fused;
+use crate::step::state::State;
+
+/// A value for error messages, of any scalar type.
+pub(crate) fn figure<T: RealField>(value: T) -> f64 {
+    nalgebra::try_convert(value).unwrap_or(f64::NAN)
+}
+
+/// The law, for blocks of particles.
+pub(crate) fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn BlockLaw<T, D>> {
+    let planted = mmsmith_laws::fault::Planted::here();
+    let material = match law {
+        Law::Library(material) => *material,
+        Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
+        Law::WithMemory(law) => return Box::new(MemoryBlocks::new(law.clone())),
+    };
+    // One law has kernels of its own; those of `AnyLaw` serve every law.
+    if let Material::NeoHookean { lambda, mu } = material {
+        return if lambda == T::zero() {
+            Box::new(NeoHookeanNoLog { mu })
+        } else {
+            Box::new(NeoHookean { lambda, mu, planted })
+        };
+    }
+    Box::new(AnyLaw(planted.law_in_stresses(material)))
+}
+
+/// Refuses a quantity that is not a positive number.
+fn positive<T: RealField + Copy>(
+    quantity: &dyn Fn() -> String,
+    value: T,
+) -> Result<(), SetupError> {
+    if value > T::zero() && value.is_finite() {
+        return Ok(());
+    }
+    Err(SetupError::NotPositive { quantity: quantity(), value: figure(value) })
+}
+
+/// Refuses a scene that makes no sense.
+pub(crate) fn check<T: Lanes, const D: usize>(
+    grid: &Grid<T, D>,
+    body: &Body<T, D>,
+    settings: &Settings<T>,
+    share: Option<&Share>,
+) -> Result<(), SetupError> {
+    positive(&|| "the time step".into(), settings.time_step)?;
+    positive(&|| "the grid spacing".into(), grid.spacing)?;
+    let update = settings.transfer.velocity_update();
+    if matches!(update, VelocityUpdate::FilteredReplace(filter) if filter.order == 0) {
+        let quantity = "the order of XPIC".into();
+        return Err(SetupError::NotPositive { quantity, value: 0.0 });
+    }
+    if grid.lower.iter().any(|x| !x.is_finite()) {
+        return Err(SetupError::NotFinite { quantity: "the lower corner of the grid".into() });
+    }
+    if settings.halve_first_acceleration && !settings.integrator.is_staggered() {
+        return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
+    }
+    check_particles(body, share)?;
+    check_domains(body, settings.shape)?;
+    check_mesh(grid, body, settings.shape, share)
+}
+
+fn check_particles<T: Lanes, const D: usize>(
+    body: &Body<T, D>,
+    share: Option<&Share>,
+) -> Result<(), SetupError> {
+    let Body { particles, half_edges, .. } = body;
+    let Particles { X, x, v, F, mass, volume, .. } = particles;
+    let expected = X.len();
+    let boxes = if half_edges.is_empty() { expected } else { half_edges.len() };
+    for (array, found) in [
+        ("x", x.len()),
+        ("v", v.len()),
+        ("F", F.len()),
+        ("mass", mass.len()),
+        ("volume", volume.len()),
+        ("half_edges", boxes),
+        ("ids", share.map_or(expected, |share| share.ids.len())),
+    ] {
+        if found != expected {
+            return Err(SetupError::LengthMismatch { array, found, expected });
+        }
+    }
+    if expected == 0 && share.is_none() {
+        return Err(SetupError::NoParticles);
+    }
+    let limit = u32::MAX as usize;
+    if expected > limit {
+        return Err(SetupError::TooManyParticles { particles: expected, limit });
+    }
+    for p in 0..expected {
+        positive(&|| format!("the mass of particle {p}"), mass[p])?;
+        positive(&|| format!("the volume of particle {p}"), volume[p])?;
+        for (name, values) in [("reference position", &X[p]), ("velocity", &v[p])] {
+            if values.iter().any(|value| !value.is_finite()) {
+                let quantity = format!("the {name} of particle {p}");
+                return Err(SetupError::NotFinite { quantity });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_domains<T: Lanes, const D: usize>(
+    body: &Body<T, D>,
+    shape: Shape,
+) -> Result<(), SetupError> {
+    let Body { particles: Particles { half_size, .. }, half_edges, .. } = body;
+    let of_boxes = matches!(shape, Shape::Ugimp | Shape::Gimp);
+    if of_boxes || (shape == Shape::Cpdi && half_edges.is_empty()) {
+        for (axis, &l) in half_size.iter().enumerate() {
+            positive(&|| format!("the half-size of particles along axis {axis}"), l)?;
+        }
+    }
+    let of_box = SMatrix::from_diagonal(half_size);
+    for (particle, E) in half_edges.iter().enumerate() {
+        if of_boxes && *E != of_box {
+            return Err(SetupError::NotABox { particle });
+        }
+        if shape == Shape::Cpdi {
+            positive(&|| format!("the domain of particle {particle}"), determinant(E))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_mesh<T: Lanes, const D: usize>(
+    grid: &Grid<T, D>,
+    body: &Body<T, D>,
+    shape: Shape,
+    share: Option<&Share>,
+) -> Result<(), SetupError> {
+    let Some(mesh) = &body.mesh else {
+        return if shape == Shape::Cpdi2 { Err(SetupError::NoCorners) } else { Ok(()) };
+    };
+    // Other shapes leave the corners of cells alone.
+    if mesh.interpolation == Interpolation::Cell && shape != Shape::Cpdi2 {
+        return Ok(());
+    }
+    if domain::at_corners(shape, mesh).is_none() {
+        return Err(SetupError::NotOfPolygons { shape: shape.to_string() });
+    }
+    if share.is_some() && mesh.numbers.is_none() {
+        return Err(SetupError::NoNumbers);
+    }
+    if mesh.turn.is_some() && grid.walls.iter().flatten().any(|is_wall| *is_wall) {
+        return Err(SetupError::TurnedWalls);
+    }
+    mesh.check(body.particles.X.len())
+}
+
+/// Reserves all memory of a run.
+pub(crate) fn allocate<T: Lanes, const D: usize>(
+    grid: &Grid<T, D>,
+    body: Body<T, D>,
+    law: Box<dyn BlockLaw<T, D>>,
+    settings: &Settings<T>,
+    share: Option<Share>,
+) -> Result<State<T, D>, SetupError> {
+    let Settings { shape, integrator, transfer, .. } = *settings;
+    let Body { mut particles, half_edges, mesh } = body;
+    let count = particles.x.len();
+    let domain = domain::new(shape, half_edges, &particles.half_size, grid.spacing);
+    let corners = mesh.and_then(|mesh| {
+        let at_corner = domain::at_corners(shape, &mesh)?;
+        Some(SharedCorners::new(mesh, at_corner))
+    });
+    let shares = fill(&mut particles, law.at_rest(), transfer.is_affine())?;
+    let fused = is_fused(integrator, transfer);
+    let filtered = transfer.is_filtered();
+    let reprojects = integrator.reprojects() || filtered;
+    // Sums for the next step are on a grid of their own, unless they are at corners.
+    let ahead = filtered || (fused && corners.is_none());
+    let grids = 1 + usize::from(reprojects) + usize::from(ahead);
+    let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
+    let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
+    let mut layout = Layout::new(grid, bytes_per_node)?;
+    let points = corners.as_ref().map_or(count, SharedCorners::count);
+    let mut bins = Bins::new(&layout, points);
+    let part = share.map(Part::new);
+    if let Some(part) = &part {
+        admit(part.ranks.count(), &layout, bins.rows())?;
+        bins.share_out(part.ranks.clone());
+        // The first sort tells which rows this process holds.
+        layout.hold(0..1);
+    }
+    let nodes = |is_needed: bool| {
+        reserve(if is_needed { layout.nodes } else { 0 }).ok_or_else(|| SetupError::GridTooLarge {
+            cells: grid.cells.to_vec(),
+            bytes: layout.nodes as u128 * bytes_per_node as u128,
+        })
+    };
+    let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
+    let Particles { mass, volume, .. } = &particles;
+    let least = |numbers: &mut dyn Iterator<Item = T>| {
+        let least = numbers.reduce(|least, number| least.min(number));
+        match &part {
+            Some(part) => part.least(least),
+            None => least.unwrap_or(T::one()),
+        }
+    };
+    let least_mass = least(&mut mass.iter().copied());
+    let density = least(&mut mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume));
+    let mass_of_cell = density * grid.spacing.powi(D as i32);
+    let uniform = particles.uniform();
+    let early = integrator.early() > 0.0;
+    Ok(State {
+        uniform,
+        part,
+        keeps_F_early: early,
+        constants: Constants::new(grid, &layout, &bins, settings.time_step, least_mass),
+        nodes: now,
+        F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
+        internal_early: if early { particles.internal.clone() } else { Vec::new() },
+        reprojected,
+        next,
+        is_ahead: false,
+        filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
+        buffers: BufferPool::new(),
+        corners: corners.map(|corners| {
+            let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
+            Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
+        }),
+        of_time: Vec::new(),
+        shares,
+        particles,
+        domain,
+        law,
+        transfer,
+        layout,
+        bins,
+    })
+}
+
+/// Fills the columns that a law with these internal variables at rest, and affine velocities, ask for.
+fn fill<T: Lanes, const D: usize>(
+    particles: &mut Particles<T, D>,
+    at_rest: &[T],
+    is_affine: bool,
+) -> Result<Shares, SetupError> {
+    let count = particles.x.len();
+    let (found, expected) = (particles.internal.len(), count * at_rest.len());
+    if found == 0 {
+        particles.internal = at_rest.repeat(count);
+    } else if found != expected {
+        return Err(SetupError::LengthMismatch { array: "internal", found, expected });
+    }
+    let shares = Shares { affine: is_affine.into(), internal: at_rest.len(), ..Shares::ONE };
+    particles.affine = Vec::new();
+    particles.fill(&shares);
+    Ok(shares)
+}
+
+/// So many nodes; none where they do not fit into memory, which asking first turns into an error instead of an abort.
+fn reserve<T: Lanes, const D: usize>(count: usize) -> Option<Vec<Node<T, D>>> {
+    let mut nodes = Vec::new();
+    nodes.try_reserve_exact(count).ok()?;
+    nodes.resize(count, Node::zero());
+    Some(nodes)
+}
