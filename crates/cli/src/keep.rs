@@ -62,18 +62,6 @@ pub(crate) struct Part {
     all: usize,
 }
 
-impl Part {
-    /// Both parts of one study.
-    pub(crate) fn and(self, other: &Self) -> Self {
-        Self {
-            own: self.own + other.own,
-            known: self.known + other.known,
-            all: self.all + other.all,
-            ..self
-        }
-    }
-}
-
 impl fmt::Display for Part {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, own, known, all } = self;
@@ -116,6 +104,11 @@ impl Keep {
         let keep = Self(Some(Place { store, common }));
         keep.tell_damage();
         Ok(keep)
+    }
+
+    /// Keeps nothing.
+    pub(crate) fn nowhere() -> Self {
+        Self(None)
     }
 
     /// Which cases are this process's to compute, by their predicted costs, in any unit that is the same on all machines.

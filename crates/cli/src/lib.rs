@@ -12,7 +12,6 @@
 
 mod arguments;
 mod commands;
-mod csv;
 mod expect;
 mod html;
 mod input;
@@ -26,6 +25,8 @@ mod npy;
 mod number;
 mod processes;
 mod progress;
+mod report;
+mod sheets;
 mod svg;
 mod table;
 mod terminal;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use mmsmith_verify::{CheckpointFolder, Ranks, RunTraffic, gather};
 
 use crate::arguments::Command;
@@ -72,8 +72,21 @@ pub(crate) fn is_first() -> bool {
     ranks().is_none_or(|ranks| ranks.rank() == 0)
 }
 
+/// Does `work` with the number of threads asked for.
+pub(crate) fn with_threads<R: Send>(
+    asked: Option<usize>,
+    work: impl FnOnce() -> Result<R> + Send,
+) -> Result<R> {
+    // Zero lets rayon take all cores.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads(asked))
+        .build()
+        .context("--threads: cannot start the threads")?
+        .install(crate::progress::watched_as_here(work))
+}
+
 /// The default number of threads of a process: its part of the cores here. Zero takes all.
-pub(crate) fn threads(said: Option<usize>) -> usize {
+fn threads(said: Option<usize>) -> usize {
     let part = || {
         let here = number(&COUNTS_HERE).unwrap_or(1).max(1);
         (crate::machine::cores() / here).max(1)

@@ -8,13 +8,11 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use mmsmith_measure::Comparison;
-use mmsmith_runtime::{AnySolution, Solution};
 
-use crate::case::{Arithmetic, Case};
-use crate::dimension::in_arithmetic;
+use crate::case::Case;
+use crate::discretized::{Discretized, OnGrid, Plan};
 use crate::drive::Driven;
 use crate::error::CaseError;
-use crate::plan::{Plan, Prepared, plan, prepare};
 use crate::precision::Precision;
 
 /// Number of first steps whose times are kept.
@@ -43,39 +41,18 @@ pub struct Timing {
     pub measure_s: f64,
 }
 
-/// Does at most `most` steps of a case, without measuring errors on the way, and at most until the given moment.
-///
-/// # Errors
-///
-/// [`CaseError`] for settings that cannot be run. A run that the solver gives up is not complete, and no error.
-pub fn time_steps(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    case: &Case,
-    most: u64,
-    until: Option<Instant>,
-) -> Result<Timing, CaseError> {
-    in_arithmetic!(
-        exact,
-        arithmetic,
-        |exact, model| time_in(exact, model, case, most, until),
-        else Err(CaseError::Dimension)
-    )
-}
-
-fn time_in<T: Precision<D>, const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    case: &Case,
+/// As [`Discretized::time_steps`].
+pub(crate) fn time_steps<T: Precision<D>, const D: usize>(
+    on_grid: &OnGrid<'_, T, D>,
     most: u64,
     until: Option<Instant>,
 ) -> Result<Timing, CaseError>
 where
     f64: Precision<D>,
 {
+    let &OnGrid { exact, steps, .. } = on_grid;
     let started = Instant::now();
-    let Prepared { scene, steps, .. } = prepare(exact, case)?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, None)?;
+    let mut driven = Driven::set_up(on_grid, steps.dt, None)?;
     let setup_s = started.elapsed().as_secs_f64();
     let (mut done, mut wall_s, mut cpu_s) = (0, 0.0, 0.0);
     let mut each = Vec::new();
@@ -168,33 +145,27 @@ impl CostModel {
         }
     }
 
-    /// Times a few steps of `case`'s scheme on grids of its own kind up to its size, for at most about `effort`.
+    /// Times a few steps of a case's scheme on grids of its own kind up to its size, for at most about `effort`.
     ///
     /// # Errors
     ///
     /// [`CaseError`] for settings that cannot be run.
-    pub fn calibrate(
-        exact: &AnySolution<f64>,
-        arithmetic: Arithmetic<'_>,
-        case: &Case,
-        effort: Duration,
-    ) -> Result<Self, CaseError> {
+    pub fn calibrate(own: &Discretized<'_>, effort: Duration) -> Result<Self, CaseError> {
         let started = Instant::now();
         let mut model = Self::default();
-        let own = plan(exact, arithmetic, case)?;
         for cells in PROBES {
-            let probe = Case { cells, ..*case };
             // Not every number of cells fits every box.
-            let Ok(size) = plan(exact, arithmetic, &probe) else { continue };
+            let Ok(probe) = own.with(&Case { cells, ..*own.case() }) else { continue };
+            let size = *probe.plan();
             let expected = model.of(&size, LEAST_STEPS).map_or(0.0, |cost| cost.total_s);
             let is_over = started.elapsed().as_secs_f64() + expected > effort.as_secs_f64();
-            if is_over || (size.particles > own.particles && !model.samples.is_empty()) {
+            if is_over || (size.particles > own.plan().particles && !model.samples.is_empty()) {
                 break;
             }
             // Enough for a median without the cold ones; many on small grids, where clocks count.
             let most = (20_000.0 / size.particles.max(1.0)).ceil().clamp(9.0, 50.0) as u64;
             let share = effort / 3;
-            let timing = time_steps(exact, arithmetic, &probe, most, Some(Instant::now() + share))?;
+            let timing = probe.time_steps(most, Some(Instant::now() + share))?;
             if timing.steps > 0 {
                 model.put(Sample {
                     particles: timing.particles as f64,

@@ -12,11 +12,10 @@ use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
-use crate::case::Case;
+use crate::discretized::OnGrid;
 use crate::error::CaseError;
 use crate::interrupt::StepLoop;
 use crate::precision::Precision;
-use crate::scene::Scene;
 use crate::scheme::Scheme;
 use crate::{total, updated};
 
@@ -60,16 +59,15 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
     /// The solver of a case at time zero with steps of `time_step`, whatever its formulation. Where `ranks` simulate it together, all of
     /// them call this.
     pub(crate) fn set_up(
-        exact: &'a dyn Solution<f64, D>,
-        model: &'a dyn Solution<T, D>,
-        case: &Case,
-        scene: &Scene<D>,
+        on_grid: &OnGrid<'a, T, D>,
         time_step: f64,
         ranks: Option<&Arc<dyn Ranks>>,
     ) -> Result<Self, CaseError>
     where
         f64: Precision<D>,
     {
+        let OnGrid { exact, model, case, scene, .. } = on_grid;
+        let (exact, model) = (*exact, *model);
         let time_step: T = Real::nearest(time_step);
         let mut solver: Box<dyn Solver<T, D> + 'a> = match &case.scheme {
             Scheme::Updated(updated) => {

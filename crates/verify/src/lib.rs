@@ -5,11 +5,12 @@
 //! - [`check`] compares the fields of a solution with each other, by finite differences and by the solver's own
 //!   constitutive law, and the declared boundary conditions at sampled boundary points.
 //! - [`coverage()`] measures which terms of the momentum balance a solution exercises.
+//! - A case is put on its grid once, as [`Discretized`], which plans, runs and times it.
 //! - [`run`] simulates one [`Case`] and measures the errors of displacement, velocity, deformation gradient and
 //!   stress; [`converge`] does so for a series of grids or time steps and adds the orders of accuracy.
 //!   A run's [history](Moment) has energies and momentum as well, of the run and of the exact motion.
 //! - [`score()`] measures what another solver wrote to files, in the same norms.
-//! - [`temporal()`] measures the error of time stepping alone, and [`verdicts`] judges orders.
+//! - [`Discretized::differences`] measures the error of time stepping alone, and [`verdicts`] judges orders.
 //! - [`tradeoff()`] measures error against cost over all schemes that fit a solution, and [`CostModel`] predicts what a run takes.
 //! - [`stability()`] finds the largest stable time step of a scheme.
 //! - [`evaluate()`] gives the exact fields at a point.
@@ -25,6 +26,7 @@ mod cost;
 mod coverage;
 mod difference;
 mod dimension;
+mod discretized;
 mod distortion;
 mod drive;
 mod error;
@@ -36,7 +38,6 @@ mod inverse;
 mod inversion;
 mod measurement;
 mod order;
-mod plan;
 mod points;
 mod precision;
 mod record;
@@ -63,8 +64,9 @@ pub use check::{
     body_of, check, has_body,
 };
 pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
-pub use cost::{Cost, CostModel, Timing, time_steps};
+pub use cost::{Cost, CostModel, Timing};
 pub use coverage::{Part, Share, coverage, smallest_set};
+pub use discretized::{Discretized, Plan};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
@@ -79,7 +81,6 @@ pub use mmsmith_mpm::{Integrator, Shape, Transfer};
 pub use mmsmith_ranks::{Ranks, Sent, gather};
 pub use mmsmith_vtk::Provenance;
 pub use order::Order;
-pub use plan::{Plan, plan, round_off};
 pub use record::{Record, TemporalRecord};
 pub use remedy::{Attempt, Remedy, remedy};
 pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
@@ -96,7 +97,7 @@ pub use stability::{
     p_wave_limit, stability,
 };
 pub use study::{Study, StudyError, Sweep, converge, orders_above};
-pub use temporal::{Temporal, TemporalRow, temporal};
+pub use temporal::{Temporal, TemporalRow};
 pub use total::POLAR_ANGLES;
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,

@@ -4,9 +4,9 @@ use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain};
 
 use crate::case::{Arithmetic, Case, CflSpeed};
+use crate::discretized::Discretized;
 use crate::error::CaseError;
-use crate::plan::plan;
-use crate::run::{Outputs, Status, run};
+use crate::run::{Outputs, Status};
 use crate::scheme::{GridPose, Placement, Scheme, Total, Updated};
 use crate::usual_step::{stable_cfl, usual_step};
 
@@ -62,11 +62,15 @@ pub fn remedy(
     for case in itself.into_iter().chain(candidates(exact, stopped)) {
         let case = Case { cells, ..case };
         let is_known = case == *stopped || remedy.attempts.iter().any(|own| own.case == case);
-        if is_known || !is_cheap(exact, arithmetic, &case) {
+        if is_known {
             continue;
         }
+        // A shorter step than that of the case that stopped may take more than it.
+        let is_cheap = |case: &Discretized<'_>| case.plan().work() <= 8.0 * MOST_WORK;
+        let prepared = Discretized::new(exact, arithmetic, &case).ok();
+        let Some(prepared) = prepared.filter(is_cheap) else { continue };
         let mut quiet = |_| {};
-        let row = match run(exact, arithmetic, &case, &mut Outputs::new(&mut quiet)) {
+        let row = match prepared.run(&mut Outputs::new(&mut quiet)) {
             Ok(row) => row,
             Err(interrupted @ CaseError::Interrupted { .. }) => return Err(interrupted),
             Err(_) => continue,
@@ -79,18 +83,12 @@ pub fn remedy(
     Ok(remedy)
 }
 
-/// Whether a case is little work. A shorter step than that of the case that stopped may take more than it.
-fn is_cheap(exact: &AnySolution<f64>, arithmetic: Arithmetic<'_>, case: &Case) -> bool {
-    plan(exact, arithmetic, case)
-        .is_ok_and(|plan| plan.particles * plan.steps as f64 <= 8.0 * MOST_WORK)
-}
-
 /// The largest number of cells, at most that of the case, on which it is little work.
 fn affordable(exact: &AnySolution<f64>, arithmetic: Arithmetic<'_>, case: &Case) -> usize {
     let mut cells = case.cells;
     loop {
-        let work = plan(exact, arithmetic, &Case { cells, ..*case })
-            .map(|plan| plan.particles * plan.steps as f64);
+        let work = Discretized::new(exact, arithmetic, &Case { cells, ..*case })
+            .map(|case| case.plan().work());
         match work {
             Ok(work) if work > MOST_WORK && cells > 4 => cells = (cells / 2).max(4),
             // A count that fits the body, below one that does not.

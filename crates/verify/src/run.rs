@@ -6,23 +6,21 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
-use mmsmith_mpm::StepError;
+use mmsmith_mpm::{Solver, StepError};
 use mmsmith_ranks::{Ranks, Sent, Traffic, counted};
 use mmsmith_runtime::{AnySolution, Solution};
 use serde::{Serialize, Serializer};
 
 use crate::case::{Arithmetic, Case, law};
 use crate::checkpoint::{Checkpoints, Reached, TakenUp};
-use crate::dimension::in_arithmetic;
-use crate::drive::{Driven, Outcome, Stepped};
+use crate::discretized::{Discretized, OnGrid};
+use crate::drive::{Driven, Outcome, Seen, Stepped};
 use crate::error::CaseError;
 use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::history::{Moment, Recorder};
 use crate::measurement::Measurement;
-use crate::plan::{Prepared, Steps, prepare};
 use crate::points;
 use crate::precision::Precision;
-use crate::scene::Scene;
 
 /// How far a run or a study is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -251,43 +249,29 @@ fn is_true(value: &bool) -> bool {
     *value
 }
 
-/// Runs one simulation of `exact` and measures its errors after every step.
-///
-/// The solver starts from the exact positions, velocities and deformation gradients at time zero and is driven
-/// by the body force at the reference positions. `u` is compared as `(x - X) - u(X, t)`, `v` at the time where
-/// the integrator stores it, `F` directly, and `P` as the solver's own law gives it for the particle's `F`.
-/// A run that the solver gives up, or whose particles leave the exact ones by more than the body's size, ends
-/// early with a [`Status`] that says so; it is not an error of this function.
-///
-/// The errors do not depend on the number of threads.
+/// Puts a case on its grid and [runs](Discretized::run) it.
 ///
 /// # Errors
 ///
-/// [`CaseError`] for settings that cannot be run, and for particle files that cannot be written.
+/// [`CaseError`] for settings that cannot be run, and for files that cannot be written.
 pub fn run(
     exact: &AnySolution<f64>,
     arithmetic: Arithmetic<'_>,
     case: &Case,
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError> {
-    in_arithmetic!(
-        exact,
-        arithmetic,
-        |exact, model| run_in(exact, model, case, outputs),
-        else Err(CaseError::Dimension)
-    )
+    Discretized::new(exact, arithmetic, case)?.run(outputs)
 }
 
-fn run_in<T: Precision<D>, const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    case: &Case,
+/// Steps a case to its end, and measures, writes and records on the way.
+pub(crate) fn follow<T: Precision<D>, const D: usize>(
+    on_grid: &OnGrid<'_, T, D>,
     outputs: &mut Outputs<'_>,
 ) -> Result<Row, CaseError>
 where
     f64: Precision<D>,
 {
-    let Prepared { scene, steps, .. } = prepare(exact, case)?;
+    let &OnGrid { exact, steps, .. } = on_grid;
     let mut counters = None;
     let mut of_steps = None;
     if let Some(ranks) = outputs.ranks.take() {
@@ -295,12 +279,18 @@ where
         counters = Some(Counters { stepping: stepping.1, measuring: measuring.1 });
         (of_steps, outputs.ranks) = (Some(stepping.0), Some(measuring.0));
     }
-    let mut driven = Driven::set_up(exact, model, case, &scene, steps.dt, of_steps.as_ref())?;
-    let mut row = follow(&mut driven, exact, case, &scene, steps, outputs, counters.as_ref())?;
+    let mut driven = Driven::set_up(on_grid, steps.dt, of_steps.as_ref())?;
+    let end = steps.count as f64 * driven.dt;
+    let traffic = outputs.traffic.take();
+    let (mut watch, begun) = Watch::begin(on_grid, &mut driven, outputs)?;
+    let before = counters.as_ref().map(|counters| counters.until(begun));
+    let outcome = driven.advance(begun + 1..=steps.count, &mut |stepped| watch.look(stepped))?;
+    if let (Some(traffic), Some(counters), Some(before)) = (traffic, &counters, before) {
+        *traffic = counters.until(watch.reached.step) - before;
+    }
+    let mut row = watch.row(driven.dt, outcome);
     if row.status == Status::Ok {
-        let unit = T::default_epsilon().to_f64() / 2.0;
-        let end = steps.count as f64 * driven.dt;
-        let rounding = Rounding { of_position: unit * scene.reach(), steps: steps.count };
+        let rounding = Rounding { of_position: on_grid.rounding(), steps: steps.count };
         row.status = judged(exact, &row.errors, end, rounding);
     }
     Ok(row)
@@ -369,150 +359,199 @@ fn largest_displacement<const D: usize>(
     .fold(0.0, f64::max)
 }
 
-/// Steps to the end and measures the errors on the way.
-fn follow<T: Precision<D>, const D: usize>(
-    driven: &mut Driven<'_, T, D>,
-    exact: &dyn Solution<f64, D>,
-    case: &Case,
-    scene: &Scene<D>,
-    steps: Steps,
-    outputs: &mut Outputs<'_>,
-    counters: Option<&Counters>,
-) -> Result<Row, CaseError>
+/// Everything that looks on at a run.
+struct Watch<'w, 'a, T: Precision<D>, const D: usize> {
+    on_grid: &'w OnGrid<'a, T, D>,
+    /// Time by which velocities lag behind positions.
+    lag: f64,
+    measurement: Measurement<'a, D>,
+    particles: usize,
+    reached: Reached,
+    progress: &'w mut dyn FnMut(Progress),
+    frames: Option<FrameWriter>,
+    snapshot: Option<&'w mut Snapshot>,
+    recorder: Option<Recorder<'w, D>>,
+    checkpoints: Option<&'w Checkpoints>,
+    ranks: Option<Arc<dyn Ranks>>,
+    until: Option<Instant>,
+}
+
+impl<'w, 'a: 'w, T: Precision<D>, const D: usize> Watch<'w, 'a, T, D>
 where
     f64: Precision<D>,
 {
-    let dt = driven.dt;
-    let ranks = outputs.ranks.clone();
-    let ranks = ranks.as_deref();
-    // What is kept of particles is of those that are here then.
-    let resumed = match outputs.checkpoints.filter(|checkpoints| checkpoints.resume) {
-        Some(checkpoints) => match checkpoints.read(ranks)? {
-            Some(TakenUp { reached, history, parts }) => {
-                driven.take_up(parts).map_err(|cause| checkpoints.refusal(cause))?;
-                Some((reached, history))
-            }
+    /// At the state before the first step, or at the checkpoint that the run goes on from; with the number of steps done.
+    fn begin(
+        on_grid: &'w OnGrid<'a, T, D>,
+        driven: &mut Driven<'_, T, D>,
+        outputs: &'w mut Outputs<'_>,
+    ) -> Result<(Self, u64), CaseError> {
+        let &OnGrid { exact, steps, .. } = on_grid;
+        let Outputs { progress, frames, snapshot, checkpoints, history, ranks, until, .. } =
+            outputs;
+        // What is kept of particles is of those that are here then.
+        let resumed = match checkpoints.filter(|checkpoints| checkpoints.resume) {
+            Some(checkpoints) => take_up(checkpoints, driven, ranks.as_deref())?,
             None => None,
-        },
-        None => None,
-    };
-    let solver = driven.solver.as_mut();
-    let lag = solver.velocity_lag().to_f64();
-    let mut measurement = Measurement::new(exact, solver, outputs.ranks.as_ref());
-    let count = measurement.count(solver);
-    let mut frames = match outputs.frames {
-        Some(output) => {
-            let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
-            Some(FrameWriter::new(output, steps.count, lag, is_first)?)
-        }
-        None => None,
-    };
-    let mut recorder = match &mut outputs.history {
-        Some(moments) => Some(Recorder::new(moments, exact, law(exact.law())?, steps.count)),
-        None => None,
-    };
-    let Reached { step: mut done, mut wall_s, mut cpu_s, mut errors } =
-        if let Some((reached, history)) = resumed {
-            if let Some(recorder) = &mut recorder {
-                recorder.take_up(history);
-            }
-            if let Some(frames) = &mut frames {
-                frames.take_up(reached.step, dt);
-            }
-            reached
-        } else {
-            if let Some(frames) = &mut frames {
-                frames.write(solver.observe(), measurement.held(), exact, (0, 0.0))?;
-            }
-            if let Some(snapshot) = &mut outputs.snapshot {
-                snapshot.take(solver.observe(), measurement.held(), exact, (0, steps.count), 0.0);
-            }
-            let at_start = measurement.errors(solver, 0.0, lag);
-            if let Some(recorder) = &mut recorder {
-                let velocity_time = if case.scheme.starts_early() { -lag } else { 0.0 };
-                let particles = solver.observe().0;
-                recorder.take(
-                    (particles, measurement.homes()),
-                    (0, false),
-                    (0.0, velocity_time),
-                    at_start.u,
-                );
-            }
-            // Before the first step no velocity is stored yet that belongs to a time of the scheme.
-            Reached {
-                step: 0,
-                wall_s: 0.0,
-                cpu_s: 0.0,
-                errors: PerField { v: PerNorm::default(), ..at_start },
-            }
         };
-    let before = counters.map(|counters| counters.until(done));
-    let outcome = driven.advance(done + 1..=steps.count, &mut |stepped| {
-        let Stepped { step, time, solver, wall_s: of_step, cpu_s: cpu_of_step, is_interrupted } =
-            stepped;
-        done = step;
-        wall_s += of_step;
-        cpu_s += cpu_of_step;
-        measurement.follow(solver);
-        let is_interrupted = measurement.any(is_interrupted);
-        let measured = measurement.errors(solver, time, lag);
-        errors = PerField::combine(&errors, &measured, PerNorm::larger);
+        let solver = driven.solver.as_mut();
+        let lag = solver.velocity_lag().to_f64();
+        let measurement = Measurement::new(exact, solver, ranks.as_ref());
+        let is_first = ranks.as_deref().is_none_or(|ranks| ranks.rank() == 0);
+        let frames = match frames {
+            Some(output) => Some(FrameWriter::new(output, steps.count, lag, is_first)?),
+            None => None,
+        };
+        let recorder = match history {
+            Some(moments) => Some(Recorder::new(moments, exact, law(exact.law())?, steps.count)),
+            None => None,
+        };
+        let mut watch = Self {
+            on_grid,
+            lag,
+            particles: measurement.count(solver),
+            measurement,
+            reached: Reached { step: 0, wall_s: 0.0, cpu_s: 0.0, errors: PerField::default() },
+            progress: *progress,
+            frames,
+            snapshot: snapshot.as_deref_mut(),
+            recorder,
+            checkpoints: *checkpoints,
+            ranks: ranks.clone(),
+            until: *until,
+        };
+        match resumed {
+            Some((reached, history)) => watch.resume(reached, history, driven.dt),
+            None => watch.start(driven.solver.as_mut())?,
+        }
+        let begun = watch.reached.step;
+        Ok((watch, begun))
+    }
+
+    fn resume(&mut self, reached: Reached, history: Vec<Moment>, dt: f64) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.take_up(history);
+        }
+        if let Some(frames) = &mut self.frames {
+            frames.take_up(reached.step, dt);
+        }
+        self.reached = reached;
+    }
+
+    fn start(&mut self, solver: &mut (dyn Solver<T, D> + '_)) -> Result<(), CaseError> {
+        self.write(solver, 0, 0.0)?;
+        let at_start = self.measurement.errors(solver, 0.0, self.lag);
+        let starts_early = self.on_grid.case.scheme.starts_early();
+        let velocity_time = if starts_early { -self.lag } else { 0.0 };
+        self.record(solver, (0, false), (0.0, velocity_time), at_start.u);
+        // Before the first step no velocity is stored yet that belongs to a time of the scheme.
+        self.reached.errors = PerField { v: PerNorm::default(), ..at_start };
+        Ok(())
+    }
+
+    /// Writes the particles where their turn has come.
+    fn write(
+        &mut self,
+        solver: &mut (dyn Solver<T, D> + '_),
+        step: u64,
+        time: f64,
+    ) -> Result<(), CaseError> {
+        let &OnGrid { exact, steps, .. } = self.on_grid;
+        if let Some(frames) = &mut self.frames {
+            frames.write(solver.observe(), self.measurement.held(), exact, (step, time))?;
+        }
+        if let Some(snapshot) = &mut self.snapshot {
+            let held = self.measurement.held();
+            snapshot.take(solver.observe(), held, exact, (step, steps.count), time);
+        }
+        Ok(())
+    }
+
+    fn record(
+        &mut self,
+        solver: &mut (dyn Solver<T, D> + '_),
+        step: (u64, bool),
+        times: (f64, f64),
+        u: PerNorm<f64>,
+    ) {
+        if let Some(recorder) = &mut self.recorder {
+            let particles = solver.observe().0;
+            recorder.take((particles, self.measurement.homes()), step, times, u);
+        }
+    }
+
+    /// Looks at the state after a step, and ends a run that says nothing more.
+    fn look(&mut self, stepped: Stepped<'_, T, D>) -> Seen<Status> {
+        let Stepped { step, time, solver, wall_s, cpu_s, is_interrupted } = stepped;
+        let OnGrid { scene, steps, .. } = self.on_grid;
+        self.reached.step = step;
+        self.reached.wall_s += wall_s;
+        self.reached.cpu_s += cpu_s;
+        self.measurement.follow(solver);
+        let is_interrupted = self.measurement.any(is_interrupted);
+        let measured = self.measurement.errors(solver, time, self.lag);
+        self.reached.errors = PerField::combine(&self.reached.errors, &measured, PerNorm::larger);
         let error = measured.u.linf;
         let mut end = (error > scene.size || error.is_nan()).then(|| {
-            let particle = measurement.worst_particle(solver, time);
+            let particle = self.measurement.worst_particle(solver, time);
             Status::Unstable { step, time, particle, error, size: scene.size }
         });
-        if let Some(frames) = &mut frames {
-            frames.write(solver.observe(), measurement.held(), exact, (step, time))?;
-        }
-        if let Some(snapshot) = &mut outputs.snapshot {
-            snapshot.take(solver.observe(), measurement.held(), exact, (step, steps.count), time);
-        }
+        self.write(solver, step, time)?;
         let share = step as f64 / steps.count as f64;
-        (outputs.progress)(Progress { case: 0, step, steps: steps.count, share });
-        let late = step < steps.count && outputs.until.is_some_and(|until| Instant::now() >= until);
+        (self.progress)(Progress { case: 0, step, steps: steps.count, share });
+        let late = step < steps.count && self.until.is_some_and(|until| Instant::now() >= until);
         if late && end.is_none() {
             end = Some(Status::Cut { step, time });
         }
-        if let Some(recorder) = &mut recorder {
-            let particles = solver.observe().0;
-            let at = (time, time - lag);
-            recorder.take((particles, measurement.homes()), (step, end.is_some()), at, measured.u);
-        }
+        self.record(solver, (step, end.is_some()), (time, time - self.lag), measured.u);
         if let Some(end) = end {
             return Ok(ControlFlow::Break(end));
         }
-        if let Some(checkpoints) = outputs.checkpoints
+        if let Some(checkpoints) = self.checkpoints
             && (step % checkpoints.every == 0 || is_interrupted)
         {
-            let history = recorder.as_ref().map_or(&[][..], Recorder::moments);
-            let reached = Reached { step, wall_s, cpu_s, errors };
-            checkpoints.write(ranks, &reached, history, &solver.state())?;
+            let history = self.recorder.as_ref().map_or(&[][..], Recorder::moments);
+            checkpoints.write(self.ranks.as_deref(), &self.reached, history, &solver.state())?;
         }
         Ok(ControlFlow::Continue(()))
-    })?;
-    if let (Some(traffic), Some(counters), Some(before)) = (&mut outputs.traffic, counters, before)
-    {
-        **traffic = counters.until(done) - before;
     }
-    let status = match outcome {
-        Outcome::Done => Status::Ok,
-        Outcome::Stopped(error) => Status::Stopped(error),
-        Outcome::Left(status) => status,
+
+    /// The row of the run, which has ended.
+    fn row(&self, dt: f64, outcome: Outcome<Status>) -> Row {
+        let Reached { step, wall_s, cpu_s, errors } = self.reached;
+        let status = match outcome {
+            Outcome::Done => Status::Ok,
+            Outcome::Stopped(error) => Status::Stopped(error),
+            Outcome::Left(status) => status,
+        };
+        let particle_steps = self.particles as f64 * step as f64;
+        let OnGrid { case, scene, steps, .. } = self.on_grid;
+        Row {
+            cells: case.cells,
+            h: scene.spacing,
+            dt,
+            cfl: steps.cfl,
+            steps: steps.count,
+            particles: self.particles,
+            wall_s,
+            cpu_s,
+            particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
+            timed_alone: true,
+            status,
+            errors,
+        }
+    }
+}
+
+/// Goes on from the last checkpoint, if there is one.
+fn take_up<T: Precision<D>, const D: usize>(
+    checkpoints: &Checkpoints,
+    driven: &mut Driven<'_, T, D>,
+    ranks: Option<&dyn Ranks>,
+) -> Result<Option<(Reached, Vec<Moment>)>, CaseError> {
+    let Some(TakenUp { reached, history, parts }) = checkpoints.read(ranks)? else {
+        return Ok(None);
     };
-    let particle_steps = count as f64 * done as f64;
-    Ok(Row {
-        cells: case.cells,
-        h: scene.spacing,
-        dt,
-        cfl: steps.cfl,
-        steps: steps.count,
-        particles: count,
-        wall_s,
-        cpu_s,
-        particle_steps_per_s: if wall_s > 0.0 { particle_steps / wall_s } else { 0.0 },
-        timed_alone: true,
-        status,
-        errors,
-    })
+    driven.take_up(parts).map_err(|cause| checkpoints.refusal(cause))?;
+    Ok(Some((reached, history)))
 }

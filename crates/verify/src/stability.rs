@@ -19,15 +19,14 @@
 use std::ops::ControlFlow;
 
 use mmsmith_mpm::{Law, Particles, StepError};
-use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_runtime::{Real, Solution};
 use serde::{Deserialize, Serialize};
 
-use crate::case::{Arithmetic, Case, CflSpeed, law};
-use crate::dimension::{in_arithmetic, in_dimension};
+use crate::case::{Arithmetic, CflSpeed, law};
+use crate::discretized::{Discretized, OnGrid, Simulate, steps_to};
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
 use crate::history::Totals;
-use crate::plan::{Prepared, plan, prepare, steps_to};
 use crate::precision::Precision;
 use crate::scene::Scene;
 
@@ -202,7 +201,7 @@ const FLOOR: f64 = 100.0;
 /// Times within a period at which the exact motion's energy is looked at for its largest.
 const MOMENTS: usize = 16;
 
-/// Looks for the largest stable CFL number of `case` by bisection; its own CFL number does not matter.
+/// Looks for the largest stable CFL number of a case by bisection; its own CFL number does not matter.
 ///
 /// `progress` is told of each run before it begins.
 ///
@@ -210,14 +209,13 @@ const MOMENTS: usize = 16;
 ///
 /// [`CaseError`] for settings that cannot be run.
 pub fn stability(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    case: &Case,
+    case: &Discretized<'_>,
     search: &Search,
     progress: &mut dyn FnMut(SearchProgress),
 ) -> Result<StabilityRow, CaseError> {
+    let arithmetic = case.arithmetic();
     search.validate(arithmetic)?;
-    let bench = Bench::new(exact, arithmetic, case)?;
+    let bench = case.bench()?;
     let mut runs = 0;
     let reference = bench.reference()?;
     let limits = bench.limits(&search.criteria, &reference);
@@ -231,7 +229,7 @@ pub fn stability(
         progress(SearchProgress { run: runs, share });
         bench.run(cfl, Some(&limits))
     };
-    let unit = bench.p_wave_limit;
+    let unit = bench.scales.p_wave_limit;
     let mut stable: Option<Observed> = None;
     let mut unstable: Option<Observed> = None;
     let start = search.lower.unwrap_or(REFERENCE * unit);
@@ -290,20 +288,15 @@ pub fn stability(
     })
 }
 
-/// One run of `case` at its own CFL number, held against the reference run.
+/// One run of a case at its own CFL number, held against the reference run.
 ///
 /// # Errors
 ///
 /// [`CaseError`] for settings that cannot be run.
-pub fn is_stable(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    case: &Case,
-    criteria: &Criteria,
-) -> Result<Observed, CaseError> {
-    let bench = Bench::new(exact, arithmetic, case)?;
+pub fn is_stable(case: &Discretized<'_>, criteria: &Criteria) -> Result<Observed, CaseError> {
+    let bench = case.bench()?;
     let limits = bench.limits(criteria, &bench.reference()?);
-    bench.run(case.cfl, Some(&limits))
+    bench.run(case.case().cfl, Some(&limits))
 }
 
 /// The CFL number at which P-waves in the undeformed solid cross one cell in one step.
@@ -311,25 +304,47 @@ pub fn is_stable(
 /// # Errors
 ///
 /// [`CaseError`] for settings that cannot be run.
-pub fn p_wave_limit(exact: &AnySolution<f64>, case: &Case) -> Result<f64, CaseError> {
-    Ok(Bench::new(exact, Arithmetic::Double, case)?.p_wave_limit)
+pub fn p_wave_limit(case: &Discretized<'_>) -> Result<f64, CaseError> {
+    Ok(case.bench()?.scales.p_wave_limit)
 }
 
 /// A case without its CFL number.
-struct Bench<'a> {
-    exact: &'a AnySolution<f64>,
-    arithmetic: Arithmetic<'a>,
-    case: Case,
+pub(crate) struct Bench<'a> {
+    on_grid: &'a dyn Simulate,
+    scales: Scales,
+}
+
+/// The scales of runs of a case, whatever their CFL number.
+#[derive(Clone, Copy)]
+pub(crate) struct Scales {
     /// The CFL number at which that of P-waves is one.
     p_wave_limit: f64,
-    /// The length of a run.
+    /// The length of a run that instabilities have time to grow in.
     end: f64,
+    period: f64,
     /// The error of `u` that rounding may cause.
     floor: f64,
 }
 
+/// The scales of a case on its grid.
+pub(crate) fn scales<T: Precision<D>, const D: usize>(
+    on_grid: &OnGrid<'_, T, D>,
+) -> Result<Scales, CaseError>
+where
+    f64: Precision<D>,
+{
+    let &OnGrid { exact, waves, .. } = on_grid;
+    let steps = on_grid.steps_at(0.5)?.count as f64;
+    Ok(Scales {
+        p_wave_limit: waves.speed / CflSpeed::PWave.of(exact)?,
+        end: on_grid.end.max(waves.time_step(LEAST_CELLS)),
+        period: exact.period(),
+        floor: FLOOR * (on_grid.rounding() * steps.sqrt()),
+    })
+}
+
 /// Limits that a run is held against.
-struct Limits {
+pub(crate) struct Limits {
     error: f64,
     energy_rate: f64,
     /// The reference run's largest difference of energy.
@@ -341,31 +356,16 @@ struct Limits {
 }
 
 impl<'a> Bench<'a> {
-    fn new(
-        exact: &'a AnySolution<f64>,
-        arithmetic: Arithmetic<'a>,
-        case: &Case,
-    ) -> Result<Self, CaseError> {
-        let usual = Case { cfl: 0.5, ..*case };
-        let plan = plan(exact, arithmetic, &usual)?;
-        let scales = in_dimension!(exact, |s| scales(s, &usual), else Err(CaseError::Dimension));
-        let (p_wave_limit, end) = scales?;
-        Ok(Self {
-            exact,
-            arithmetic,
-            case: *case,
-            p_wave_limit,
-            end,
-            floor: FLOOR * plan.round_off,
-        })
+    pub(crate) fn new(on_grid: &'a dyn Simulate) -> Result<Self, CaseError> {
+        Ok(Self { on_grid, scales: on_grid.scales()? })
     }
 
     /// The run that errors are compared with; its time step is halved until it is through.
     fn reference(&self) -> Result<Observed, CaseError> {
-        let mut cfl = REFERENCE * self.p_wave_limit;
+        let mut cfl = REFERENCE * self.scales.p_wave_limit;
         loop {
             let found = self.run(cfl, None)?;
-            if found.failure.is_none() || cfl < REFERENCE / 8.0 * self.p_wave_limit {
+            if found.failure.is_none() || cfl < REFERENCE / 8.0 * self.scales.p_wave_limit {
                 return Ok(found);
             }
             cfl /= 2.0;
@@ -374,61 +374,43 @@ impl<'a> Bench<'a> {
 
     fn limits(&self, criteria: &Criteria, reference: &Observed) -> Limits {
         let error = criteria.error_multiple * reference.error.unwrap_or(f64::NAN);
-        let period = in_dimension!(self.exact, |s| s.period(), else self.end);
         Limits {
             // Without a reference no error is too large.
             error: if error.is_nan() || reference.failure.is_some() {
                 f64::INFINITY
             } else {
-                error.max(self.floor)
+                error.max(self.scales.floor)
             },
             energy_rate: criteria.energy_rate,
             energy_drift: reference.energy_drift.unwrap_or(0.0),
-            period,
-            strain_floor: self.floor,
+            period: self.scales.period,
+            strain_floor: self.scales.floor,
         }
     }
 
     fn run(&self, cfl: f64, limits: Option<&Limits>) -> Result<Observed, CaseError> {
-        let case = Case { cfl, ..self.case };
-        in_arithmetic!(
-            self.exact,
-            self.arithmetic,
-            |exact, model| run_in(exact, model, &case, self.end, limits),
-            else Err(CaseError::Dimension)
-        )
+        self.on_grid.observe(cfl, self.scales.end, limits)
     }
 }
 
-/// The CFL number at which that of P-waves is one, and the length of a run.
-fn scales<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    case: &Case,
-) -> Result<(f64, f64), CaseError>
-where
-    f64: Precision<D>,
-{
-    let Prepared { waves, end, .. } = prepare(exact, case)?;
-    let unit = waves.speed / CflSpeed::PWave.of(exact)?;
-    Ok((unit, end.max(waves.time_step(LEAST_CELLS))))
-}
-
-fn run_in<T: Precision<D>, const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    case: &Case,
+/// One run of a case at another CFL number until `end`, held against limits where there are some.
+pub(crate) fn observe<T: Precision<D>, const D: usize>(
+    on_grid: &OnGrid<'_, T, D>,
+    cfl: f64,
     end: f64,
     limits: Option<&Limits>,
 ) -> Result<Observed, CaseError>
 where
     f64: Precision<D>,
 {
-    let Prepared { scene, waves, .. } = prepare(exact, case)?;
-    let time_step = waves.time_step(case.cfl);
+    // Not that of any other step: such a CFL number is refused.
+    on_grid.steps_at(cfl)?;
+    let time_step = on_grid.waves.time_step(cfl);
     // In the solver's precision, which is what it steps with.
     let count = steps_to(end, <T as Real>::nearest(time_step).to_f64())?;
-    let mut driven = Driven::set_up(exact, model, case, &scene, time_step, None)?;
-    Run { exact, scene: &scene, cfl: case.cfl, count, limits }.follow(&mut driven)
+    let mut driven = Driven::set_up(on_grid, time_step, None)?;
+    let &OnGrid { exact, ref scene, .. } = on_grid;
+    Run { exact, scene, cfl, count, limits }.follow(&mut driven)
 }
 
 /// One run.
@@ -564,6 +546,7 @@ impl From<&StepError> for Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::case::Case;
 
     fn search(width: f64) -> Search {
         Search { lower: None, upper: None, width, criteria: Criteria::default() }
@@ -608,7 +591,8 @@ mod tests {
         let case = Case { cells: 4, ..Case::default() };
         let mut told: Vec<SearchProgress> = Vec::new();
         let show = &mut |progress| told.push(progress);
-        let found = stability(&exact, Arithmetic::Double, &case, &search(0.05), show).unwrap();
+        let case = Discretized::new(&exact, Arithmetic::Double, &case).unwrap();
+        let found = stability(&case, &search(0.05), show).unwrap();
         assert!(told.windows(2).all(|pair| pair[0].share <= pair[1].share), "{told:?}");
         assert!(told.iter().zip(1..).all(|(progress, run)| progress.run == run));
         assert!(told.iter().all(|progress| (0.0..1.0).contains(&progress.share)));

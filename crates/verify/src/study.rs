@@ -6,10 +6,10 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::{Arithmetic, Case};
+use crate::discretized::Discretized;
 use crate::error::CaseError;
 use crate::order::Order;
-use crate::plan::plan;
-use crate::run::{Outputs, Progress, Row, Status, run};
+use crate::run::{Outputs, Progress, Row, Status};
 
 /// The setting that changes from row to row.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +49,36 @@ impl Study {
     }
 }
 
+impl Study {
+    /// Runs the cases of `sweep`, in its order, and derives the orders of accuracy in every field and norm.
+    ///
+    /// `progress` is called after every step.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError`] for the first case that cannot be run.
+    pub fn measure(
+        cases: &[Discretized<'_>],
+        sweep: &Sweep,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Self, StudyError> {
+        let total: f64 = cases.iter().map(|case| case.plan().work()).sum();
+        let mut before = 0.0;
+        let mut rows = Vec::with_capacity(cases.len());
+        for (index, case) in cases.iter().enumerate() {
+            let work = case.plan().work();
+            let mut report = |done: Progress| {
+                let share = (before + done.share * work) / total;
+                progress(Progress { case: index, share, ..done });
+            };
+            let row = case.run(&mut Outputs::new(&mut report));
+            rows.push(row.map_err(|cause| StudyError { index, cause })?);
+            before += work;
+        }
+        Ok(Self::new(rows, sweep))
+    }
+}
+
 /// A case of a study could not be run.
 // The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
 #[derive(Debug, Error)]
@@ -60,13 +90,11 @@ pub struct StudyError {
     pub cause: CaseError,
 }
 
-/// Runs every case of `sweep` and derives the orders of accuracy in every field and norm.
-///
-/// `progress` is called after every step.
+/// Puts every case of `sweep` on its grid, before the first run, and [measures](Study::measure) them.
 ///
 /// # Errors
 ///
-/// [`StudyError`] for the first case that cannot be run; all of them are judged before the first run.
+/// [`StudyError`] for the first case that cannot be run.
 pub fn converge(
     exact: &AnySolution<f64>,
     arithmetic: Arithmetic<'_>,
@@ -74,25 +102,12 @@ pub fn converge(
     sweep: &Sweep,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Study, StudyError> {
+    let prepare = |(index, case)| {
+        Discretized::new(exact, arithmetic, case).map_err(|cause| StudyError { index, cause })
+    };
     let cases = sweep.cases(base);
-    let fail = |index| move |cause| StudyError { index, cause };
-    let mut work = Vec::with_capacity(cases.len());
-    for (index, case) in cases.iter().enumerate() {
-        let plan = plan(exact, arithmetic, case).map_err(fail(index))?;
-        work.push(plan.steps as f64 * plan.particles);
-    }
-    let total: f64 = work.iter().sum();
-    let mut rows = Vec::with_capacity(cases.len());
-    for (index, case) in cases.iter().enumerate() {
-        let before: f64 = work[..index].iter().sum();
-        let mut report = |done: Progress| {
-            let share = (before + done.share * work[index]) / total;
-            progress(Progress { case: index, share, ..done });
-        };
-        let mut outputs = Outputs::new(&mut report);
-        rows.push(run(exact, arithmetic, case, &mut outputs).map_err(fail(index))?);
-    }
-    Ok(Study::new(rows, sweep))
+    let cases = cases.iter().enumerate().map(prepare).collect::<Result<Vec<_>, _>>()?;
+    Study::measure(&cases, sweep, progress)
 }
 
 /// The orders over the rows of a sweep.

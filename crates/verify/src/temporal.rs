@@ -11,19 +11,16 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use mmsmith_measure::norms::{PerField, PerNorm, Tallies, is_squarable, magnitude, scale_of};
-use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_runtime::Real;
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
-use crate::case::{Arithmetic, Case};
-use crate::dimension::in_arithmetic;
+use crate::discretized::OnGrid;
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::{CaseError, MOST_STEPS};
 use crate::order::Order;
-use crate::plan::{Prepared, prepare};
 use crate::precision::Precision;
 use crate::run::{Progress, Status};
-use crate::scene::Scene;
 use crate::study::{StudyError, orders_of};
 
 /// The runs are compared at this many times, evenly spread, the last one the end.
@@ -74,44 +71,20 @@ pub struct TemporalRow {
     pub differences: PerField<PerNorm<f64>>,
 }
 
-/// Compares, for every CFL number, the run of `base` with the one of half the time step.
-///
-/// A CFL number is lowered until its steps divide the run into five equal parts, at whose ends the runs are
-/// compared. `progress` is called after every step.
-///
-/// # Errors
-///
-/// [`StudyError`] for the first CFL number that cannot be run; a run that fails on the way is a row with its status.
-pub fn temporal(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    base: &Case,
-    cfls: &[f64],
-    progress: &mut dyn FnMut(Progress),
-) -> Result<Temporal, StudyError> {
-    in_arithmetic!(
-        exact,
-        arithmetic,
-        |exact, model| over(exact, model, base, cfls, progress),
-        else Err(StudyError { index: 0, cause: CaseError::Dimension })
-    )
-}
-
-fn over<T: Precision<D>, const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    base: &Case,
+/// As [`Discretized::differences`](crate::Discretized::differences).
+pub(crate) fn over<T: Precision<D>, const D: usize>(
+    on_grid: &OnGrid<'_, T, D>,
     cfls: &[f64],
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Temporal, StudyError>
 where
     f64: Precision<D>,
 {
-    let end = base.periods * exact.period();
+    let &OnGrid { end, waves, .. } = on_grid;
     let mut counts = Vec::with_capacity(cfls.len());
     for (index, &cfl) in cfls.iter().enumerate() {
         let fail = |cause| StudyError { index, cause };
-        let steps = prepare(exact, &Case { cfl, ..*base }).map_err(fail)?.steps;
+        let steps = on_grid.steps_at(cfl).map_err(fail)?;
         let count = steps.count.div_ceil(INSTANTS) * INSTANTS;
         if 2.0 * count as f64 > MOST_STEPS {
             let (dt, steps) = (end / (2 * count) as f64, 2.0 * count as f64);
@@ -119,8 +92,6 @@ where
         }
         counts.push(count);
     }
-    let fail = |cause| StudyError { index: 0, cause };
-    let Prepared { scene, waves, .. } = prepare(exact, base).map_err(fail)?;
     // Halves of one row are often the whole of the next.
     let mut runs = BTreeMap::new();
     for (index, &count) in counts.iter().enumerate() {
@@ -135,8 +106,8 @@ where
             let share = (before + step) as f64 / total as f64;
             progress(Progress { case: index, step, steps: count, share });
         };
-        let set_up = Driven::set_up(exact, model, base, &scene, end / count as f64, None);
-        let run = set_up.and_then(|driven| observe(driven, exact, &scene, count, &mut report));
+        let set_up = Driven::set_up(on_grid, end / count as f64, None);
+        let run = set_up.and_then(|driven| observe(driven, on_grid, count, &mut report));
         states.insert(count, run.map_err(|cause| StudyError { index, cause })?);
         before += count;
     }
@@ -148,8 +119,8 @@ where
         };
         let cfl = waves.cfl(dt);
         TemporalRow {
-            cells: base.cells,
-            h: scene.spacing,
+            cells: on_grid.case.cells,
+            h: on_grid.scene.spacing,
             dt,
             cfl,
             steps: count,
@@ -172,11 +143,11 @@ struct State<const D: usize> {
 /// The states at the common times of a run with `count` steps, or how it failed.
 fn observe<T: Precision<D>, const D: usize>(
     mut driven: Driven<'_, T, D>,
-    exact: &dyn Solution<f64, D>,
-    scene: &Scene<D>,
+    on_grid: &OnGrid<'_, T, D>,
     count: u64,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Result<Vec<State<D>>, Status>, CaseError> {
+    let OnGrid { exact, scene, .. } = on_grid;
     let lags = driven.solver.velocity_lag() > T::zero();
     let mut states: Vec<State<D>> = Vec::new();
     // One step more than the run has: the last velocity at a full step needs it.

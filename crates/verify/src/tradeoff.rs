@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 
 use crate::case::Case;
 use crate::cost::{Cost, CostModel};
-use crate::plan::Plan;
+use crate::discretized::Plan;
 use crate::run::{Row, Status};
 use crate::scheme::{Placement, Scheme, Stepping, Total, Updated};
 

@@ -12,9 +12,9 @@ use mmsmith_mpm::fault::{self, Fault};
 use mmsmith_mpm::{Body, Grid, Material, NoBodyForce, Particles, Settings, Simulation};
 use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_verify::{
-    Arithmetic, Case, CflSpeed, Composition, Coordinates, Integrator, Layout, ORDER_TOLERANCE,
-    Placement, Scheme, Shape, Start, Status, Stepping, Study, Sweep, Total, Transfer, Updated,
-    check, converge, expected_in_space, expected_in_time, temporal, verdicts,
+    Arithmetic, Case, CflSpeed, Composition, Coordinates, Discretized, Integrator, Layout,
+    ORDER_TOLERANCE, Placement, Scheme, Shape, Start, Status, Stepping, Study, Sweep, Total,
+    Transfer, Updated, check, converge, expected_in_space, expected_in_time, verdicts,
 };
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -686,8 +686,11 @@ fn order_in_time(fault: Option<Fault>) -> Vec<String> {
         let scheme = Updated { stepping, ..Updated::default() };
         let case = Case { scheme: Scheme::Updated(scheme), cells: 16, ..Case::default() };
         let cfls = [0.4, 0.2, 0.1];
-        let study = with(fault, || temporal(&exact, Arithmetic::Double, &case, &cfls, &mut |_| ()))
-            .unwrap();
+        let measure = || {
+            let case = Discretized::new(&exact, Arithmetic::Double, &case)?;
+            case.differences(&cfls, &mut |_| ()).map_err(|error| error.cause)
+        };
+        let study = with(fault, measure).unwrap();
         let steps: Vec<f64> = study.rows.iter().map(|row| row.dt).collect();
         let ok =
             study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.differences));

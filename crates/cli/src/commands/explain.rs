@@ -12,9 +12,9 @@ use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
-use super::scheme::Settled;
-use super::{Model, blind, predict};
-use crate::arguments::{ExplainOptions, Precision, SchemeOptions};
+use super::problem::Problem;
+use super::{blind, predict};
+use crate::arguments::{ExplainOptions, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
 use crate::table::Table;
@@ -29,13 +29,12 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let exercises = exercises(&options.name)?;
     let degree = fields.polynomial_degree(MOST_COMMON_DEGREE);
     let cost = BodyForceCost::of(&spec, fields);
-    let selection = Selection::new(&options.name, &[])?;
-    let model = Model::new(&selection, Precision::F64)?;
-    let settled = Settled::settle(&SchemeOptions::open(), &model.exact)?;
-    let predicted = predict::on_grids(&model, &settled.case).map_err(|error| error.to_string());
+    let problem = Problem::new(Selection::new(&options.name, &[])?, &SchemeOptions::open())?;
+    let Problem { selection, model, settled } = &problem;
+    let predicted = predict::on_grids(model, &settled.case).map_err(|error| error.to_string());
     let words = settled.choice();
-    let blind = blind::measure(&selection)?;
-    let deformation = Deformation::of(&options.name, &model, &settled)?;
+    let blind = blind::measure(selection)?;
+    let deformation = Deformation::of(&options.name, model, settled)?;
     let told = deformation.as_ref().map(Deformation::text).unwrap_or_default();
     terminal::say(
         &(text(&spec, &exercises, &blind, &cost)
@@ -44,7 +43,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
             + &runs(&predicted, &words)),
     )?;
     let compared = match options.compare {
-        true => Some(Comparison::measure(&model)?),
+        true => Some(Comparison::measure(model)?),
         false => None,
     };
     if let Some(compared) = &compared {

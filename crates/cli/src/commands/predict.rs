@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use mmsmith_verify::{Case, Cost, CostModel, Plan, plan};
+use mmsmith_verify::{Case, CaseError, Cost, CostModel, Discretized, Plan};
 
-use super::Model;
+use super::problem::Model;
 
 /// Cell counts that `mms explain` tells of.
 pub(super) const GRIDS: [usize; 4] = [32, 64, 128, 256];
@@ -18,47 +18,41 @@ const BRIEF: Duration = Duration::from_millis(1500);
 
 /// The seconds that each of `cases`, of one scheme, will take; none for work so little that it is not worth calibrating for,
 /// and where nothing could be measured.
-pub(super) fn seconds(model: &Model, cases: &[Case]) -> Option<Vec<f64>> {
-    let plans: Option<Vec<Plan>> =
-        cases.iter().map(|case| plan(&model.exact, model.arithmetic(), case).ok()).collect();
-    let plans = plans?;
-    let work = |plan: &Plan| plan.steps as f64 * plan.particles;
-    let all: f64 = plans.iter().map(work).sum();
+pub(super) fn seconds(cases: &[Discretized<'_>]) -> Option<Vec<f64>> {
+    let all: f64 = cases.iter().map(|case| case.plan().work()).sum();
     if all < LITTLE_WORK {
         return None;
     }
-    let largest = plans.iter().zip(cases).max_by(|a, b| a.0.particles.total_cmp(&b.0.particles))?.1;
+    let largest = cases.iter().max_by(|a, b| a.plan().particles.total_cmp(&b.plan().particles))?;
     let effort = Duration::from_secs_f64((EFFORT * all).clamp(EFFORTS.0, EFFORTS.1));
-    let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), largest, effort).ok()?;
-    plans.iter().map(|plan| Some(learnt.predict(plan)?.total_s)).collect()
+    let learnt = CostModel::calibrate(largest, effort).ok()?;
+    cases.iter().map(|case| Some(learnt.predict(case.plan())?.total_s)).collect()
 }
 
 /// Cost model from a few steps of a case's scheme, on grids up to its own.
-pub(super) fn learn(model: &Model, case: &Case) -> Result<CostModel, mmsmith_verify::CaseError> {
-    CostModel::calibrate(&model.exact, model.arithmetic(), case, BRIEF)
+pub(super) fn learn(case: &Discretized<'_>) -> Result<CostModel, CaseError> {
+    CostModel::calibrate(case, BRIEF)
 }
 
 /// Costs of the scheme of `base` on some grids; grids that do not fit the solution are left out.
-pub(super) fn on_grids(
-    model: &Model,
-    base: &Case,
-) -> Result<Vec<(usize, Plan, Cost)>, mmsmith_verify::CaseError> {
-    let at = |cells| Case { cells, ..*base };
-    let mut fitting: Vec<(usize, Plan)> = Vec::new();
+pub(super) fn on_grids(model: &Model, base: &Case) -> Result<Vec<(usize, Plan, Cost)>, CaseError> {
+    let mut fitting: Vec<Discretized<'_>> = Vec::new();
     let mut refused = None;
     for cells in GRIDS {
-        match plan(&model.exact, model.arithmetic(), &at(cells)) {
-            Ok(plan) => fitting.push((cells, plan)),
+        match model.discretized(&Case { cells, ..*base }) {
+            Ok(case) => fitting.push(case),
             Err(error) => refused = Some(error),
         }
     }
     if let (true, Some(error)) = (fitting.is_empty(), refused) {
         return Err(error);
     }
-    let Some(&(finest, _)) = fitting.last() else { return Ok(Vec::new()) };
-    let learnt = learn(model, &at(finest))?;
-    let row = |(cells, plan): (usize, Plan)| Some((cells, plan, learnt.predict(&plan)?));
-    Ok(fitting.into_iter().filter_map(row).collect())
+    let Some(finest) = fitting.last() else { return Ok(Vec::new()) };
+    let learnt = learn(finest)?;
+    let row = |case: &Discretized<'_>| {
+        Some((case.case().cells, *case.plan(), learnt.predict(case.plan())?))
+    };
+    Ok(fitting.iter().filter_map(row).collect())
 }
 
 /// A time for people.

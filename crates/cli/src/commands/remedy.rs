@@ -7,7 +7,7 @@ use mmsmith_verify::{
 };
 use serde_json::{Value, json};
 
-use super::Model;
+use super::problem::Model;
 use crate::arguments::{Precision, SchemeOptions, word};
 use crate::progress::Bar;
 use crate::{number, processes, table};

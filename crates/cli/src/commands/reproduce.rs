@@ -12,27 +12,28 @@ mod section;
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
     Case, CostModel, Expected, Field, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Shape,
-    Start, Status, StepError, Stepping, Study, Sweep, Temporal, converge as measure,
-    expected_in_space, expected_in_time, plan, run as simulate,
+    Start, Status, StepError, Stepping, Study, Sweep, Temporal, expected_in_space,
+    expected_in_time,
 };
-use serde_json::json;
 
 use super::converge::{
-    Verdicts, difference_curve, difference_tables, differences, document, judge, judge_differences,
-    tables, temporal_document, verdict_table,
+    Verdicts, difference_curve, difference_tables, judge, judge_differences, results as of_study,
+    tables, temporal_results, verdict_table,
 };
-use super::scheme::{Settled, usual};
-use super::{Model, settings, with_threads};
+use super::problem::{Model, Problem, extent};
+use super::scheme::usual;
 use crate::arguments::{Precision, ReproduceOptions};
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
+use crate::processes::with_threads;
 use crate::progress::{Agenda, Bar};
+use crate::report::{Files, Form, Report, Section as Part};
 use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
-use crate::{csv, number, terminal};
+use crate::{number, sheets, terminal};
 
 /// The study's problems, by name.
 const PROBLEMS: [&str; 2] = ["axis-aligned", "ring"];
@@ -177,17 +178,17 @@ impl Pace {
         /// Spent on the steps.
         const EFFORT: Duration = Duration::from_millis(100);
         let model = Model::new(&studied(problem, &[])?, Precision::F64)?;
-        let usual = usual(Shape::Gimp, CD, GRID);
+        let usual = model.discretized(&usual(Shape::Gimp, CD, GRID));
         // Only the bar depends on it.
-        let learnt = CostModel::calibrate(&model.exact, model.arithmetic(), &usual, EFFORT).ok();
+        let learnt = usual.and_then(|usual| CostModel::calibrate(&usual, EFFORT)).ok();
         Ok(Self { model, learnt })
     }
 
     /// The seconds that cases will take; what nobody can tell counts as nothing.
     fn seconds(&self, cases: &[Case]) -> f64 {
         let one = |case| {
-            let plan = plan(&self.model.exact, self.model.arithmetic(), case).ok()?;
-            Some(self.learnt.as_ref()?.predict(&plan)?.total_s)
+            let case = self.model.discretized(case).ok()?;
+            Some(self.learnt.as_ref()?.predict(case.plan())?.total_s)
         };
         cases.iter().filter_map(one).sum()
     }
@@ -236,11 +237,10 @@ fn total_seconds(paces: &[Pace], budget: f64) -> f64 {
 /// The differences of the first problem at a small amplitude on a fine grid.
 fn gentle_differences(folder: &Path, pace: &Pace, agenda: &Agenda) -> Result<Vec<Differences>> {
     let selection = studied(PROBLEMS[0], &[("A", GENTLE)])?;
-    let model = Model::new(&selection, Precision::F64)?;
     let all = DIFFERENCES.map(|scheme| {
         let bar = agenda.next(difference_seconds(pace, scheme, GENTLE_GRID, &GENTLE_CFLS));
         let ladder = TimeLadder { kind: "gentle", cells: GENTLE_GRID, cfls: &GENTLE_CFLS };
-        measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
+        measure_differences(&selection, scheme, &ladder, folder, &bar)
     });
     all.into_iter().collect()
 }
@@ -256,7 +256,6 @@ struct TimeLadder<'a> {
 /// Measures the differences of a scheme on one grid and writes them into `folder`.
 fn measure_differences(
     selection: &Selection,
-    model: &Model,
     scheme: (Shape, Stepping),
     ladder: &TimeLadder<'_>,
     folder: &Path,
@@ -264,20 +263,67 @@ fn measure_differences(
 ) -> Result<Differences> {
     let &TimeLadder { kind, cells, cfls } = ladder;
     let base = usual(scheme.0, scheme.1, cells);
-    let extent = model.admit(&[base])?;
-    let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
-    let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
-    let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
+    let problem = Problem::of(selection.clone(), base)?;
+    let cases = problem.model.admit(&[base])?;
+    let [case] = cases.as_slice() else { bail!("differences have one case") };
+    let files = files(folder, kind, scheme)?;
     let what = format!("{}, {kind}, {}", selection.name(), name(scheme));
-    let found = differences(model, &base, cfls, &what, bar)?;
+    let mut show = |progress: Progress| {
+        bar.show(&format!("{what}, CFL {}", cfls[progress.case]), progress);
+    };
+    let found = case.differences(cfls, &mut show)?;
     let verdicts = judge_differences(&found, &expected_in_time(&base), ORDER_TOLERANCE);
-    json.write(&json!({
-        "schema": "mmsmith.temporal/1",
-        "settings": settings(selection, &Settled::of(base), extent, cells, cfls),
-        "temporal": temporal_document(&found, &verdicts),
-    }))?;
-    csv.write_text(&csv::temporal(&found))?;
+    let report = Report {
+        settings: problem.settings(case.plan().extent, cells, cfls),
+        results: [("temporal".to_owned(), temporal_results(&found, &verdicts))]
+            .into_iter()
+            .collect(),
+        sections: vec![Part::Sheet(sheets::temporal(&found))],
+        ..Report::new("temporal")
+    };
+    report.write(files)?;
     Ok(Differences { scheme, found, verdicts })
+}
+
+/// The files of a study of one scheme.
+fn files(folder: &Path, kind: &str, scheme: (Shape, Stepping)) -> Result<Files> {
+    let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
+    Files::of_stem(folder, &stem, &[Form::Json, Form::Csv])
+}
+
+/// Measures a series of one scheme and writes it into `folder`.
+fn measure_series(
+    selection: &Selection,
+    kind: &str,
+    (scheme, sweep): ((Shape, Stepping), &Sweep),
+    cfl: f64,
+    folder: &Path,
+    (pace, agenda): (&Pace, &Agenda),
+) -> Result<Series> {
+    let base = Case { cfl, ..usual(scheme.0, scheme.1, GRID) };
+    let problem = Problem::of(selection.clone(), base)?;
+    let cases = problem.model.admit(&sweep.cases(&base))?;
+    let files = files(folder, kind, scheme)?;
+    let bar = agenda.next(pace.seconds(&sweep.cases(&base)));
+    let what = format!("{}, {kind}, {}", selection.name(), name(scheme));
+    let study = Study::measure(&cases, sweep, &mut |progress| bar.show(&what, progress))?;
+    let expected = match sweep {
+        Sweep::Cells(_) => expected_in_space(&problem.model.exact, &base),
+        Sweep::Cfls(_) => Expected::default(),
+    };
+    let verdicts = judge(&study, sweep, &expected, ORDER_TOLERANCE);
+    let extent = extent(&cases);
+    let report = Report {
+        settings: match sweep {
+            Sweep::Cells(cells) => problem.settings(extent, cells, base.cfl),
+            Sweep::Cfls(cfls) => problem.settings(extent, base.cells, cfls),
+        },
+        results: of_study(&study, &verdicts),
+        sections: vec![Part::Sheet(sheets::study(&study))],
+        ..Report::new("converge")
+    };
+    report.write(files)?;
+    Ok(Series { scheme, study, verdicts })
 }
 
 /// Measures everything for one problem and writes its data into `folder`.
@@ -288,50 +334,27 @@ fn measure_problem(
     agenda: &Agenda,
 ) -> Result<Results> {
     let selection = studied(problem, &[])?;
-    let model = Model::new(&selection, Precision::F64)?;
-    let series = |kind: &str,
-                  scheme: (Shape, Stepping),
-                  sweep: &Sweep,
-                  cfl: Option<f64>|
-     -> Result<Series> {
-        let usual = usual(scheme.0, scheme.1, GRID);
-        let base = Case { cfl: cfl.unwrap_or(usual.cfl), ..usual };
-        let extent = model.admit(&sweep.cases(&base))?;
-        let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
-        let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
-        let csv = Output::prepare(&folder.join(format!("{stem}.csv")))?;
-        let bar = agenda.next(pace.seconds(&sweep.cases(&base)));
-        let what = format!("{problem}, {kind}, {}", name(scheme));
-        let mut show = |progress: Progress| bar.show(&what, progress);
-        let study = measure(&model.exact, model.arithmetic(), &base, sweep, &mut show)?;
-        let expected = match sweep {
-            Sweep::Cells(_) => expected_in_space(&model.exact, &base),
-            Sweep::Cfls(_) => Expected::default(),
-        };
-        let verdicts = judge(&study, sweep, &expected, ORDER_TOLERANCE);
-        let settled = Settled::of(base);
-        json.write(&document(&selection, &settled, extent, &base, sweep, &study, &verdicts))?;
-        csv.write_text(&csv::text(&study))?;
-        Ok(Series { scheme, study, verdicts })
+    let series = |kind: &str, scheme: (Shape, Stepping), sweep: &Sweep, cfl: f64| {
+        measure_series(&selection, kind, (scheme, sweep), cfl, folder, (pace, agenda))
     };
+    let usual_cfl = Case::default().cfl;
     let cells = Sweep::Cells(CELLS.to_vec());
-    let space = SPACE.map(|scheme| series("space", scheme, &cells, None));
+    let space = SPACE.map(|scheme| series("space", scheme, &cells, usual_cfl));
     let space = space.into_iter().collect::<Result<Vec<_>>>()?;
     let cfls = Sweep::Cfls(CFLS.to_vec());
-    let time = TIME.map(|scheme| series("time", scheme, &cfls, None));
+    let time = TIME.map(|scheme| series("time", scheme, &cfls, usual_cfl));
     let time = time.into_iter().collect::<Result<Vec<_>>>()?;
     let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
     let usl = (Shape::Gimp, Stepping::Usl);
-    let small_step = series("small-step", usl, &few, Some(SMALL_STEP))?;
+    let small_step = series("small-step", usl, &few, SMALL_STEP)?;
     let differences = DIFFERENCES.map(|scheme| {
         let cfls = &DIFFERENCE_CFLS;
         let bar = agenda.next(difference_seconds(pace, scheme, GRID, cfls));
         let ladder = TimeLadder { kind: "differences", cells: GRID, cfls };
-        measure_differences(&selection, &model, scheme, &ladder, folder, &bar)
+        measure_differences(&selection, scheme, &ladder, folder, &bar)
     });
     let differences = differences.into_iter().collect::<Result<Vec<_>>>()?;
 
-    let base = usual(Shape::Gimp, CD, GRID);
     let frames = FrameOutput {
         folder: folder.join("particles"),
         name: problem.to_owned(),
@@ -340,12 +363,11 @@ fn measure_problem(
     };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
-    simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
-    let base = usual(Shape::Gimp, Stepping::Cd(Start::Exact), GRID);
-    let silent = &mut |_| ();
-    let mut outputs = Outputs::new(silent);
-    let exact_start = simulate(&model.exact, model.arithmetic(), &base, &mut outputs)?;
-    pictures::write_contrast(&selection, &model, problem, folder)?;
+    let model = &pace.model;
+    model.discretized(&usual(Shape::Gimp, CD, GRID))?.run(&mut outputs)?;
+    let exact_start = usual(Shape::Gimp, Stepping::Cd(Start::Exact), GRID);
+    let exact_start = model.discretized(&exact_start)?.run(&mut Outputs::new(&mut |_| ()))?;
+    pictures::write_contrast(&selection, model, problem, folder)?;
     let results = Results { problem, space, time, small_step, differences, exact_start };
     for (kind, svg) in [("space", space_plot(&results)), ("time", time_plot(&results))] {
         Output::prepare(&folder.join(format!("{kind}.svg")))?.write_text(&svg)?;

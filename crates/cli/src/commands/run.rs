@@ -1,29 +1,30 @@
 //! `mms run`: one simulation.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Checkpoints, FrameOutput, Moment, Outputs, Parts, Row, RunTraffic, Scheme, Status,
-    energy_drift, run as simulate,
+    Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Parts, Row, RunTraffic, Scheme,
+    Status, energy_drift,
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::picture::Picture;
+use super::problem::{Model, Problem, announce};
 use super::remedy::{Advice, Given};
-use super::scheme::Settled;
-use super::{Model, caption, checkpoint_folder, inversion, settings, with_threads};
+use super::{checkpoint_folder, inversion};
 use crate::arguments::RunOptions;
 use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
 use crate::library::Selection;
+use crate::processes::with_threads;
 use crate::progress::Bar;
+use crate::report::{Asked, Form, Report, Section};
 use crate::svg::{Course, Drift};
 use crate::table::{self, Table};
 use crate::units::{self, Units};
-use crate::{csv, number, processes, terminal};
+use crate::{number, processes, sheets, terminal};
 
 /// A run, by the words of its command line.
 pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
@@ -41,131 +42,166 @@ pub(super) enum Origin<'a> {
 /// The run, from its beginning or from its last checkpoint.
 pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
-    let model = Model::new(&selection, options.scheme.precision)?;
-    let settled = &Settled::settle(&options.scheme, &model.exact)?;
-    let cells = options.cells.unwrap_or(settled.case.cells);
-    let case = Case { cells, ..settled.case };
-    let extent = model.admit(&[case])?;
-    let keeps_history = options.history.is_some() || options.plot.is_some();
-    let prepare = |path: &Option<PathBuf>| Output::prepare_if(path.as_ref());
-    let [output, history, plot] = [&settled.json, &options.history, &options.plot].map(prepare);
-    let (output, history, plot) = (output?, history?, plot?);
+    let problem = &Problem::new(selection, &options.scheme)?;
+    let cells = options.cells.unwrap_or(problem.settled.case.cells);
+    let cases = problem.model.admit(&[Case { cells, ..problem.settled.case }])?;
+    let [case] = cases.as_slice() else { bail!("a run has one case") };
+    let report = [(Form::Json, &options.scheme.json)];
+    let files = Asked(&report).prepare()?;
+    let history = Output::prepare_if(options.history.as_ref())?;
+    let plot = Output::prepare_if(options.plot.as_ref())?;
     if let Some(folder) = options.vtk.as_ref().filter(|_| processes::is_first()) {
         prepare_folder(folder).context("--vtk")?;
     }
-    let mut picture = Picture::asked(&options.picture, case.periods)?;
-    let mut moments = keeps_history.then(Vec::new);
-    let frames = options.vtk.as_ref().map(|folder| FrameOutput {
-        folder: folder.clone(),
-        name: selection.name().to_owned(),
-        count: options.frames,
-        provenance: Some(selection.provenance()),
-    });
-    let settings = || settings(&selection, settled, extent, cells, case.cfl);
+    let mut picture = Picture::asked(&options.picture, case.case().periods)?;
     // Nothing is left in the folder of a run that cannot begin.
     let place = match (origin, &options.checkpoint) {
         (Origin::Line(line), Some(folder)) => Some(checkpoint_folder::remember(folder, line)?),
         (Origin::Line(_), None) => None,
         (Origin::Checkpoint(place), _) => Some(place),
     };
-    let mut traffic = RunTraffic::default();
+    let settings = || problem.settings(case.plan().extent, cells, case.case().cfl);
     let checkpoints = match place {
         Some(place) => Some(checkpoint_folder::checkpoints(place, options, &settings())?),
         None => None,
     };
-    with_threads(settled.threads, || {
-        let row = {
-            let expected = model.announce(&[case]);
-            let bar = Bar::expecting("starting", expected.map(|seconds| seconds.iter().sum()));
-            let what = format!("{cells} cells");
-            let show = &mut |progress| bar.show(&what, progress);
-            let mut outputs = Outputs {
-                frames: frames.as_ref(),
-                checkpoints: checkpoints.as_ref(),
-                history: moments.as_mut(),
-                snapshot: picture.as_mut().map(Picture::snapshot),
-                ranks: processes::ranks(),
-                traffic: Some(&mut traffic),
-                ..Outputs::new(show)
-            };
-            let row = simulate(&model.exact, model.arithmetic(), &case, &mut outputs);
-            let row = row.map_err(anyhow::Error::new);
-            match &checkpoints {
-                Some(Checkpoints { folder, .. }) if row.as_ref().is_err_and(is_interrupted) => {
-                    let folder = folder.path().display();
-                    row.with_context(|| format!("mms resume {folder} goes on from there"))?
-                }
-                _ => row?,
-            }
-        };
-        processes::tell_traffic(&traffic);
-        let caption = caption(&selection, settled, extent);
-        let told = text(&row, Units::of(&selection));
-        terminal::say(&(settled.choice() + &caption + &told))?;
-        let inverted = match row.status.passed() {
-            Some(false) => inversion::measure(&selection)?,
-            _ => None,
-        };
-        if let Some(told) = &inverted {
-            terminal::say(&format!("{}\n", told.text()))?;
-        }
-        // Nothing runs a motion that turns the body inside out.
-        let advice = match inverted {
-            Some(_) => None,
-            None => {
-                let given = Given::of(&options.name, &options.scheme);
-                Advice::seek(given, &model, &case, &row)?
-            }
-        };
-        if let Some(advice) = &advice {
-            terminal::say(&advice.text())?;
-        }
-        if let Some(frames) = &frames {
-            let list = frames.folder.join(format!("{}.pvd", frames.name));
-            terminal::say(&format!("particle files: {}\n", list.display()))?;
-        }
+    with_threads(options.scheme.threads, || {
+        let ran = simulate(options, problem, case, checkpoints.as_ref(), picture.as_mut())?;
+        let report = ran.report(options, problem, case)?;
+        terminal::say(&report.text())?;
         if let Some(file) = history {
-            file.write_text(&csv::history(moments.as_deref().unwrap_or_default()))?;
+            file.write_text(&sheets::history(ran.moments()).csv()?)?;
         }
         if let Some(file) = plot {
-            let Parts { shape, integrator, .. } = case.scheme.parts();
-            let curve = match case.scheme {
-                Scheme::Total(_) => shape,
-                Scheme::Updated(_) => format!("{shape} + {integrator}"),
-            };
-            let course = course(curve, &model, moments.as_deref().unwrap_or_default());
-            let title = format!("{}: drift of energy, {cells} cells", selection.name());
-            file.write_text(&drift_plot(&title, vec![course]))?;
+            file.write_text(&ran.drift(problem, case.case()))?;
         }
-        if let Some(output) = output {
-            let mut document = json!({
-                "schema": "mmsmith.run/1",
-                "settings": settings(),
-                "passed": row.status.passed(),
-                "result": row,
-            });
-            if let Some(inverted) = &inverted {
-                document["inverted"] = json!(inverted);
-            }
-            if let Some(advice) = &advice {
-                document["advice"] = advice.document();
-            }
-            if let Some(moments) = &moments {
-                document["history"] = history_document(moments);
-            }
-            output.write(&document)?;
-        }
+        report.write(files)?;
+        let passed = ran.row.status.passed() != Some(false);
         // Last, since a run that stopped may have no picture.
         if let Some(picture) = picture {
-            let note = super::setting(&selection, settled, extent);
-            let written = picture.write(&selection, &row, &format!("{note}, {cells} cells"));
-            match written {
-                Err(error) if row.status.passed() == Some(false) => terminal::error(error),
+            let note = format!("{}, {cells} cells", problem.setting(case.plan().extent));
+            match picture.write(&problem.selection, &ran.row, &note) {
+                Err(error) if !passed => terminal::error(error),
                 written => written?,
             }
         }
-        Ok(row.status.passed() != Some(false))
+        Ok(passed)
     })
+}
+
+/// A run that has ended.
+struct Ran {
+    row: Row,
+    /// Where a history is kept.
+    moments: Option<Vec<Moment>>,
+}
+
+/// Simulates a case.
+fn simulate(
+    options: &RunOptions,
+    problem: &Problem,
+    case: &Discretized<'_>,
+    checkpoints: Option<&Checkpoints>,
+    picture: Option<&mut Picture>,
+) -> Result<Ran> {
+    let keeps_history = options.history.is_some() || options.plot.is_some();
+    let mut moments = keeps_history.then(Vec::new);
+    let frames = options.vtk.as_ref().map(|folder| FrameOutput {
+        folder: folder.clone(),
+        name: problem.selection.name().to_owned(),
+        count: options.frames,
+        provenance: Some(problem.selection.provenance()),
+    });
+    let mut traffic = RunTraffic::default();
+    let row = {
+        let expected = announce(std::slice::from_ref(case));
+        let bar = Bar::expecting("starting", expected.map(|seconds| seconds.iter().sum()));
+        let what = format!("{} cells", case.case().cells);
+        let show = &mut |progress| bar.show(&what, progress);
+        let mut outputs = Outputs {
+            frames: frames.as_ref(),
+            checkpoints,
+            history: moments.as_mut(),
+            snapshot: picture.map(Picture::snapshot),
+            ranks: processes::ranks(),
+            traffic: Some(&mut traffic),
+            ..Outputs::new(show)
+        };
+        let row = case.run(&mut outputs).map_err(anyhow::Error::new);
+        match checkpoints {
+            Some(Checkpoints { folder, .. }) if row.as_ref().is_err_and(is_interrupted) => {
+                let folder = folder.path().display();
+                row.with_context(|| format!("mms resume {folder} goes on from there"))?
+            }
+            _ => row?,
+        }
+    };
+    processes::tell_traffic(&traffic);
+    Ok(Ran { row, moments })
+}
+
+impl Ran {
+    fn moments(&self) -> &[Moment] {
+        self.moments.as_deref().unwrap_or_default()
+    }
+
+    fn report(
+        &self,
+        options: &RunOptions,
+        problem: &Problem,
+        case: &Discretized<'_>,
+    ) -> Result<Report> {
+        let Problem { selection, model, settled } = problem;
+        let Self { row, moments } = self;
+        let passed = row.status.passed();
+        let mut said = text(row, Units::of(selection));
+        let inverted = match passed {
+            Some(false) => inversion::measure(selection)?,
+            _ => None,
+        };
+        let mut results = Map::new();
+        results.insert("result".into(), json!(row));
+        results.insert("passed".into(), json!(passed));
+        // Nothing runs a motion that turns the body inside out.
+        if let Some(inverted) = &inverted {
+            said += &format!("{}\n", inverted.text());
+            results.insert("inverted".into(), json!(inverted));
+        } else if let Some(advice) =
+            Advice::seek(Given::of(&options.name, &options.scheme), model, case.case(), row)?
+        {
+            said += &advice.text();
+            results.insert("advice".into(), advice.document());
+        }
+        if let Some(folder) = &options.vtk {
+            let list = folder.join(format!("{}.pvd", selection.name()));
+            said += &format!("particle files: {}\n", list.display());
+        }
+        if let Some(moments) = moments {
+            results.insert("history".into(), history_document(moments));
+        }
+        let (extent, Case { cells, cfl, .. }) = (case.plan().extent, *case.case());
+        Ok(Report {
+            command: "run",
+            preface: settled.choice(),
+            caption: problem.caption(extent),
+            sections: vec![Section::Note(said)],
+            settings: problem.settings(extent, cells, cfl),
+            results,
+            verdict: passed,
+        })
+    }
+
+    /// A picture of the drift of energy.
+    fn drift(&self, problem: &Problem, case: &Case) -> String {
+        let Parts { shape, integrator, .. } = case.scheme.parts();
+        let curve = match case.scheme {
+            Scheme::Total(_) => shape,
+            Scheme::Updated(_) => format!("{shape} + {integrator}"),
+        };
+        let course = course(curve, &problem.model, self.moments());
+        let name = problem.selection.name();
+        drift_plot(&format!("{name}: drift of energy, {} cells", case.cells), vec![course])
+    }
 }
 
 /// A history as arrays of one length; each momentum is an array by axis.

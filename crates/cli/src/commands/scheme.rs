@@ -1,7 +1,5 @@
 //! From options to a scheme, and the combinations that make none.
 
-use std::path::PathBuf;
-
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
@@ -29,9 +27,6 @@ pub(super) struct Settled {
     /// On the number of cells that is usual.
     pub(super) case: Case,
     pub(super) precision: Precision,
-    /// As many as was asked for.
-    pub(super) threads: Option<usize>,
-    pub(super) json: Option<PathBuf>,
     /// The choice made because the usual scheme would not do, and its reason.
     pub(super) chosen: Option<Choice>,
     /// Conditions in whose place the traction of the exact motion acts.
@@ -56,17 +51,9 @@ pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> C
 }
 
 impl Settled {
-    /// A case in double precision, on all threads.
+    /// A case in double precision.
     pub(super) fn of(case: Case) -> Self {
-        Self {
-            case,
-            precision: Precision::F64,
-            threads: None,
-            json: None,
-            chosen: None,
-            loaded: Vec::new(),
-            too_long: None,
-        }
+        Self { case, precision: Precision::F64, chosen: None, loaded: Vec::new(), too_long: None }
     }
 
     /// The scheme that the options leave for a solution. What they say holds; what they leave open is chosen so that the
@@ -107,13 +94,10 @@ impl Settled {
             periods: options.periods,
             extent: options.extent.map(Into::into),
         };
-        let SchemeOptions { precision, threads, ref json, .. } = *options;
         let loaded = verify::loaded_instead(exact, &case);
         let mut settled = Self {
             case,
-            precision,
-            threads,
-            json: json.clone(),
+            precision: options.precision,
             chosen: None,
             loaded,
             too_long: step.too_long,

@@ -17,11 +17,12 @@ use mmsmith_verify::{
 use mmsmith_vtk::foreign::column;
 use serde_json::json;
 
-use super::{blind, with_threads};
+use super::blind;
 use crate::arguments::ScoreOptions;
 use crate::expect;
 use crate::json::Output;
 use crate::library::Selection;
+use crate::processes::with_threads;
 use crate::terminal;
 
 pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {

@@ -3,43 +3,35 @@
 mod random;
 mod vary;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Case, Criteria, Extent, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow,
-    is_stable, stability as find,
+    Case, Criteria, Discretized, Failure, FailureKind, Observed, Search, SearchProgress,
+    StabilityRow, USUAL_CFL, is_stable, stability as find,
 };
-use serde_json::{Value, json};
-use std::sync::atomic::{AtomicU64, Ordering};
+use serde_json::{Map, Value, json};
 
-use mmsmith_verify::USUAL_CFL;
-
+use super::problem::{Model, Problem, extent};
 use super::scheme::Settled;
-use super::{Model, caption, converge, settings, with_threads};
+use super::study::{Request, Show, Study, conduct};
 use crate::arguments::{SchemeOptions, StabilityOptions};
-use crate::csv;
-use crate::json::Output;
-use crate::keep::{Found, Keep, Order, Part};
+use crate::keep::Order;
 use crate::library::Selection;
-use crate::progress::Bar;
-use crate::svg::{Limits, Map};
-use crate::table::{self, Table};
-use crate::terminal;
+use crate::processes::with_threads;
+use crate::report::{Asked, Form, Report, Section, Sheet};
+use crate::svg::{Limits, Map as Chart};
+use crate::table::Table;
 
-/// One point of a line or map: what is set, and the case that follows from it.
+/// One point of a line or map: what is set, and the problem that follows from it.
 struct Point {
     /// The values of the varied settings here, in their order.
     values: Vec<String>,
-    selection: Selection,
     /// With the number of cells that the point has.
-    settled: Settled,
-    model: Model,
-    extent: Option<Extent>,
+    problem: Problem,
 }
 
 /// The CFL number is what is looked for; where none is said, numbers refer to the speed that they usually have.
-fn settle(options: &SchemeOptions, model: &Model) -> Result<Settled> {
-    let said = SchemeOptions { cfl: options.cfl.or(Some(USUAL_CFL)), ..options.clone() };
-    Settled::settle(&said, &model.exact)
+fn with_cfl(options: &SchemeOptions) -> SchemeOptions {
+    SchemeOptions { cfl: options.cfl.or(Some(USUAL_CFL)), ..options.clone() }
 }
 
 impl Point {
@@ -49,18 +41,22 @@ impl Point {
         options: &SchemeOptions,
         cells: usize,
     ) -> Result<Self> {
-        let model = Model::new(&selection, options.precision)?;
-        let mut settled = settle(options, &model)?;
-        settled.case.cells = cells;
-        // The finest step that a search may come to is not known; memory does not depend on it.
-        let extent = model.admit(&[Case { cfl: 0.5, ..settled.case }])?;
-        Ok(Self { values, selection, settled, model, extent })
+        let mut problem = Problem::new(selection, &with_cfl(options))?;
+        problem.settled.case.cells = cells;
+        Ok(Self { values, problem })
     }
 
-    /// Everything but the CFL number.
-    fn settings(&self) -> Value {
-        let cells = self.settled.case.cells;
-        settings(&self.selection, &self.settled, self.extent, cells, Value::Null)
+    /// Its case on its grid. The finest step that a search may come to is not known; memory does not depend on it.
+    fn admit(&self) -> Result<Discretized<'_>> {
+        let case = Case { cfl: 0.5, ..self.problem.settled.case };
+        self.problem.model.admit(&[case])?.pop().context("one case")
+    }
+
+    /// The setting as it is varied, such as `nu = 0.3`.
+    fn place(&self, options: &StabilityOptions, between: &str) -> String {
+        let all = options.over.iter().zip(&self.values);
+        let all: Vec<_> = all.map(|((name, _), value)| format!("{name}{between}{value}")).collect();
+        all.join(", ")
     }
 }
 
@@ -76,54 +72,52 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     if options.search.is_some() {
         return random::search(options, &criteria);
     }
-    let output = Output::prepare_if(options.scheme.json.as_ref())?;
-    let [plot, values] =
-        [&options.plot, &options.csv].map(|path| Output::prepare_if(path.as_ref()));
-    let (plot, values) = (plot?, values?);
-    with_threads(options.scheme.threads, || {
-        let found = match survey(options, &Bar::new("largest stable CFL number"))? {
-            Surveyed::All(found) => found,
-            Surveyed::Part(part) => {
-                terminal::say(&part.to_string())?;
-                return Ok(true);
-            }
-        };
-        terminal::say(&found.text())?;
-        if let Some(output) = output {
-            output.write(&found.document()?)?;
-        }
-        if let Some(file) = values {
-            file.write_text(&found.sheet())?;
-        }
-        if let Some(file) = plot {
-            file.write_text(&found.picture())?;
-        }
-        Ok(true)
-    })
+    let files = [
+        (Form::Json, &options.scheme.json),
+        (Form::Plot, &options.plot),
+        (Form::Csv, &options.csv),
+    ];
+    survey(options, |found| conduct(found, &request(options, &files)))
 }
 
-/// The limits over what was varied, to be told.
+/// The request for a study with these options.
+fn request<'a>(
+    options: &'a StabilityOptions,
+    files: &'a [(Form, &'a Option<std::path::PathBuf>)],
+) -> Request<'a> {
+    Request {
+        solution: &options.name,
+        kept: &options.kept,
+        threads: options.scheme.threads,
+        files: Asked(files),
+        others: &[],
+    }
+}
+
+/// The limits over what is varied.
 pub(super) struct Survey<'a> {
     options: &'a StabilityOptions,
-    selection: Selection,
-    settled: Settled,
+    /// Without what is varied.
+    common: Problem,
     search: Search,
-    points: Vec<Point>,
-    rows: Vec<StabilityRow>,
+    points: &'a [Point],
+    cases: Vec<Discretized<'a>>,
 }
 
-/// The limits that were asked for, or a shard's part of them.
-pub(super) enum Surveyed<'a> {
-    All(Box<Survey<'a>>),
-    Part(Part),
-}
-
-/// Looks for the limits that were asked for.
-pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Surveyed<'a>> {
+/// Does something with the survey that is asked for.
+pub(super) fn survey<R>(
+    options: &StabilityOptions,
+    work: impl FnOnce(&Survey<'_>) -> Result<R>,
+) -> Result<R> {
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let points = vary::points(options, &selection)?;
+    let cases = points.iter().map(|point| match point.place(options, "=") {
+        place if place.is_empty() => point.admit(),
+        place => point.admit().with_context(|| format!("--over {place}")),
+    });
+    let cases = cases.collect::<Result<_>>()?;
     let (lower, upper) = (options.lower, options.upper);
     if let (Some(lower), Some(upper)) = (lower, upper)
         && lower >= upper
@@ -131,79 +125,83 @@ pub(super) fn survey<'a>(options: &'a StabilityOptions, bar: &Bar) -> Result<Sur
         bail!("--lower {lower} --upper {upper}: the lower CFL number must be below the upper one");
     }
     let search = Search { lower, upper, width: options.width, criteria };
-    points.iter().try_for_each(|point| search.validate(point.model.arithmetic()))?;
-    let outputs = [
-        ("--json", options.scheme.json.is_some()),
-        ("--plot", options.plot.is_some()),
-        ("--csv", options.csv.is_some()),
-    ];
-    let keep = Keep::open(&options.kept, &options.name, &outputs)?;
-    let rows = match limits(&points, &search, &keep, bar)? {
-        Found::All(rows) => rows,
-        Found::Part(part) => return Ok(Surveyed::Part(part)),
-    };
+    points.iter().try_for_each(|point| search.validate(point.problem.model.arithmetic()))?;
+    let first = &points[0].problem;
     // What is varied may have no meaning without its values.
-    let settled = settle(&options.scheme, &points[0].model);
-    let settled = settled.unwrap_or_else(|_| points[0].settled.clone());
-    let found = Survey { options, selection, settled, search, points, rows };
-    Ok(Surveyed::All(Box::new(found)))
+    let settled = Settled::settle(&with_cfl(&options.scheme), &first.model.exact);
+    let settled = settled.unwrap_or_else(|_| first.settled.clone());
+    let model = Model::new(&first.selection, options.scheme.precision)?;
+    let common = Problem { selection, model, settled };
+    work(&Survey { options, common, search, points: &points, cases })
 }
 
-impl Survey<'_> {
-    fn names(&self) -> Vec<&str> {
-        self.options.over.iter().map(|(name, _)| name.as_str()).collect()
+impl Study for Survey<'_> {
+    type Found = StabilityRow;
+
+    /// The cases are independent, and go side by side where there are several.
+    fn order(&self) -> Order {
+        if self.points.len() > 1 { Order::AtOnce } else { Order::OneByOne }
     }
 
-    fn text(&self) -> String {
-        let Self { options, selection, settled, search, points, .. } = self;
-        let mut text = settled.choice() + &caption(selection, settled, points[0].extent);
+    fn keys(&self) -> Vec<Value> {
+        let key = |(point, case): (&Point, &Discretized<'_>)| {
+            let (cells, extent) = (case.case().cells, case.plan().extent);
+            let case = point.problem.settings(extent, cells, Value::Null);
+            without_threads(json!({ "case": case, "search": self.search }))
+        };
+        self.points.iter().zip(&self.cases).map(key).collect()
+    }
+
+    /// That of a run of each point at one CFL number; searches take about as many runs.
+    fn work(&self) -> Vec<f64> {
+        self.cases.iter().map(|case| case.plan().work()).collect()
+    }
+
+    fn measure(&self, index: usize, show: &Show<'_>) -> Result<StabilityRow> {
+        let point = &self.points[index];
+        let name = match point.values.as_slice() {
+            [] => point.problem.selection.name().to_owned(),
+            values => values.join(", "),
+        };
+        let mut progress = |SearchProgress { run, share }: SearchProgress| {
+            show.share(|| format!("{name}, run {run}"), share);
+        };
+        let row = find(&self.cases[index], &self.search, &mut progress)?;
+        show.share(|| name.clone(), 1.0);
+        Ok(row)
+    }
+
+    fn report(&self, rows: Vec<StabilityRow>) -> Result<Report> {
+        let Self { options, common, search, .. } = self;
+        let extent = self.cases[0].plan().extent;
+        let mut said = self.definition();
         if !self.names().contains(&"cells") {
-            text += &format!("{} cells\n", options.cells);
+            said = format!("{} cells\n{said}", options.cells);
         }
-        text += &self.definition();
-        text += &format!("\nlargest stable CFL number, to {} on P-waves\n", search.width);
-        let table = self.table();
-        text += &table.text();
-        text += LEGEND;
-        let has = "A wider terminal, --csv and --json have them.";
-        text += &table::on_left_out([&table], has);
-        text += &self.notes();
-        text
-    }
-
-    /// Definition of 'unstable', in words.
-    pub(super) fn definition(&self) -> String {
-        definition(&self.search.criteria)
-    }
-
-    pub(super) fn table(&self) -> Table {
-        table(&self.names(), &self.points, &self.rows)
-    }
-
-    /// Facts that the table cannot say.
-    pub(super) fn notes(&self) -> String {
-        notes(&self.names(), &self.points, &self.rows)
-    }
-
-    pub(super) fn document(&self) -> Result<Value> {
-        let Self { options, selection, settled, search, points, rows } = self;
-        let settings = settings(selection, settled, points[0].extent, options.cells, Value::Null);
-        let rows = points.iter().zip(rows).map(|(point, row)| document(options, point, row));
-        Ok(json!({
-            "schema": "mmsmith.stability/1",
-            "settings": settings,
-            "over": self.names(),
-            "search": search,
-            "rows": rows.collect::<Result<Vec<_>>>()?,
-        }))
-    }
-
-    pub(super) fn sheet(&self) -> String {
-        sheet(&self.names(), &self.points, &self.rows)
-    }
-
-    pub(super) fn picture(&self) -> String {
-        picture(&self.selection, self.options, &self.rows)
+        let title = format!("largest stable CFL number, to {} on P-waves", search.width);
+        let mut results = Map::new();
+        results.insert("over".into(), json!(self.names()));
+        results.insert("search".into(), json!(search));
+        let all = self.points.iter().zip(&rows);
+        let all = all.map(|(point, row)| document(options, point, row));
+        results.insert("rows".into(), all.collect::<Result<_>>()?);
+        Ok(Report {
+            command: "stability",
+            preface: common.settled.choice(),
+            caption: common.caption(extent),
+            sections: vec![
+                Section::Note(said),
+                Section::Table(title, self.table(&rows)),
+                Section::Note(LEGEND.into()),
+                Section::LeftOut("A wider terminal, --csv and --json have them."),
+                Section::Note(self.notes(&rows)),
+                Section::Sheet(self.sheet(&rows)),
+                Section::Plot(picture(&common.selection, options, &rows)),
+            ],
+            settings: common.settings(extent, options.cells, Value::Null),
+            results,
+            verdict: None,
+        })
     }
 }
 
@@ -211,90 +209,28 @@ impl Survey<'_> {
 fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let scheme = SchemeOptions { cfl: Some(cfl), ..options.scheme.clone() };
-    let output = Output::prepare_if(scheme.json.as_ref())?;
-    let point = Point::new(Vec::new(), selection, &scheme, options.cells)?;
-    let Point { selection, settled, model, extent, .. } = &point;
-    with_threads(settled.threads, || {
-        let found = is_stable(&model.exact, model.arithmetic(), &settled.case, criteria)?;
-        let mut text = settled.choice() + &caption(selection, settled, *extent);
-        text += &definition(criteria);
-        text += &match &found.failure {
+    let files = Asked(&[(Form::Json, &scheme.json)]).prepare()?;
+    let Point { problem, .. } = Point::new(Vec::new(), selection, &scheme, options.cells)?;
+    let cases = problem.model.admit(&[problem.settled.case])?;
+    let extent = extent(&cases);
+    with_threads(scheme.threads, || {
+        let found = is_stable(&cases[0], criteria)?;
+        let said = match &found.failure {
             None => format!("CFL {cfl}: stable over {} steps\n", found.steps),
             Some(failure) => format!("CFL {cfl}: UNSTABLE: {}\n", told(failure)),
         };
-        terminal::say(&text)?;
-        if let Some(output) = output {
-            let settings = settings(selection, settled, *extent, options.cells, cfl);
-            output.write(&json!({
-                "schema": "mmsmith.stability/1",
-                "settings": settings,
-                "criteria": criteria,
-                "result": found,
-            }))?;
-        }
-        Ok(found.failure.is_none())
+        let results = [("criteria", json!(criteria)), ("result", json!(found))];
+        let report = Report {
+            command: "stability",
+            preface: problem.settled.choice(),
+            caption: problem.caption(extent),
+            sections: vec![Section::Note(definition(criteria) + &said)],
+            settings: problem.settings(extent, options.cells, cfl),
+            results: results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect(),
+            verdict: Some(found.failure.is_none()),
+        };
+        report.publish(files)
     })
-}
-
-/// The limits of all points; the cases are independent, and go side by side where there are several.
-fn limits(
-    points: &[Point],
-    search: &Search,
-    keep: &Keep,
-    bar: &Bar,
-) -> Result<Found<StabilityRow>> {
-    let keys: Vec<_> = points
-        .iter()
-        .map(|point| json!({ "case": point.settings(), "search": search }))
-        .map(without_threads)
-        .collect();
-    let order = if points.len() > 1 { Order::AtOnce } else { Order::OneByOne };
-    let own = keep.own(&work(points)?);
-    let shares = Shares::of(own.iter().filter(|own| **own).count());
-    // Places among this process's own.
-    let place = |index: usize| own[..index].iter().filter(|own| **own).count();
-    keep.all(
-        &keys,
-        &own,
-        order,
-        |_| {},
-        |index| {
-            let point = &points[index];
-            let name = match point.values.as_slice() {
-                [] => point.selection.name().to_owned(),
-                values => values.join(", "),
-            };
-            let mut show = |SearchProgress { run, share }: SearchProgress| {
-                bar.show_share(|| format!("{name}, run {run}"), shares.set(place(index), share));
-            };
-            let Point { model, settled, .. } = point;
-            let row = find(&model.exact, model.arithmetic(), &settled.case, search, &mut show)?;
-            bar.show_share(|| name.clone(), shares.set(place(index), 1.0));
-            Ok(row)
-        },
-    )
-}
-
-/// The work of a run of each point at one CFL number; searches take about as many runs.
-fn work(points: &[Point]) -> Result<Vec<f64>> {
-    let each = |Point { model, settled, .. }: &Point| converge::work(model, &[settled.case]);
-    Ok(points.iter().map(each).collect::<Result<Vec<_>>>()?.concat())
-}
-
-/// How much of each case is done, where several are under way.
-struct Shares(Vec<AtomicU64>);
-
-impl Shares {
-    fn of(cases: usize) -> Self {
-        Self((0..cases).map(|_| AtomicU64::new(0.0_f64.to_bits())).collect())
-    }
-
-    /// Takes down the share of one case that is done, and gives that of all.
-    fn set(&self, case: usize, share: f64) -> f64 {
-        self.0[case].store(share.to_bits(), Ordering::Relaxed);
-        let shares = self.0.iter().map(|share| f64::from_bits(share.load(Ordering::Relaxed)));
-        shares.sum::<f64>() / self.0.len() as f64
-    }
 }
 
 /// Results do not depend on the number of threads.
@@ -348,72 +284,120 @@ fn told(failure: &Failure) -> String {
     format!("{} at step {step}, t = {time:.4e}{particle}{value}{limit}", kind(failure.kind))
 }
 
-fn table(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> Table {
-    let header = names.iter().copied().chain([
-        "stable",
-        "unstable",
-        "on P-waves",
-        "predicted",
-        "error",
-        "energy",
-        "momentum",
-        "runs",
-        "failure",
-    ]);
-    let n = names.len();
-    let table = Table::new(0, header).sparing(n + 7..n + 8).sparing(n + 6..n + 7);
-    let mut table = table.sparing(n + 5..n + 6).sparing(n + 4..n + 5).flowing(13);
-    for (point, row) in points.iter().zip(rows) {
-        let scientific = |value: Option<f64>| {
-            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
-        };
-        let limit = row.at_limit.as_ref();
-        let mut cells = point.values.clone();
-        cells.extend([
-            three(row.cfl_max),
-            three(row.bracket[1]),
-            three(row.p_wave_cfl),
-            format!("{:.3}", row.p_wave_limit),
-            scientific(limit.and_then(|run| run.error)),
-            scientific(limit.and_then(|run| run.energy_drift)),
-            scientific(limit.and_then(|run| run.momentum_drift)),
-            row.runs.to_string(),
-            row.failure.as_ref().map_or("-", |failure| kind(failure.kind)).to_owned(),
-        ]);
-        table.row(cells);
+impl Survey<'_> {
+    fn names(&self) -> Vec<&str> {
+        self.options.over.iter().map(|(name, _)| name.as_str()).collect()
     }
-    table
-}
 
-/// Facts that the table cannot say.
-fn notes(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> String {
-    let mut text = String::new();
-    for (point, row) in points.iter().zip(rows) {
-        let place: Vec<_> = names
-            .iter()
-            .zip(&point.values)
-            .map(|(name, value)| format!("{name} = {value}"))
-            .collect();
-        let place =
-            if place.is_empty() { String::new() } else { format!("{}: ", place.join(", ")) };
-        match (row.bracket, &row.failure) {
-            ([Some(stable), None], _) => {
-                text += &format!("{place}stable at every CFL number tried, up to {stable:.3}\n");
-            }
-            ([None, Some(unstable)], Some(failure)) => {
-                text += &format!(
-                    "{place}unstable at every CFL number tried, down to {unstable:.4}: {}\n",
-                    told(failure)
-                );
-            }
-            _ => {}
-        }
-        for Observed { cfl, failure, .. } in &row.unstable_below {
-            let failure = failure.as_ref().map(told).unwrap_or_default();
-            text += &format!("{place}a hole below the limit, at CFL {cfl:.4}: {failure}\n");
-        }
+    /// Definition of 'unstable', in words.
+    pub(super) fn definition(&self) -> String {
+        definition(&self.search.criteria)
     }
-    text
+
+    pub(super) fn table(&self, rows: &[StabilityRow]) -> Table {
+        let names = self.names();
+        let header = names.iter().copied().chain([
+            "stable",
+            "unstable",
+            "on P-waves",
+            "predicted",
+            "error",
+            "energy",
+            "momentum",
+            "runs",
+            "failure",
+        ]);
+        let n = names.len();
+        let table = Table::new(0, header).sparing(n + 7..n + 8).sparing(n + 6..n + 7);
+        let mut table = table.sparing(n + 5..n + 6).sparing(n + 4..n + 5).flowing(13);
+        for (point, row) in self.points.iter().zip(rows) {
+            let scientific = |value: Option<f64>| {
+                value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
+            };
+            let limit = row.at_limit.as_ref();
+            let mut cells = point.values.clone();
+            cells.extend([
+                three(row.cfl_max),
+                three(row.bracket[1]),
+                three(row.p_wave_cfl),
+                format!("{:.3}", row.p_wave_limit),
+                scientific(limit.and_then(|run| run.error)),
+                scientific(limit.and_then(|run| run.energy_drift)),
+                scientific(limit.and_then(|run| run.momentum_drift)),
+                row.runs.to_string(),
+                row.failure.as_ref().map_or("-", |failure| kind(failure.kind)).to_owned(),
+            ]);
+            table.row(cells);
+        }
+        table
+    }
+
+    /// Facts that the table cannot say.
+    pub(super) fn notes(&self, rows: &[StabilityRow]) -> String {
+        let mut text = String::new();
+        for (point, row) in self.points.iter().zip(rows) {
+            let place = point.place(self.options, " = ");
+            let place = if place.is_empty() { place } else { format!("{place}: ") };
+            match (row.bracket, &row.failure) {
+                ([Some(stable), None], _) => {
+                    text +=
+                        &format!("{place}stable at every CFL number tried, up to {stable:.3}\n");
+                }
+                ([None, Some(unstable)], Some(failure)) => {
+                    text += &format!(
+                        "{place}unstable at every CFL number tried, down to {unstable:.4}: {}\n",
+                        told(failure)
+                    );
+                }
+                _ => {}
+            }
+            for Observed { cfl, failure, .. } in &row.unstable_below {
+                let failure = failure.as_ref().map(told).unwrap_or_default();
+                text += &format!("{place}a hole below the limit, at CFL {cfl:.4}: {failure}\n");
+            }
+        }
+        text
+    }
+
+    /// The rows with all digits.
+    fn sheet(&self, rows: &[StabilityRow]) -> Sheet {
+        let found = "cfl_max,stable,unstable,p_wave_cfl,p_wave_limit,failure,step,time,particle,value,limit,\
+                     reference_error,error,energy_drift,momentum_drift,runs,unstable_below";
+        let mut sheet = Sheet::new(self.names().into_iter().chain(found.split(',')));
+        let number =
+            |value: Option<f64>| value.map(|value| format!("{value:?}")).unwrap_or_default();
+        for (point, row) in self.points.iter().zip(rows) {
+            let failure = row.failure.as_ref();
+            let limit = row.at_limit.as_ref();
+            let below: Vec<_> =
+                row.unstable_below.iter().map(|run| format!("{:?}", run.cfl)).collect();
+            let mut cells: Vec<String> = point.values.clone();
+            cells.extend([
+                number(row.cfl_max),
+                number(row.bracket[0]),
+                number(row.bracket[1]),
+                number(row.p_wave_cfl),
+                number(Some(row.p_wave_limit)),
+                failure.map(|failure| kind(failure.kind).to_owned()).unwrap_or_default(),
+                failure.map(|failure| failure.step.to_string()).unwrap_or_default(),
+                number(failure.map(|failure| failure.time)),
+                failure
+                    .and_then(|failure| failure.particle)
+                    .map(|p| p.to_string())
+                    .unwrap_or_default(),
+                number(failure.and_then(|failure| failure.value)),
+                number(failure.and_then(|failure| failure.limit)),
+                number(row.reference.error),
+                number(limit.and_then(|run| run.error)),
+                number(limit.and_then(|run| run.energy_drift)),
+                number(limit.and_then(|run| run.momentum_drift)),
+                row.runs.to_string(),
+                below.join(" "),
+            ]);
+            sheet.row(cells);
+        }
+        sheet
+    }
 }
 
 /// A row as it is written to JSON: what was varied, then what was found.
@@ -429,41 +413,6 @@ fn document(options: &StabilityOptions, point: &Point, row: &StabilityRow) -> Re
     Ok(document.into())
 }
 
-/// The rows as comma-separated values.
-fn sheet(names: &[&str], points: &[Point], rows: &[StabilityRow]) -> String {
-    let mut text = names.iter().map(|name| format!("{name},")).collect::<String>()
-        + "cfl_max,stable,unstable,p_wave_cfl,p_wave_limit,failure,step,time,particle,value,limit,\
-           reference_error,error,energy_drift,momentum_drift,runs,unstable_below\n";
-    let number = |value: Option<f64>| value.map(|value| format!("{value:?}")).unwrap_or_default();
-    for (point, row) in points.iter().zip(rows) {
-        let failure = row.failure.as_ref();
-        let limit = row.at_limit.as_ref();
-        let below: Vec<_> = row.unstable_below.iter().map(|run| format!("{:?}", run.cfl)).collect();
-        let mut cells: Vec<String> = point.values.iter().map(|value| csv::quoted(value)).collect();
-        cells.extend([
-            number(row.cfl_max),
-            number(row.bracket[0]),
-            number(row.bracket[1]),
-            number(row.p_wave_cfl),
-            number(Some(row.p_wave_limit)),
-            failure.map(|failure| csv::quoted(kind(failure.kind))).unwrap_or_default(),
-            failure.map(|failure| failure.step.to_string()).unwrap_or_default(),
-            number(failure.map(|failure| failure.time)),
-            failure.and_then(|failure| failure.particle).map(|p| p.to_string()).unwrap_or_default(),
-            number(failure.and_then(|failure| failure.value)),
-            number(failure.and_then(|failure| failure.limit)),
-            number(row.reference.error),
-            number(limit.and_then(|run| run.error)),
-            number(limit.and_then(|run| run.energy_drift)),
-            number(limit.and_then(|run| run.momentum_drift)),
-            row.runs.to_string(),
-            below.join(" "),
-        ]);
-        text += &format!("{}\n", cells.join(","));
-    }
-    text
-}
-
 /// A line over one setting, a map over two.
 fn picture(selection: &Selection, options: &StabilityOptions, rows: &[StabilityRow]) -> String {
     let title = format!("{}: largest stable CFL number", selection.name());
@@ -473,23 +422,11 @@ fn picture(selection: &Selection, options: &StabilityOptions, rows: &[StabilityR
         [(x, columns), (y, lines)] => {
             let (x, y) = ((x.as_str(), columns.as_slice()), (y.as_str(), lines.as_slice()));
             // Rows come with the second setting changing fastest.
-            Map { title: &title, x, y, values: &measured, analytic: &analytic }.svg()
+            Chart { title: &title, x, y, values: &measured, analytic: &analytic }.svg()
         }
         [(x, values), ..] => {
             Limits { title: &title, x, values, measured: &measured, analytic: &analytic }.svg()
         }
         [] => String::new(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cases_side_by_side_have_one_share() {
-        let shares = Shares::of(4);
-        assert_eq!((shares.set(2, 0.5), shares.set(0, 1.0)), (0.125, 0.375));
-        assert_eq!([1, 2, 3].map(|case| shares.set(case, 1.0))[2], 1.0);
     }
 }

@@ -11,20 +11,20 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Arithmetic, Case, CaseError, Chosen, Effect, Entry, Field, Goal, MARGIN, Machine, Norm,
-    Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, list,
-    listed as listed_ones, plan, run as simulate, time_steps, tradeoff as measure,
+    Arithmetic, Case, CaseError, Chosen, Discretized, Effect, Entry, Field, Goal, MARGIN, Machine,
+    Norm, Outputs, Record, Repeat, Row, Setting, Skip, Status, Tradeoff, families, leading, list,
+    listed as listed_ones, tradeoff as measure,
 };
 use serde_json::{Value, json};
 
 use self::time::Time;
-use super::Model;
+use super::problem::Model;
 use crate::arguments::{Against, Precision, TradeoffOptions};
-use crate::csv;
 use crate::json::Output;
 use crate::keep::{Found, Keep, Order, Part};
 use crate::library::Selection;
 use crate::progress::Bar;
+use crate::report::{self, Sheet};
 use crate::svg::{Front, Point};
 use crate::table::{self, Table};
 use crate::{machine, memory, number, terminal};
@@ -103,6 +103,11 @@ impl Runner<'_> {
         }
     }
 
+    /// The case of a setting on its grid.
+    fn discretized(&self, setting: &Setting) -> Result<Discretized<'_>, CaseError> {
+        Discretized::new(&self.exact.exact, self.arithmetic(setting), &setting.case)
+    }
+
     fn pool(&self, setting: &Setting) -> Result<&rayon::ThreadPool> {
         self.pools.get(&setting.threads).context("no threads were started for this setting")
     }
@@ -128,7 +133,7 @@ impl Runner<'_> {
             let mut row = self.pool(setting)?.install(|| {
                 let silent = &mut |_| ();
                 let mut outputs = Outputs { until, ..Outputs::new(silent) };
-                simulate(&self.exact.exact, self.arithmetic(setting), &setting.case, &mut outputs)
+                self.discretized(setting)?.run(&mut outputs)
             })?;
             if matches!(row.status, Status::Cut { .. }) {
                 return Err(CutShort(row).into());
@@ -157,10 +162,9 @@ impl Runner<'_> {
             return Ok(Some(repeat));
         }
         let until = self.time.until(most_s);
-        let timing = self.pool(setting)?.install(|| {
-            let arithmetic = self.arithmetic(setting);
-            time_steps(&self.exact.exact, arithmetic, &setting.case, u64::MAX, until)
-        })?;
+        let timing = self
+            .pool(setting)?
+            .install(|| self.discretized(setting)?.time_steps(u64::MAX, until))?;
         let repeat = Repeat { wall_s: timing.wall_s, cpu_s: timing.cpu_s };
         Ok(timing.complete.then_some(repeat))
     }
@@ -183,7 +187,7 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
         file.write(&report.document()?)?;
     }
     if let Some(file) = csv {
-        file.write_text(&report.sheet())?;
+        file.write_text(&report.sheet().csv()?)?;
     }
     if let Some(file) = plot {
         file.write_text(&report.picture())?;
@@ -237,14 +241,13 @@ fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<S
     let keep = Keep::open(&options.kept, &options.name, &outputs)?;
     let runner =
         Runner { exact: &exact, single: single.as_ref(), pools, time, keep, selection: &selection };
-    let what =
-        |setting: &Setting| plan(&exact.exact, runner.arithmetic(setting), &setting.case).ok();
+    let what = |setting: &Setting| Some(*runner.discretized(setting).ok()?.plan());
     let case = Case { cfl: CFL, periods: options.periods, ..Case::default() };
     let base = Setting { case, single: false, threads };
     let tried = families(&base, more, single.is_some(), &what);
     if tried.is_empty() {
         // The reason why even the usual scheme cannot be run.
-        plan(&exact.exact, Arithmetic::Double, &case)?;
+        exact.discretized(&case)?;
         bail!("no scheme of the solver fits {}", selection.name());
     }
     let compared = Measure::new(options, &selection);
@@ -273,9 +276,7 @@ fn sweep_in<'a>(options: &'a TradeoffOptions, time: Time, bar: &Bar) -> Result<S
         Some(cases) => {
             let settings: Vec<Setting> =
                 list(&tried, cases, &what).into_iter().map(|(_, setting)| setting).collect();
-            let work = |setting: &Setting| {
-                what(setting).map_or(0.0, |plan| plan.steps as f64 * plan.particles)
-            };
+            let work = |setting: &Setting| what(setting).map_or(0.0, |plan| plan.work());
             let work: Vec<f64> = settings.iter().map(work).collect();
             let own = runner.keep.own(&work);
             let total: f64 =
@@ -697,33 +698,33 @@ impl Report<'_> {
         }))
     }
 
-    pub(super) fn sheet(&self) -> String {
-        let mut text = "front,scheme,cells,cfl,ppc,threads,precision,steps,particles,wall_s,cpu_s,wall_spread,timings,bytes,error,status\n"
-            .to_owned();
+    pub(super) fn sheet(&self) -> Sheet {
+        let header = "front,scheme,cells,cfl,ppc,threads,precision,steps,particles,wall_s,cpu_s,wall_spread,timings,bytes,error,status";
+        let mut sheet = Sheet::new(header.split(','));
         for (index, entry) in self.found.entries.iter().enumerate() {
             let Entry { setting, row, walls, bytes, .. } = entry;
             let error = self.error(entry);
             let error = if error.is_finite() { format!("{error:?}") } else { String::new() };
-            text += &format!(
-                "{},{},{},{:?},{},{},{},{},{},{:?},{:?},{:?},{},{:?},{error},{}\n",
-                u8::from(self.found.front.contains(&index)),
-                csv::quoted(&words::scheme(setting)),
-                row.cells,
-                row.cfl,
-                setting.case.per_cell,
-                setting.threads,
-                if setting.single { "f32" } else { "f64" },
-                row.steps,
-                row.particles,
-                row.wall_s,
-                row.cpu_s,
-                spread(walls),
-                walls.len(),
-                bytes,
-                csv::quoted(&row.status.to_string())
-            );
+            sheet.row([
+                u8::from(self.found.front.contains(&index)).to_string(),
+                words::scheme(setting),
+                row.cells.to_string(),
+                report::number(row.cfl),
+                setting.case.per_cell.to_string(),
+                setting.threads.to_string(),
+                if setting.single { "f32" } else { "f64" }.to_owned(),
+                row.steps.to_string(),
+                row.particles.to_string(),
+                report::number(row.wall_s),
+                report::number(row.cpu_s),
+                report::number(spread(walls)),
+                walls.len().to_string(),
+                report::number(*bytes),
+                error,
+                row.status.to_string(),
+            ]);
         }
-        text
+        sheet
     }
 
     pub(super) fn picture(&self) -> String {

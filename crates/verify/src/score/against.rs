@@ -9,10 +9,10 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::{Arithmetic, Case};
+use crate::discretized::Discretized;
 use crate::error::CaseError;
 use crate::frames::FrameOutput;
-use crate::plan::plan;
-use crate::run::{Outputs, Row, Status, run};
+use crate::run::{Outputs, Row, Status};
 
 use super::times::TIME_SLACK;
 use super::{Input, Quantity, ScoreError, ScoreOptions, ScoreRow, score};
@@ -84,7 +84,8 @@ pub fn against(
     folder: &Path,
     options: &ScoreOptions,
 ) -> Result<Agreement, AgainstError> {
-    let steps = plan(exact, Arithmetic::Double, case)?.steps;
+    let prepared = Discretized::new(exact, Arithmetic::Double, case)?;
+    let steps = prepared.plan().steps;
     let frames = FrameOutput {
         folder: folder.to_owned(),
         name: "beside".into(),
@@ -94,7 +95,7 @@ pub fn against(
     let progress = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(progress) };
     let between = row.frames.saturating_sub(1) as u64;
-    let run = run(exact, Arithmetic::Double, case, &mut outputs)?;
+    let run = prepared.run(&mut outputs)?;
     let end = run.dt * run.steps as f64;
     let is_close = |one: f64, other: f64| (one - other).abs() <= TIME_SLACK * end;
     let is_even = between > 0 && steps % between == 0;

@@ -2,9 +2,9 @@
 
 use mmsmith_solutions::{AnySolution, CATALOGUE, Precision, build};
 use mmsmith_verify::{
-    Arithmetic, Case, Coordinates, Criteria, Layout, Outputs, PerField, PerNorm, Placement, Row,
-    Scheme, Search, Shape, Start, Status, Stepping, Total, Transfer, Updated, is_stable, plan, run,
-    stability,
+    Arithmetic, Case, Coordinates, Criteria, Discretized, Layout, Outputs, PerField, PerNorm,
+    Placement, Row, Scheme, Search, Shape, Start, Status, Stepping, Total, Transfer, Updated,
+    is_stable, run, stability,
 };
 
 const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
@@ -15,6 +15,10 @@ fn solution<T: Precision>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
     let description = CATALOGUE.iter().find(|known| known.name == name).expect("a solution");
     let values = description.resolve(set.iter().copied()).expect("its parameters");
     build(name, &values).expect("a solution").expect("admissible values")
+}
+
+fn prepared<'a>(exact: &'a AnySolution<f64>, case: &Case) -> Discretized<'a> {
+    Discretized::new(exact, Arithmetic::Double, case).expect("a case that can be run")
 }
 
 fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
@@ -187,7 +191,7 @@ fn small_amplitudes_keep_their_relative_accuracy_until_positions_round() {
         let reference = relative(1e-6);
         let small = relative(1e-10);
         let exact = solution("axis-aligned", &[("A", 1e-14)]);
-        let round_off = plan(&exact, Arithmetic::Double, &case).unwrap().round_off;
+        let round_off = prepared(&exact, &case).plan().round_off;
         let allowed = 1e-3 * reference.0 + 3.0 * round_off / 1e-10;
         assert!((small.0 - reference.0).abs() < allowed, "{case:?}: {small:?} {reference:?}");
         assert!((small.1 / reference.1 - 1.0).abs() < 1e-3, "{case:?}: {small:?} {reference:?}");
@@ -241,13 +245,13 @@ fn an_almost_incompressible_solid_runs_with_the_time_step_of_its_p_waves() {
     let exact = solution("axis-aligned", &[("nu", 0.4999), ("A", 0.01)]);
     let search = Search { lower: None, upper: None, width: 0.05, criteria: Criteria::default() };
     let case = Case { cells: 6, ..Case::default() };
-    let row = stability(&exact, Arithmetic::Double, &case, &search, &mut |_| ()).unwrap();
+    let row = stability(&prepared(&exact, &case), &search, &mut |_| ()).unwrap();
     // c/c_p = sqrt((1 + nu) (1 - 2 nu)/(1 - nu))
     assert!((row.p_wave_limit - 0.024_49).abs() < 1e-4, "{row:?}");
     let share = row.p_wave_cfl.unwrap();
     assert!((0.5..1.3).contains(&share), "{row:?}");
     assert!(row.unstable_below.is_empty(), "{row:?}");
-    let at = |cfl| is_stable(&exact, Arithmetic::Double, &Case { cfl, ..case }, &search.criteria);
+    let at = |cfl| is_stable(&prepared(&exact, &Case { cfl, ..case }), &search.criteria);
     assert_eq!(at(row.bracket[0].unwrap()).unwrap().failure, None);
     assert_eq!(at(row.bracket[1].unwrap()).unwrap().failure, row.failure);
 }
@@ -277,7 +281,7 @@ fn limits_do_not_depend_on_the_start_of_the_search_or_on_threads() {
     let limit = |lower, upper, threads: usize| {
         let search = Search { lower, upper, width: 0.01, criteria: Criteria::default() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let find = || stability(&exact, Arithmetic::Double, &case, &search, &mut |_| ());
+        let find = || stability(&prepared(&exact, &case), &search, &mut |_| ());
         pool.install(find).unwrap()
     };
     let first = limit(None, None, 1);

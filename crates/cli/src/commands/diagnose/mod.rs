@@ -16,12 +16,12 @@ use mmsmith_spec::Condition;
 use mmsmith_verify::Quantity;
 use serde_json::{Value, json};
 
-use super::with_threads;
 use crate::arguments::DiagnoseOptions;
 use crate::expect;
 use crate::json::Output;
 use crate::library::{Selection, locate};
 use crate::number;
+use crate::processes::with_threads;
 use crate::table::{self, Table};
 use crate::terminal;
 use runs::{Errors, Run, Solver, written_step};

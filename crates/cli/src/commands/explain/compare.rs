@@ -2,13 +2,14 @@
 
 use anyhow::Result;
 use mmsmith_verify::{
-    Case, CostModel, Integrator, Outputs, Parts, Plan, Scheme, Shape, Status, median, plan, run,
+    Case, CostModel, Discretized, Integrator, Outputs, Parts, Scheme, Shape, Status, median,
 };
 use serde::Serialize;
 
 use crate::arguments::{Frame, HighDegree, Mass, SchemeOptions, Weights};
+use crate::commands::predict;
+use crate::commands::problem::Model;
 use crate::commands::scheme::Settled;
-use crate::commands::{Model, predict};
 use crate::memory;
 use crate::number;
 use crate::table::Table;
@@ -58,20 +59,19 @@ impl Comparison {
     pub(super) fn measure(model: &Model) -> Result<Self> {
         let mut rows = Vec::new();
         for (words, base) in schemes(model)? {
-            let fitting: Vec<(Case, Plan)> = LADDER
+            let fitting: Vec<Discretized<'_>> = LADDER
                 .into_iter()
                 .filter_map(|cells| fitting(model, &Case { cells, ..base }))
                 .collect();
-            let Some((finest, _)) = fitting.last() else { continue };
-            let Ok(learnt) = predict::learn(model, finest) else { continue };
-            for (whole, all) in &fitting {
-                let Some((case, predicted_s)) = share(model, &learnt, whole, all) else { continue };
+            let Some(finest) = fitting.last() else { continue };
+            let Ok(learnt) = predict::learn(finest) else { continue };
+            for whole in &fitting {
+                let Some((case, predicted_s)) = share(&learnt, whole) else { continue };
                 if predicted_s > MOST_S {
                     continue;
                 }
                 let mut quiet = |_| {};
-                let mut outputs = Outputs::new(&mut quiet);
-                let row = run(&model.exact, model.arithmetic(), &case, &mut outputs)?;
+                let row = case.run(&mut Outputs::new(&mut quiet))?;
                 // What stopped took less than all its steps do.
                 if !matches!(row.status, Status::Ok | Status::Unresolved { .. }) {
                     continue;
@@ -168,20 +168,21 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     all.iter().map(told).collect()
 }
 
-/// A case with what it comes to, where it fits the solution and the memory.
-fn fitting(model: &Model, case: &Case) -> Option<(Case, Plan)> {
-    let all = plan(&model.exact, model.arithmetic(), case).ok()?;
-    memory::require(all.bytes, case.cells).ok()?;
-    Some((*case, all))
+/// A case on its grid, where it fits the solution and the memory.
+fn fitting<'a>(model: &'a Model, case: &Case) -> Option<Discretized<'a>> {
+    let found = model.discretized(case).ok()?;
+    memory::require(found.plan().bytes, case.cells).ok()?;
+    Some(found)
 }
 
 /// The part of a period of a case that tells enough, and the seconds that its steps are predicted to take.
-fn share(model: &Model, learnt: &CostModel, whole: &Case, all: &Plan) -> Option<(Case, f64)> {
-    let seconds = learnt.predict(all)?.steps_s;
-    let part = (ENOUGH_S / seconds).max(LEAST_STEPS / all.steps as f64).min(1.0);
-    let case = Case { periods: whole.periods * part, ..*whole };
-    let plan = plan(&model.exact, model.arithmetic(), &case).ok()?;
-    Some((case, learnt.predict(&plan)?.steps_s))
+fn share<'a>(learnt: &CostModel, whole: &Discretized<'a>) -> Option<(Discretized<'a>, f64)> {
+    let (seconds, steps) = (learnt.predict(whole.plan())?.steps_s, whole.plan().steps as f64);
+    let part = (ENOUGH_S / seconds).max(LEAST_STEPS / steps).min(1.0);
+    let periods = whole.case().periods * part;
+    let case = whole.with(&Case { periods, ..*whole.case() }).ok()?;
+    let predicted_s = learnt.predict(case.plan())?.steps_s;
+    Some((case, predicted_s))
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! How strongly a motion deforms its cells, and whether the usual scheme follows it.
 
 use anyhow::Result;
-use mmsmith_verify::{Case, Distortion, Outputs, Row, distortion, plan, run};
+use mmsmith_verify::{Case, Discretized, Distortion, Outputs, Row, distortion};
 use serde_json::{Value, json};
 
-use crate::commands::Model;
+use crate::commands::problem::Model;
 use crate::commands::remedy::{Advice, Given};
 use crate::commands::scheme::Settled;
 use crate::number;
@@ -73,14 +73,11 @@ impl Deformation {
 
 /// A run of the usual scheme on a small grid, and what runs instead where it stopped; nothing where no grid is small enough.
 fn tried(given: Given<'_>, model: &Model, usual: &Case) -> Result<Option<(Row, Option<Advice>)>> {
-    let fits = |cells: &usize| {
-        plan(&model.exact, model.arithmetic(), &Case { cells: *cells, ..*usual })
-            .is_ok_and(|plan| plan.particles * plan.steps as f64 <= MOST_WORK)
-    };
-    let Some(cells) = GRIDS.into_iter().find(fits) else { return Ok(None) };
-    let case = Case { cells, ..*usual };
+    let on = |cells| model.discretized(&Case { cells, ..*usual }).ok();
+    let is_little = |case: &Discretized<'_>| case.plan().work() <= MOST_WORK;
+    let Some(case) = GRIDS.into_iter().filter_map(on).find(is_little) else { return Ok(None) };
     let mut quiet = |_| {};
-    let row = run(&model.exact, model.arithmetic(), &case, &mut Outputs::new(&mut quiet))?;
-    let advice = Advice::seek(given, model, &case, &row)?;
+    let row = case.run(&mut Outputs::new(&mut quiet))?;
+    let advice = Advice::seek(given, model, case.case(), &row)?;
     Ok(Some((row, advice)))
 }

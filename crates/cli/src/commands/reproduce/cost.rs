@@ -35,7 +35,7 @@ pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Sectio
         let said = format!("\n{problem}: the front of error against cost\n{}", front.text());
         agenda.aside(|| terminal::say(&said))?;
         json.write(&report.document()?)?;
-        csv.write_text(&report.sheet())?;
+        csv.write_text(&report.sheet().csv()?)?;
         plot.write_text(&svg)?;
         advice.write_text(&report.advice())?;
         section.heading(problem);

@@ -2,21 +2,19 @@
 
 use std::path::Path;
 
-use anyhow::Result;
-use mmsmith_verify::{
-    Case, Moment, Outputs, Progress, Row, Shape, Status, Stepping, energy_drift, run as simulate,
-};
+use anyhow::{Result, bail};
+use mmsmith_verify::{Case, Moment, Outputs, Row, Shape, Status, Stepping, energy_drift};
 use serde_json::json;
 
 use super::section::Section;
 use super::{CD, PROBLEMS, Pace, name, studied};
-use crate::arguments::Precision;
+use crate::commands::problem::Problem;
 use crate::commands::run::{course, drift_plot, history_document};
-use crate::commands::scheme::{Settled, usual};
-use crate::commands::{Model, settings};
-use crate::csv;
+use crate::commands::scheme::usual;
 use crate::json::Output;
 use crate::progress::Agenda;
+use crate::report::{Files, Form, Report, Section as Part};
+use crate::sheets;
 use crate::table::Table;
 
 const CELLS: usize = 16;
@@ -45,29 +43,32 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
     for (problem, pace) in PROBLEMS.into_iter().zip(paces) {
         let folder = out.join(problem);
         let selection = studied(problem, &[])?;
-        let model = Model::new(&selection, Precision::F64)?;
         let mut curves = Vec::new();
         let header = ["scheme", "least", "largest", "at the end", "momentum", "status"];
         let mut table = Table::new(1, header);
         for stepping in STEPPINGS {
             let scheme = (Shape::Gimp, stepping);
             let base = case(stepping);
-            let extent = model.admit(&[base])?;
+            let known = Problem::of(selection.clone(), base)?;
+            let cases = known.model.admit(&[base])?;
+            let [one] = cases.as_slice() else { bail!("a run has one case") };
             let stem = format!("drift-{}-{}", scheme.0, scheme.1);
-            let json = Output::prepare(&folder.join(format!("{stem}.json")))?;
-            let sheet = Output::prepare(&folder.join(format!("{stem}.csv")))?;
+            let files = Files::of_stem(&folder, &stem, &[Form::Json, Form::Csv])?;
             let bar = agenda.next(pace.seconds(&[base]));
             let what = format!("{problem}, energy, {}", name(scheme));
-            let (row, history) = run(&model, &base, &mut |progress| bar.show(&what, progress))?;
-            json.write(&json!({
-                "schema": "mmsmith.run/1",
-                "settings": settings(&selection, &Settled::of(base), extent, CELLS, base.cfl),
-                "result": row,
-                "history": history_document(&history),
-            }))?;
-            sheet.write_text(&csv::history(&history))?;
+            let mut history = Vec::new();
+            let show = &mut |progress| bar.show(&what, progress);
+            let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(show) };
+            let row = one.run(&mut outputs)?;
+            let report = Report {
+                settings: known.settings(one.plan().extent, CELLS, base.cfl),
+                sections: vec![Part::Sheet(sheets::history(&history))],
+                ..Report::new("run")
+            };
+            let report = report.with("result", json!(row));
+            report.with("history", history_document(&history)).write(files)?;
             table.row(cells(name(scheme), &row, &history));
-            curves.push(course(name(scheme), &model, &history));
+            curves.push(course(name(scheme), &known.model, &history));
             section.remember(problem, &stem, &["json", "csv"]);
         }
         let svg = drift_plot(&format!("{problem}: drift of energy"), curves);
@@ -83,13 +84,6 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
     }
     section.remembered();
     Ok(section)
-}
-
-fn run(model: &Model, case: &Case, show: &mut dyn FnMut(Progress)) -> Result<(Row, Vec<Moment>)> {
-    let mut history = Vec::new();
-    let mut outputs = Outputs { history: Some(&mut history), ..Outputs::new(show) };
-    let row = simulate(&model.exact, model.arithmetic(), case, &mut outputs)?;
-    Ok((row, history))
 }
 
 fn cells(name: String, row: &Row, history: &[Moment]) -> [String; 6] {

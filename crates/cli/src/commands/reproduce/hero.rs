@@ -2,14 +2,14 @@
 
 use anyhow::{Context, Result};
 use mmsmith_verify::{
-    Case, Coordinates, Extent, Layout, Outputs, Placement, Scheme, Shape, Snapshot, Status, Sweep,
-    Total, Updated, converge as measure, run as simulate,
+    Case, Coordinates, Extent, Layout, Outputs, Placement, Scheme, Shape, Snapshot, Status, Study,
+    Sweep, Total, Updated,
 };
 
 use super::{GRID, studied};
 use crate::arguments::{Precision, Stress};
-use crate::commands::Model;
 use crate::commands::picture::{draw, range};
+use crate::commands::problem::Model;
 use crate::svg::{Curve, Plot, beside};
 use crate::units::Units;
 
@@ -58,7 +58,7 @@ pub(super) fn svg() -> Result<String> {
     let mut snapshot = Snapshot { share: 1.0, frame: None };
     let silent = &mut |_| ();
     let mut outputs = Outputs { snapshot: Some(&mut snapshot), ..Outputs::new(silent) };
-    simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?;
+    model.discretized(&case)?.run(&mut outputs)?;
     let frame = snapshot.frame.context("the ring's run stopped before its end")?;
     let hoop = Stress::Hoop.values(&frame)?;
     let note = format!("{} particles that fit the rims, {SHOWN} cells, cpdi2", frame.points.len());
@@ -67,7 +67,8 @@ pub(super) fn svg() -> Result<String> {
     let mut curves = Vec::new();
     for one in schemes() {
         let sweep = Sweep::Cells(CELLS.to_vec());
-        let study = measure(&model.exact, model.arithmetic(), &one.case, &sweep, &mut |_| ())?;
+        let cases = model.admit(&sweep.cases(&one.case))?;
+        let study = Study::measure(&cases, &sweep, &mut |_| ())?;
         let cases = study
             .rows
             .iter()

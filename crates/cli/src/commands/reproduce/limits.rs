@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use mmsmith_verify::Shape;
+use mmsmith_verify::{Shape, StabilityRow};
 
 use super::section::Section;
 use super::{CD, PROBLEMS, Pace, study_parameters};
 use crate::arguments::StabilityOptions;
 use crate::commands::scheme::usual;
-use crate::commands::stability::{Surveyed, survey};
-use crate::json::Output;
+use crate::commands::stability::{Survey, survey};
+use crate::commands::study::{Study, results};
+use crate::keep::{Found, Keep};
 use crate::progress::Bar;
+use crate::report::{Files, Form};
 
 /// A small grid: the limit depends little on it.
 const CELLS: usize = 16;
@@ -29,18 +31,23 @@ pub(super) fn seconds(pace: &Pace) -> f64 {
 pub(super) fn section(out: &Path, bar: &Bar) -> Result<Section> {
     let problem = PROBLEMS[0];
     let folder = out.join(problem);
-    let file = |name: &str| Output::prepare(&folder.join(name));
-    let (json, csv, plot) =
-        (file("stability.json")?, file("stability.csv")?, file("stability.svg")?);
+    let files = Files::of_stem(&folder, "stability", &[Form::Json, Form::Csv, Form::Plot])?;
     let mut options = StabilityOptions::map(problem, CELLS, OVER);
     options.scheme.parameters.set = study_parameters(&[]);
-    let Surveyed::All(found) = survey(&options, bar)? else {
-        bail!("the report needs the limits of all settings, not those of one shard");
-    };
-    json.write(&found.document()?)?;
-    csv.write_text(&found.sheet())?;
-    let svg = found.picture();
-    plot.write_text(&svg)?;
+    survey(&options, |found| {
+        let Found::All(rows) = results(found, &Keep::nowhere(), None, bar)? else {
+            bail!("the report needs the limits of all settings, not those of one shard");
+        };
+        let report = found.report(rows.clone())?;
+        let svg = report.plot();
+        report.write(files)?;
+        Ok(told(found, &rows, svg))
+    })
+}
+
+/// The section on a map of limits, which is drawn as `svg`.
+fn told(found: &Survey<'_>, rows: &[StabilityRow], svg: String) -> Section {
+    let problem = PROBLEMS[0];
     let said = format!(
         "The largest stable CFL number of gimp+cd on {problem} with {CELLS} cells, over the amplitude and Poisson's ratio. \
          Linear analysis allows the step in which P-waves cross one cell. As long as particles stay where they are, the limit \
@@ -53,8 +60,8 @@ pub(super) fn section(out: &Path, bar: &Bar) -> Result<Section> {
         format!("{problem}/stability.svg"),
         format!("Each limit and its share of the CFL number of P-waves. {}", found.definition()),
     )]);
-    section.table(&found.table(), &format!("{problem}: largest stable CFL numbers"));
-    section.lines(&found.notes());
+    section.table(&found.table(rows), &format!("{problem}: largest stable CFL numbers"));
+    section.lines(&found.notes(rows));
     section.files(problem, "stability", &["json", "csv", "svg"]);
-    Ok(section)
+    section
 }

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use mmsmith_verify::{Case, FrameOutput, Outputs, Shape, run as simulate};
+use mmsmith_verify::{Case, FrameOutput, Outputs, Shape};
 use mmsmith_vtk::{Frame, read};
 
 use super::{CD, FRAMES, GRID, PROBLEMS};
 use crate::arguments::Stress;
-use crate::commands::Model;
 use crate::commands::picture::{draw, range};
+use crate::commands::problem::Model;
 use crate::commands::scheme::usual;
 use crate::library::Selection;
 use crate::number;
@@ -42,7 +42,7 @@ pub(super) fn write_contrast(
     };
     let silent = &mut |_| ();
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
-    simulate(&model.exact, model.arithmetic(), &case, &mut outputs)?;
+    model.discretized(&case)?.run(&mut outputs)?;
     Ok(())
 }
 

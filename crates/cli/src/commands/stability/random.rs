@@ -1,117 +1,115 @@
 //! Failures inside the region believed stable, looked for by random settings.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use anyhow::{Result, bail};
-use mmsmith_verify::{Case, CflSpeed, Criteria, GridPose, Observed, is_stable};
+use mmsmith_verify::{Case, CflSpeed, Criteria, Discretized, GridPose, Observed, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
-use super::{Point, definition, told, without_threads, work};
+use super::{Point, definition, request, told, without_threads};
 use crate::arguments::{SchemeOptions, StabilityOptions, word};
-use crate::commands::scheme::Settled;
-use crate::commands::{caption, settings, with_threads};
-use crate::json::Output;
-use crate::keep::{Found, Keep, Order};
+use crate::commands::problem::Problem;
+use crate::commands::study::{Show, Study, conduct};
+use crate::keep::Order;
 use crate::library::Selection;
-use crate::progress::Bar;
-use crate::terminal;
+use crate::report::{Form, Report, Section};
 
 /// Draws for one setting; the specification may refuse some.
 const MOST_DRAWS: usize = 100;
 
 pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
-    let settled = &Settled::settle(&options.scheme, &selection.build()?)?;
-    let cfl = settled.case.cfl;
+    let common = &Problem::new(selection, &options.scheme)?;
     if options.plot.is_some() || options.csv.is_some() {
         bail!("--search random draws no picture and no table; use --json");
     }
-    let output = Output::prepare_if(settled.json.as_ref())?;
-    let points: Vec<Point> = (0..options.samples)
-        .map(|sample| draw(options, &settled.case, &selection, sample))
-        .collect::<Result<_>>()?;
-    let keep =
-        Keep::open(&options.kept, &options.name, &[("--json", options.scheme.json.is_some())])?;
-    let own = keep.own(&work(&points)?);
-    let keys: Vec<_> = points
-        .iter()
-        .map(|Point { selection, settled, extent, .. }| {
-            let Case { cells, cfl, .. } = settled.case;
-            let case = settings(selection, settled, *extent, cells, cfl);
-            without_threads(json!({ "case": case, "criteria": criteria }))
-        })
-        .collect();
-    with_threads(settled.threads, || {
-        let found: Found<Observed> = {
-            let bar = Bar::new("random settings");
-            let done = AtomicUsize::new(0);
-            let count = own.iter().filter(|own| **own).count();
-            keep.all(
-                &keys,
-                &own,
-                Order::AtOnce,
-                |_| {},
-                |index| {
-                    let Point { model, settled, .. } = &points[index];
-                    let case = &settled.case;
-                    let found = is_stable(&model.exact, model.arithmetic(), case, criteria)?;
-                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    let share = done as f64 / count as f64;
-                    bar.show_share(|| format!("setting {done}/{count}"), share);
-                    Ok(found)
-                },
-            )?
+    let draw = |sample| draw(options, common, sample);
+    let points = (0..options.samples).map(draw).collect::<Result<Vec<_>>>()?;
+    let mut cases = Vec::new();
+    for problem in &points {
+        cases.push(problem.model.discretized(&problem.settled.case)?);
+    }
+    let study = RandomSettings { options, criteria, common, points: &points, cases };
+    conduct(&study, &request(options, &[(Form::Json, &options.scheme.json)]))
+}
+
+/// Runs of random settings.
+struct RandomSettings<'a> {
+    options: &'a StabilityOptions,
+    criteria: &'a Criteria,
+    /// The settings without what is drawn.
+    common: &'a Problem,
+    points: &'a [Problem],
+    cases: Vec<Discretized<'a>>,
+}
+
+impl Study for RandomSettings<'_> {
+    type Found = Observed;
+
+    fn order(&self) -> Order {
+        Order::AtOnce
+    }
+
+    fn keys(&self) -> Vec<Value> {
+        let key = |(problem, case): (&Problem, &Discretized<'_>)| {
+            let Case { cells, cfl, .. } = *case.case();
+            let case = problem.settings(case.plan().extent, cells, cfl);
+            without_threads(json!({ "case": case, "criteria": self.criteria }))
         };
-        let found = match found {
-            Found::All(found) => found,
-            Found::Part(part) => {
-                terminal::say(&part.to_string())?;
-                return Ok(true);
-            }
-        };
-        let extent = points.first().and_then(|point| point.extent);
-        let mut text = settled.choice() + &caption(&selection, settled, extent);
-        text += &definition(criteria);
+        self.points.iter().zip(&self.cases).map(key).collect()
+    }
+
+    fn work(&self) -> Vec<f64> {
+        self.cases.iter().map(|case| case.plan().work()).collect()
+    }
+
+    fn measure(&self, index: usize, show: &Show<'_>) -> Result<Observed> {
+        let found = is_stable(&self.cases[index], self.criteria)?;
+        show.share(|| format!("setting {}/{}", index + 1, self.cases.len()), 1.0);
+        Ok(found)
+    }
+
+    fn report(&self, found: Vec<Observed>) -> Result<Report> {
+        let Self { options, criteria, common, points, cases } = self;
+        let (cfl, extent) = (common.settled.case.cfl, cases.first().and_then(|c| c.plan().extent));
+        let mut text = definition(criteria);
         text += &format!(
-            "{} random settings (seed {}) with CFL numbers up to {} on P-waves:\n",
+            "{} random settings (seed {}) with CFL numbers up to {cfl} on P-waves:\n",
             points.len(),
             options.seed,
-            cfl
         );
         let mut failures = Vec::new();
-        for (point, found) in points.iter().zip(&found) {
+        for (problem, found) in points.iter().zip(&found) {
             let Some(failure) = &found.failure else { continue };
-            let command = command(options, point);
+            let command = command(options, problem);
             text += &format!("UNSTABLE: {}\n  {command}\n", told(failure));
-            let cfl = point.settled.case.cfl;
+            let cfl = problem.settled.case.cfl;
             failures.push(json!({ "command": command, "cfl": cfl, "failure": failure }));
         }
         text += &format!("{} of {} unstable\n", failures.len(), points.len());
-        terminal::say(&text)?;
-        let passed = failures.is_empty();
-        if let Some(output) = output {
-            output.write(&json!({
-                "schema": "mmsmith.stability/1",
-                "settings": settings(&selection, settled, extent, Value::Null, cfl),
-                "criteria": criteria,
-                "samples": points.len(),
-                "seed": options.seed,
-                "failures": failures,
-            }))?;
-        }
-        Ok(passed)
-    })
+        let verdict = Some(failures.is_empty());
+        let results = [
+            ("criteria", json!(criteria)),
+            ("samples", json!(points.len())),
+            ("seed", json!(options.seed)),
+            ("failures", json!(failures)),
+        ];
+        Ok(Report {
+            command: "stability",
+            preface: common.settled.choice(),
+            caption: common.caption(extent),
+            sections: vec![Section::Note(text)],
+            settings: common.settings(extent, Value::Null, cfl),
+            results: results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect(),
+            verdict,
+        })
+    }
 }
 
 /// Setting number `sample`.
-fn draw(
-    options: &StabilityOptions,
-    base: &Case,
-    selection: &Selection,
-    sample: usize,
-) -> Result<Point> {
+fn draw(options: &StabilityOptions, common: &Problem, sample: usize) -> Result<Problem> {
+    let Problem { selection, settled, .. } = common;
+    let base = &settled.case;
     let mut random = Random::new(options.seed.wrapping_add((sample as u64) << 32));
     let mut last = None;
     for _ in 0..MOST_DRAWS {
@@ -134,13 +132,14 @@ fn draw(
         let attempt = selection.with(&parameters).and_then(|selection| {
             let ppc = Some(ppc.max(base.per_cell));
             let scheme = SchemeOptions { ppc, offset, ..options.scheme.clone() };
-            let mut point = Point::new(Vec::new(), selection, &scheme, cells)?;
-            let unit = mmsmith_verify::p_wave_limit(&point.model.exact, &point.settled.case)?;
-            point.settled.case.cfl = base.cfl * unit * share;
-            Ok(point)
+            let point = Point::new(Vec::new(), selection, &scheme, cells)?;
+            let unit = mmsmith_verify::p_wave_limit(&point.admit()?)?;
+            let mut problem = point.problem;
+            problem.settled.case.cfl = base.cfl * unit * share;
+            Ok(problem)
         });
         match attempt {
-            Ok(point) => return Ok(point),
+            Ok(problem) => return Ok(problem),
             Err(error) => last = Some(error),
         }
     }
@@ -151,8 +150,8 @@ fn draw(
 }
 
 /// The command line that repeats a setting.
-fn command(options: &StabilityOptions, point: &Point) -> String {
-    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent } = point.settled.case;
+fn command(options: &StabilityOptions, problem: &Problem) -> String {
+    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent } = problem.settled.case;
     let parts = scheme.parts();
     let mut text = format!(
         "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --offset {:?} --shape {} --integrator {} --start {} \
@@ -164,7 +163,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
         parts.start,
         parts.transfer,
         parts.layout,
-        word(point.settled.precision),
+        word(problem.settled.precision),
         options.error_multiple,
         options.energy_rate,
     );
@@ -184,7 +183,7 @@ fn command(options: &StabilityOptions, point: &Point) -> String {
     if let Some(extent) = extent {
         text += &format!(" --extent {extent}");
     }
-    for (name, value) in point.selection.parameters() {
+    for (name, value) in problem.selection.parameters() {
         text += &format!(" --set {name}={value:?}");
     }
     text

@@ -1,0 +1,154 @@
+//! Judgement of a series of errors.
+
+use mmsmith_verify::{
+    Behaviour, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
+    Values, expected_in_space, expected_in_time, orders_above, verdicts_above,
+};
+
+use super::Converge;
+
+/// Orders of every field and norm, judged.
+pub(in crate::commands) type Verdicts = PerField<PerNorm<OrderVerdict>>;
+
+/// Rows with their orders and verdicts.
+pub(super) struct Judged {
+    pub(super) study: Study,
+    pub(super) verdicts: Verdicts,
+    /// Of a study in time.
+    pub(super) differences: Option<(Temporal, Verdicts)>,
+}
+
+impl Judged {
+    pub(super) fn new(asked: &Converge<'_>, rows: Vec<Row>, differences: Option<Temporal>) -> Self {
+        let Converge { problem, sweep, base, cases, orders, .. } = asked;
+        let floors: Vec<PerField<f64>> = cases.iter().map(|case| *case.floors()).collect();
+        let study = above(Study::new(rows, sweep), sweep, &floors);
+        // In time the expectation is about the differences; the total error is mostly a spatial one.
+        let in_space = match (sweep, orders.expected) {
+            (Sweep::Cells(_), Some(expected)) => expected,
+            (Sweep::Cells(_), None) => expected_in_space(&problem.model.exact, base),
+            (Sweep::Cfls(_), _) => Expected::default(),
+        };
+        let coarsest = coarsest(&study, sweep);
+        let settle = |judged: Verdicts| match orders.strict {
+            true => judged,
+            false => unless_unjudged(judged, coarsest),
+        };
+        let verdicts = settle(judge_above(&study, sweep, &in_space, orders.tolerance, &floors));
+        let differences = differences.map(|found| {
+            let expected = orders.expected.unwrap_or_else(|| expected_in_time(base));
+            let verdicts = settle(judge_differences(&found, &expected, orders.tolerance));
+            (found, verdicts)
+        });
+        Self { study, verdicts, differences }
+    }
+
+    /// The verdicts on which the result of the study hangs.
+    pub(super) fn decisive(&self) -> &Verdicts {
+        self.differences.as_ref().map_or(&self.verdicts, |(_, verdicts)| verdicts)
+    }
+
+    /// Whether the study did what it promised: false where an order was missed or a run stopped, and `None` where nothing was
+    /// judged.
+    pub(super) fn passed(&self) -> Option<bool> {
+        let of_differences = self.differences.iter().flat_map(|(found, _)| &found.rows);
+        let ends = self.study.rows.iter().map(|row| &row.status);
+        let mut ends = ends.chain(of_differences.map(|row| &row.status));
+        let is = |passed| any(self.decisive(), |one| one.passed == Some(passed));
+        if ends.any(|end| end.passed() == Some(false)) || is(false) {
+            return Some(false);
+        }
+        is(true).then_some(true)
+    }
+}
+
+/// Whether a verdict of any field and norm is so.
+pub(super) fn any(judged: &Verdicts, is_so: impl Fn(&OrderVerdict) -> bool) -> bool {
+    judged.iter().any(|(_, norms)| norms.iter().any(|(_, one)| is_so(one)))
+}
+
+/// The study without orders of rows that rounding may have caused.
+fn above(mut study: Study, sweep: &Sweep, floors: &[PerField<f64>]) -> Study {
+    let steps: Vec<f64> = study.rows.iter().map(|row| step(row, sweep)).collect();
+    let errors: Vec<_> =
+        study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.errors)).collect();
+    study.orders = orders_above(&steps, &errors, floors);
+    study
+}
+
+/// The step that orders of a study are about.
+pub(super) fn step(row: &Row, sweep: &Sweep) -> f64 {
+    if matches!(sweep, Sweep::Cells(_)) { row.h } else { row.dt }
+}
+
+/// Judges the errors of a study, large or small.
+pub(in crate::commands) fn judge(
+    study: &Study,
+    sweep: &Sweep,
+    expected: &Expected,
+    tolerance: f64,
+) -> Verdicts {
+    judge_above(study, sweep, expected, tolerance, &[])
+}
+
+/// Judges the errors of a study that are above what rounding alone may cause.
+fn judge_above(
+    study: &Study,
+    sweep: &Sweep,
+    expected: &Expected,
+    tolerance: f64,
+    floors: &[PerField<f64>],
+) -> Verdicts {
+    let nothing = {
+        let none = PerNorm { linf: f64::NAN, l2: f64::NAN, l1: f64::NAN };
+        PerField { u: none, v: none, F: none, P: none }
+    };
+    let steps: Vec<f64> = study.rows.iter().map(|row| step(row, sweep)).collect();
+    let errors = study.rows.iter().map(|row| match &row.status {
+        Status::Ok => Some(&row.errors),
+        status if status.is_not_judged() => Some(&nothing),
+        _ => None,
+    });
+    let errors: Vec<_> = errors.collect();
+    verdicts_above(&Values { steps: &steps, errors: &errors, floors }, expected, tolerance)
+}
+
+/// The cells of the coarsest grid of a series of grids.
+fn coarsest(study: &Study, sweep: &Sweep) -> Option<usize> {
+    match sweep {
+        Sweep::Cells(_) => study.rows.iter().map(|row| row.cells).min(),
+        Sweep::Cfls(_) => None,
+    }
+}
+
+/// Verdicts where an expectation that nothing can judge is none. Errors on coarse grids may fall faster than theory promises, or
+/// somewhat slower: that is no failure, and no proof before the order has settled.
+fn unless_unjudged(judged: Verdicts, coarsest: Option<usize>) -> Verdicts {
+    let settle = |one: OrderVerdict| {
+        let above = one.finest.zip(one.expected).map(|(order, expected)| order - expected);
+        let is_unjudged = match one.behaviour {
+            Behaviour::NoOrder | Behaviour::AtRounding => true,
+            Behaviour::NotSettled => above.is_some_and(|above| above > one.tolerance),
+            _ => false,
+        };
+        match coarsest {
+            _ if is_unjudged => OrderVerdict { passed: None, ..one },
+            Some(cells) => one.sparing_coarse_grids(cells),
+            None => one,
+        }
+    };
+    PerField::from_fn(|field| PerNorm::from_fn(|norm| settle(judged[field][norm].clone())))
+}
+
+/// Judges the differences on one grid.
+pub(in crate::commands) fn judge_differences(
+    temporal: &Temporal,
+    expected: &Expected,
+    tolerance: f64,
+) -> Verdicts {
+    let steps: Vec<f64> = temporal.rows.iter().map(|row| row.dt).collect();
+    let rows = temporal.rows.iter();
+    let values = rows.map(|row| (row.status == Status::Ok).then_some(&row.differences));
+    let errors: Vec<_> = values.collect();
+    verdicts_above(&Values { steps: &steps, errors: &errors, floors: &[] }, expected, tolerance)
+}
