@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_mpm::each_chunk;
+use mmsmith_threads::each_chunk;
 
 use super::axis::{Axis, End};
 use super::piece;

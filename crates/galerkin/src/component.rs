@@ -6,7 +6,7 @@
 use std::mem;
 
 use mmsmith_mpm::SetupError;
-use mmsmith_mpm::{each, each_chunk};
+use mmsmith_threads::{each, each_chunk};
 
 use super::basis::{Basis, Part};
 use super::boundary::Face;

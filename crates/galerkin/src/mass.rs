@@ -4,7 +4,7 @@
 //! banded matrix for each axis, so that its inverse is applied axis after axis.
 
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_mpm::{each, each_chunk};
+use mmsmith_threads::{each, each_chunk};
 
 use super::axis::{Axis, End};
 use super::basis::{Basis, Part};

@@ -16,7 +16,7 @@ use mmsmith_mpm::BodyForce;
 use mmsmith_mpm::Particles;
 use mmsmith_mpm::{SavedState, SavedStateError, replace_whole};
 use mmsmith_mpm::{SetupError, StepError};
-use mmsmith_mpm::{each, each_chunk};
+use mmsmith_threads::{each, each_chunk};
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};

@@ -145,14 +145,13 @@
 //! - `domain`: the domains that weights are means over, of each particle alone or on shared corners.
 //! - `kernel`: sums over weights in vector instructions, for blocks of particles.
 //! - `step`: each integrator as a sequence of `p2g`, `grid_update`, `g2p`; `g2p2g` fuses G2P with the next P2G; `xpic`: its filter.
-//! - `parallel`: bins of particles and the two-colour schedule. `processes`: several processes, and the state to resume from.
+//! - `processes`: several processes, and the state to resume from.
 
 mod domain;
 mod error;
 mod grid;
 mod kernel;
 mod named;
-mod parallel;
 mod particles;
 mod processes;
 mod scheme;
@@ -174,7 +173,6 @@ pub use mmsmith_laws::{
 };
 pub use named::UnknownName;
 #[doc(hidden)]
-pub use parallel::chunks::{each, each_chunk};
 pub use particles::Particles;
 pub use particles::body::{Annulus, Body};
 pub use particles::clip::{Clip, Facet, Side};

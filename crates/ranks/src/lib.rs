@@ -7,12 +7,16 @@
 //!
 //! [`in_process()`] gives ranks that are threads of one process, for tests. The crate `mmsmith-message-passing` gives those of MPI.
 
+mod directory;
 mod in_process;
+mod moves;
 mod traffic;
 
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, cast_slice_mut};
 
+pub use directory::{Answers, Directory};
 pub use in_process::in_process;
+pub use moves::{Lists, Move};
 pub use traffic::{Sent, Traffic, counted};
 
 /// One of the processes of a run.

@@ -5,7 +5,7 @@
 //! from it:      v_c = sum_i v_i N_i(x_c);  v_p by sum_c w_pc v_c, grad v = sum_c v_c g_pc
 //! ```
 //!
-//! Sums over the particles at a corner are in the order of ids, sums over corners at a node in that of [`bins`](crate::parallel::bins)
+//! Sums over the particles at a corner are in the order of ids, sums over corners at a node in that of [`bins`](crate::grid::bins)
 //! of corners: no sum depends on the number of threads.
 
 use mmsmith_lanes::simd::{Lane4, Lanes, dispatch};
@@ -14,6 +14,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::corner_values::{AlongAxes, CornerValues};
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::{CHUNK, Chunk, SharedCorners};
+use crate::grid::bins::Bins;
 use crate::grid::extension::Extension;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
@@ -21,11 +22,10 @@ use crate::grid::node::Node;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
-use crate::parallel::bins::Bins;
-use crate::parallel::chunks::each;
 use crate::shape::one_axis::OnAxis;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome, SharedOutcome};
+use mmsmith_threads::each;
 
 /// The source of the tractions on the boundary, and the time.
 pub(crate) type Loading<'a, T, const D: usize> = Option<(&'a dyn BodyForce<T, D>, T)>;

@@ -13,9 +13,9 @@ use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::cpdi::ParallelogramWeights;
 use crate::kernel::cpdi::parallelograms::{GROUP, OfGroup, gather, padded, parallelograms};
-use crate::processes::decomposition::Move;
 use crate::shape::cells::{self, HalfEdges, MOST_CORNERS, REACHED, corner_of_parallelogram};
 use crate::shape::one_axis::{HALF_SIZE_LIMIT, node_below};
+use mmsmith_ranks::Move;
 
 /// Hat functions interpolated between the corners of parallelograms, half of whose edges in the reference configuration are the columns
 /// of a matrix, lengths.

@@ -12,10 +12,10 @@ use nalgebra::{RealField, SMatrix, SVector};
 use crate::grid::geometry::Constants;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::processes::decomposition::Move;
 use crate::shape::cells::REACHED;
 use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, first_layer, node_below};
 use crate::step::health::{Invalid, Outcome};
+use mmsmith_ranks::Move;
 
 /// Domains of particles whose weights are means over them.
 pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {

@@ -11,12 +11,12 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::of_particles::Domain;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::parallel::chunks::each;
 use crate::particles::mesh::{Interpolation, Mesh, Share};
 use crate::processes::corner_halo::CornerHalo;
 use crate::shape::cells::{PAIRS, volume_of_cell};
 use crate::shape::one_axis::ProductShape;
 use crate::step::health::Invalid;
+use mmsmith_threads::each;
 
 /// Corners handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 pub(crate) const CHUNK: usize = 1024;

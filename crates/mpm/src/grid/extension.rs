@@ -22,11 +22,11 @@ use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
 use crate::grid::Layout;
+use crate::grid::bins::{AddToBand, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate, receive_nodes, send_nodes};
 use crate::grid::node::Node;
-use crate::parallel::bins::{AddToBand, Bins};
-use crate::parallel::chunks::each_chunk;
+use mmsmith_threads::each_chunk;
 
 /// Nodes with less than this share of the mass of a whole cell are light.
 ///

@@ -6,9 +6,9 @@ use mmsmith_lanes::tensor::{product, real};
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::grid::bins::{BinRows, Bins};
 use crate::grid::node::Node;
 use crate::grid::{Grid, Layout};
-use crate::parallel::bins::{BinRows, Bins};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 
 /// Constants of a run: the grid's geometry, the rows of each bin, the time step.

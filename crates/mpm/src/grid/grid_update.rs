@@ -12,12 +12,12 @@ use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
 use crate::grid::Layout;
+use crate::grid::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::parallel::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
-use crate::parallel::coloring::Shared;
-use crate::parallel::disjoint::Partition;
 use crate::scheme::{Transfer, VelocityUpdate};
+use mmsmith_threads::coloring::Shared;
+use mmsmith_threads::disjoint::Partition;
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {

@@ -1,5 +1,6 @@
 //! The background grid: its cells and walls, and the layout of its nodes in memory with ghost nodes beyond walls.
 
+pub(crate) mod bins;
 pub(crate) mod extension;
 pub(crate) mod geometry;
 pub(crate) mod grid_update;

@@ -223,7 +223,7 @@ pub(super) mod tests {
 
     use crate::Grid;
     use crate::grid::Layout;
-    use crate::parallel::bins::Bins;
+    use crate::grid::bins::Bins;
     use mmsmith_laws::NeoHookean;
 
     pub(in crate::kernel) fn constants<const D: usize>() -> (Constants<f64, D>, usize) {

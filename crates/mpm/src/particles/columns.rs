@@ -7,7 +7,7 @@ use bytemuck::{Pod, cast_slice};
 use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
-use crate::parallel::disjoint::{DisjointColumn, PartColumn, Partition, Run};
+use mmsmith_threads::disjoint::{DisjointColumn, PartColumn, Partition, Run};
 
 /// Work on a column, whatever its elements are.
 pub(crate) trait EachColumn {

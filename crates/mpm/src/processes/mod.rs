@@ -2,6 +2,5 @@
 
 pub(crate) mod corner_halo;
 pub(crate) mod decomposition;
-pub(crate) mod directory;
 pub(crate) mod redistribute;
 pub(crate) mod saved_state;

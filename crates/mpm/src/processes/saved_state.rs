@@ -15,10 +15,10 @@ use thiserror::Error;
 use crate::domain::corners::Corners;
 use crate::particles::columns::{EachColumn, MovingColumns, Shares};
 use crate::particles::mesh::Mesh;
-use crate::processes::decomposition::Move;
-use crate::processes::directory::{Answers, Directory};
 use crate::simulation::Simulation;
 use crate::step::state::State;
+use mmsmith_ranks::Move;
+use mmsmith_ranks::{Answers, Directory};
 
 /// The arrays that one process saved, in this machine's byte order.
 pub type SavedState = Vec<Vec<u8>>;

@@ -18,7 +18,6 @@ use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::{FromCorners, ToCorners};
-use crate::parallel::chunks::each;
 use crate::particles::columns::{Fixed, Moving};
 use crate::scheme::Transfer;
 use crate::step::StepTimes;
@@ -27,6 +26,7 @@ use crate::step::forcing::Forcing;
 use crate::step::g2p::{Follow, check_all};
 use crate::step::health::Outcome;
 use crate::step::state::State;
+use mmsmith_threads::each;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Advances by a step.

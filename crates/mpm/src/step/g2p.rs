@@ -16,19 +16,19 @@ use crate::domain::corner_exchange;
 use crate::domain::corners::{Corners, grid_values, reprojected_values};
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::SharedCorners;
+use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::have_volume_next;
-use crate::parallel::bins::Bins;
-use crate::parallel::chunks::each;
 use crate::particles::Particles;
 use crate::particles::columns::Moving;
 use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::{State, invalidity};
+use mmsmith_threads::each;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
 const CHUNK: usize = 1024;

@@ -74,10 +74,10 @@ impl SharedOutcome {
 mod tests {
     use super::*;
     use crate::domain::of_particles::{Domain, OfBlock};
+    use crate::grid::bins::Bins;
     use crate::grid::geometry::Constants;
     use crate::grid::{Grid, Layout};
     use crate::kernel::copies::{BLOCK, Copies};
-    use crate::parallel::bins::Bins;
     use crate::shape::one_axis::{OnAxis, ProductShape};
     use nalgebra::{Matrix2, Vector2, vector};
 

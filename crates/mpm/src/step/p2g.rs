@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
-//! [`parallel`](crate::parallel).
+//! [`parallel`](mmsmith_threads).
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
@@ -15,6 +15,7 @@ use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
+use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
     Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
@@ -24,13 +25,12 @@ use crate::grid::node::Node;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::ToCorners;
-use crate::parallel::bins::Bins;
-use crate::parallel::chunks::each;
 use crate::particles::Particles;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::state::State;
+use mmsmith_threads::each;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.

@@ -12,9 +12,9 @@ use mmsmith_laws::fault::Fault;
 use nalgebra::SVector;
 
 use crate::grid::node::Node;
-use crate::parallel::chunks::each_chunk;
 use crate::scheme::Filter;
 use crate::step::state::State;
+use mmsmith_threads::each_chunk;
 
 /// Nodes handed to a thread at a time.
 const CHUNK: usize = 1024;

@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use super::{Interpolation, Load, Mesh, Numbers, start};
-use crate::processes::decomposition::{Lists, Move};
+use mmsmith_ranks::{Lists, Move};
 
 /// The polygons of some particles, which can be told apart from the others.
 pub(crate) struct Records<T, const D: usize> {

@@ -11,8 +11,9 @@ use crate::domain::shared_corners::SharedCorners;
 use crate::particles::mesh::Mesh;
 use crate::particles::mesh::part::{LoadRecords, Records};
 use crate::processes::corner_halo::CornerHalo;
-use crate::processes::decomposition::{Lists, Move, Owned};
+use crate::processes::decomposition::Owned;
 use crate::step::state::State;
+use mmsmith_ranks::{Lists, Move};
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Gives every particle to the processes of its corners, of which `keys` has the sub-bins. Gives those of the corners that this

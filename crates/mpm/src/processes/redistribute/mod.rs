@@ -11,10 +11,10 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::grid::node::Node;
 use crate::kernel::buffers::BufferPool;
-use crate::parallel::coloring::Held;
 use crate::particles::Particles;
-use crate::processes::decomposition::Move;
 use crate::step::state::State;
+use mmsmith_ranks::Move;
+use mmsmith_threads::coloring::Held;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,

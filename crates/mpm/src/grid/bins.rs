@@ -3,7 +3,7 @@
 //! A row is all nodes that share an index along the last axis. Bins divide the rows: each bin owns a fixed number of them,
 //! which depends on the dimension alone. Each particle belongs to one bin. A bin writes to its band: its own rows and the rows
 //! of the next bin. Only the bands of neighbours overlap, and a two-colour schedule keeps those apart in time
-//! ([`coloring`](crate::parallel::coloring)). Particles of a bin come in a fixed order. No sum depends on the number of
+//! ([`coloring`](mmsmith_threads::coloring)). Particles of a bin come in a fixed order. No sum depends on the number of
 //! threads. The grid update of a row follows its last contribution, while the row lies in the cache.
 //!
 //! A band has more rows than a bin and its stencils need. Particles may thus drift for some steps before the next sort. The
@@ -18,9 +18,9 @@ use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
 use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
-use crate::parallel::chunks::on_all_threads;
-use crate::parallel::coloring::{ColoredBands, Held, Schedule, Shared, count};
-use crate::parallel::disjoint::Partition;
+use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared, count};
+use mmsmith_threads::disjoint::Partition;
+use mmsmith_threads::on_all_threads;
 
 /// Rows in a bin, in two and three dimensions.
 const BIN_HEIGHT: usize = 8;

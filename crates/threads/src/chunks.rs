@@ -26,7 +26,7 @@ pub fn each<A: Send>(pieces: Vec<A>, work: &(dyn Fn(A) + Sync)) {
 }
 
 /// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.
-pub(crate) fn on_all_threads(work: &(dyn Fn((usize, usize)) + Sync)) {
+pub fn on_all_threads(work: &(dyn Fn((usize, usize)) + Sync)) {
     let threads = rayon::current_num_threads();
     (0..threads).into_par_iter().with_max_len(1).for_each(|thread| work((thread, threads)));
 }

@@ -17,36 +17,37 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The bands that a process holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Held {
+pub struct Held {
     /// Their numbers, each that of its first segment.
-    pub(crate) bands: Range<usize>,
+    pub bands: Range<usize>,
     /// The number of segments of the whole array, and so of bands.
-    pub(crate) all: usize,
+    pub all: usize,
 }
 
 /// A segment that a band here and one of another process cover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shared {
+pub struct Shared {
     /// Whether the other band is the one below.
-    pub(crate) is_below: bool,
-    pub(crate) segment: usize,
+    pub is_below: bool,
+    /// Which of all segments it is.
+    pub segment: usize,
     /// Whether the band here comes first: the other one then completes the segment.
-    pub(crate) is_first_here: bool,
+    pub is_first_here: bool,
 }
 
 impl Held {
     /// All bands of an array of so many segments.
-    pub(crate) fn whole(segments: usize) -> Self {
+    pub fn whole(segments: usize) -> Self {
         Self { bands: 0..segments, all: segments }
     }
 
     /// The segments that the bands cover.
-    pub(crate) fn segments(&self) -> Range<usize> {
+    pub fn segments(&self) -> Range<usize> {
         self.bands.start..self.all.min(self.bands.end + 1)
     }
 
     /// The segments that other processes' bands cover as well.
-    pub(crate) fn shared(&self) -> impl Iterator<Item = Shared> + use<> {
+    pub fn shared(&self) -> impl Iterator<Item = Shared> + use<> {
         let Self { bands: Range { start, end }, all } = *self;
         let below = (start > 0).then_some((true, start, start));
         let above = (end < all).then_some((false, end, end - 1));
@@ -60,7 +61,7 @@ impl Held {
 
 /// Progress of the bands: taken or not, and released segments.
 #[derive(Debug, Default)]
-pub(crate) struct Schedule {
+pub struct Schedule {
     of: Held,
     /// For each segment here the number of bands that have released it.
     released: Vec<usize>,
@@ -93,7 +94,7 @@ enum Next {
 }
 
 /// The number of segments of `segment_length` in `length`, and so of bands; the last segment has the remainder as well.
-pub(crate) fn count(length: usize, segment_length: usize) -> usize {
+pub fn count(length: usize, segment_length: usize) -> usize {
     (length / segment_length.max(1)).max(1)
 }
 
@@ -192,7 +193,7 @@ impl Schedule {
 const ATTEMPTS: usize = 1 << 14;
 
 /// The bands of an array.
-pub(crate) struct ColoredBands<'a, N> {
+pub struct ColoredBands<'a, N> {
     schedule: Mutex<&'a mut Schedule>,
     of: Held,
     first: *mut N,
@@ -212,7 +213,7 @@ impl<'a, N> ColoredBands<'a, N> {
     /// # Panics
     ///
     /// Where `array` does not have the elements of those segments.
-    pub(crate) fn new(
+    pub fn new(
         array: &'a mut [N],
         segment_length: usize,
         of: Held,
@@ -229,19 +230,19 @@ impl<'a, N> ColoredBands<'a, N> {
     }
 
     /// The segments that bands of other processes cover as well.
-    pub(crate) fn shared(&self) -> impl Iterator<Item = Shared> + use<N> {
+    pub fn shared(&self) -> impl Iterator<Item = Shared> + use<N> {
         self.of.shared()
     }
 
     /// All elements, while no thread holds a band.
-    pub(crate) fn all(&mut self) -> &mut [N] {
+    pub fn all(&mut self) -> &mut [N] {
         // SAFETY: the array is borrowed for 'a, and bands that are held borrow `self`, which is exclusive here.
         unsafe { slice::from_raw_parts_mut(self.first, self.length) }
     }
 
     /// Lets `fill` put the sums of another process in place, whose band comes first in a shared segment; that band has released the
     /// segment then. Once; what follows does nothing. True where it did something.
-    pub(crate) fn fill(&self, shared: Shared, fill: impl FnOnce(&mut [N])) -> bool {
+    pub fn fill(&self, shared: Shared, fill: impl FnOnce(&mut [N])) -> bool {
         // What the unsafe code relies on.
         assert!(!shared.is_first_here && self.of.shared().any(|known| known == shared));
         let has_come = |schedule: &mut Schedule| {
@@ -260,12 +261,12 @@ impl<'a, N> ColoredBands<'a, N> {
     }
 
     /// Whether the sums of a shared segment have not come yet.
-    pub(crate) fn is_awaited(&self, shared: Shared) -> bool {
+    pub fn is_awaited(&self, shared: Shared) -> bool {
         !self.schedule().has_come[usize::from(shared.is_below)]
     }
 
     /// The elements of a segment that is shared, while no thread holds a band.
-    pub(crate) fn of_shared(&mut self, shared: Shared) -> &mut [N] {
+    pub fn of_shared(&mut self, shared: Shared) -> &mut [N] {
         let range = self.range(shared.segment..shared.segment + 1);
         // SAFETY: as in `Band::elements` the range lies in the array; bands that are held borrow `self`, which is exclusive here.
         unsafe { slice::from_raw_parts_mut(self.first.add(range.start), range.len()) }
@@ -277,7 +278,7 @@ impl<'a, N> ColoredBands<'a, N> {
 
     /// The next band for the `part`-th of `parts` threads. `None` where all bands are released, or where the bands left wait for
     /// longer than is worth waiting: the thread that holds their neighbour takes them next.
-    pub(crate) fn take(&self, (part, parts): (usize, usize)) -> Option<Band<'_, 'a, N>> {
+    pub fn take(&self, (part, parts): (usize, usize)) -> Option<Band<'_, 'a, N>> {
         for _ in 0..ATTEMPTS {
             let next = self.schedule().take((part, parts));
             match next {
@@ -300,19 +301,19 @@ impl<'a, N> ColoredBands<'a, N> {
 }
 
 /// A segment of an array and the next one, for one thread alone until it is dropped.
-pub(crate) struct Band<'p, 'a, N> {
+pub struct Band<'p, 'a, N> {
     bands: &'p ColoredBands<'a, N>,
     segment: usize,
 }
 
 impl<N> Band<'_, '_, N> {
     /// Number of the band's first segment, in the whole array.
-    pub(crate) fn segment(&self) -> usize {
+    pub fn segment(&self) -> usize {
         self.segment
     }
 
     /// The elements, and the index of the first of them in the array.
-    pub(crate) fn elements(&mut self) -> (&mut [N], usize) {
+    pub fn elements(&mut self) -> (&mut [N], usize) {
         let Self { bands, segment } = *self;
         let range = bands.range(covered(bands.of.all, segment));
         // SAFETY: the range lies in the array, which is borrowed for 'a: segments ascend to at most the last one here, and with them
@@ -327,7 +328,7 @@ impl<N> Band<'_, '_, N> {
     }
 
     /// The segments of the band, and the elements of each.
-    pub(crate) fn segments(&mut self) -> impl Iterator<Item = (usize, &[N])> {
+    pub fn segments(&mut self) -> impl Iterator<Item = (usize, &[N])> {
         let Self { bands, segment } = *self;
         let (elements, first) = self.elements();
         let elements = &*elements;
@@ -348,12 +349,12 @@ impl<N> Band<'_, '_, N> {
     }
 
     /// The elements that no band covered before this one, and the index of the first of them in the array.
-    pub(crate) fn first_touched(&mut self) -> (&mut [N], usize) {
+    pub fn first_touched(&mut self) -> (&mut [N], usize) {
         self.leading(|visit| visit.before == 0)
     }
 
     /// The elements that no band covers after this one, and the index of the first of them in the array.
-    pub(crate) fn completed(&mut self) -> (&mut [N], usize) {
+    pub fn completed(&mut self) -> (&mut [N], usize) {
         self.leading(|visit| visit.before + 1 == visit.all)
     }
 }

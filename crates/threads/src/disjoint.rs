@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The indices 0 to n - 1, each in one of several parts, in an order that matters.
 #[derive(Debug)]
-pub(crate) struct Partition {
+pub struct Partition {
     /// The indices, part after part.
     order: Vec<u32>,
     /// Start of each part in `order`, and the end of the last one.
@@ -25,7 +25,7 @@ pub(crate) struct Partition {
 
 impl Partition {
     /// Allocates `count` indices in `parts` parts; [`arrange`](Self::arrange) has to follow.
-    pub(crate) fn new(count: usize, parts: usize) -> Self {
+    pub fn new(count: usize, parts: usize) -> Self {
         Self {
             order: vec![0; count],
             starts: vec![0; parts + 1],
@@ -35,19 +35,19 @@ impl Partition {
     }
 
     /// The indices of a part.
-    pub(crate) fn part(&self, part: usize) -> Option<&[u32]> {
+    pub fn part(&self, part: usize) -> Option<&[u32]> {
         let &[start, end] = self.starts.get(part..)?.first_chunk()?;
         self.order.get(start..end)
     }
 
     /// The indices part after part, and the start of each part with the end of the last one, to be changed.
-    pub(crate) fn arrange(&mut self) -> (&mut [u32], &mut [usize]) {
+    pub fn arrange(&mut self) -> (&mut [u32], &mut [usize]) {
         self.checked = false;
         (&mut self.order, &mut self.starts)
     }
 
     /// Whether every index occurs in exactly one part.
-    pub(crate) fn is_whole(&mut self) -> bool {
+    pub fn is_whole(&mut self) -> bool {
         self.checked = self.checked || self.check();
         self.checked
     }
@@ -72,24 +72,24 @@ impl Partition {
     }
 
     /// The partition as columns are divided by it; `None` where an index is in no part or in two.
-    pub(crate) fn whole(&mut self) -> Option<WholePartition<'_>> {
+    pub fn whole(&mut self) -> Option<WholePartition<'_>> {
         self.is_whole().then_some(WholePartition(self))
     }
 }
 
 /// A partition that has every index once, and stays as it is.
 #[derive(Clone, Copy)]
-pub(crate) struct WholePartition<'a>(&'a Partition);
+pub struct WholePartition<'a>(&'a Partition);
 
 impl<'a> WholePartition<'a> {
     /// The partition.
-    pub(crate) fn partition(self) -> &'a Partition {
+    pub fn partition(self) -> &'a Partition {
         self.0
     }
 
     /// Mutable access to a column, part by part. Each index has as many successive elements as the others, its share, which may be none;
     /// `None` where the length is no multiple of the number of indices.
-    pub(crate) fn column<E>(self, elements: &'a mut [E]) -> Option<DisjointColumn<'a, E>> {
+    pub fn column<E>(self, elements: &'a mut [E]) -> Option<DisjointColumn<'a, E>> {
         let count = self.0.order.len();
         let share = elements.len().checked_div(count).unwrap_or(0);
         if share * count != elements.len() {
@@ -102,7 +102,7 @@ impl<'a> WholePartition<'a> {
 }
 
 /// A column whose elements belong to the parts of a partition.
-pub(crate) struct DisjointColumn<'a, E> {
+pub struct DisjointColumn<'a, E> {
     partition: &'a Partition,
     /// How many elements each index has.
     share: usize,
@@ -118,7 +118,7 @@ unsafe impl<E: Send> Sync for DisjointColumn<'_, E> {}
 
 impl<E> DisjointColumn<'_, E> {
     /// The elements of a part: once, then `None`, as for a part that does not exist.
-    pub(crate) fn take(&self, part: usize) -> Option<PartColumn<'_, E>> {
+    pub fn take(&self, part: usize) -> Option<PartColumn<'_, E>> {
         let indices = self.partition.part(part)?;
         let is_first = !self.taken.get(part)?.swap(true, Ordering::Relaxed);
         let &Self { share, first, .. } = self;
@@ -127,7 +127,7 @@ impl<E> DisjointColumn<'_, E> {
 }
 
 /// The elements of a column that belong to one part.
-pub(crate) struct PartColumn<'a, E> {
+pub struct PartColumn<'a, E> {
     indices: &'a [u32],
     share: usize,
     first: *mut E,
@@ -136,7 +136,7 @@ pub(crate) struct PartColumn<'a, E> {
 
 /// Successive indices, one after the other in a part.
 #[derive(Clone, Copy)]
-pub(crate) struct Run<'a> {
+pub struct Run<'a> {
     /// All indices of the part.
     indices: &'a [u32],
     first: u32,
@@ -146,7 +146,7 @@ pub(crate) struct Run<'a> {
 impl<'a> Run<'a> {
     /// The `count` indices of a part from `place` on, if each is the one before it and one.
     #[inline(always)]
-    pub(crate) fn find(indices: &'a [u32], place: usize, count: usize) -> Option<Self> {
+    pub fn find(indices: &'a [u32], place: usize, count: usize) -> Option<Self> {
         let run = indices.get(place..place.checked_add(count)?)?;
         let first = *run.first()?;
         let mut apart = 0;
@@ -160,7 +160,7 @@ impl<'a> Run<'a> {
 impl<E> PartColumn<'_, E> {
     /// The elements of a run, which lie side by side: none where the run is one of another part.
     #[inline(always)]
-    pub(crate) fn run(&mut self, run: Run<'_>) -> &mut [E] {
+    pub fn run(&mut self, run: Run<'_>) -> &mut [E] {
         if !std::ptr::eq(self.indices, run.indices) {
             return &mut [];
         }
@@ -179,7 +179,7 @@ impl<E> PartColumn<'_, E> {
     ///
     /// Panics where the part has no such place.
     #[inline(always)]
-    pub(crate) fn get(&mut self, place: usize) -> &mut [E] {
+    pub fn get(&mut self, place: usize) -> &mut [E] {
         let index = self.indices[place] as usize;
         // SAFETY: `Partition::whole` saw that every index is below the number of indices, of each of which the column has
         // `share` elements, which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so
@@ -192,7 +192,7 @@ impl<E> PartColumn<'_, E> {
 impl<E: Copy> PartColumn<'_, E> {
     /// Copies the elements of so many indices from a place on, and gives how many they are.
     #[inline(always)]
-    pub(crate) fn gather(&mut self, place: usize, count: usize, copies: &mut [E]) -> usize {
+    pub fn gather(&mut self, place: usize, count: usize, copies: &mut [E]) -> usize {
         let share = self.share;
         for k in 0..count {
             match (share, copies.get_mut(k)) {
@@ -205,7 +205,7 @@ impl<E: Copy> PartColumn<'_, E> {
 
     /// Copies back what [`gather`](Self::gather) copied, changed.
     #[inline(always)]
-    pub(crate) fn scatter(&mut self, place: usize, count: usize, copies: &[E]) {
+    pub fn scatter(&mut self, place: usize, count: usize, copies: &[E]) {
         let share = self.share;
         for k in 0..count {
             match (share, copies.get(k)) {

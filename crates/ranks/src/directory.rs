@@ -4,12 +4,12 @@ use std::slice;
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use mmsmith_ranks::{Ranks, announce, exchange};
 
-use crate::processes::decomposition::Move;
+use crate::moves::Move;
+use crate::{Ranks, announce, exchange};
 
 /// Where elements are by their numbers.
-pub(crate) struct Directory {
+pub struct Directory {
     ranks: Option<Arc<dyn Ranks>>,
     /// To the processes that answer for them.
     moved: Move,
@@ -18,7 +18,7 @@ pub(crate) struct Directory {
 }
 
 /// The answers to the questions of all processes.
-pub(crate) struct Answers {
+pub struct Answers {
     ranks: Option<Arc<dyn Ranks>>,
     moved: Move,
     /// The places of the elements that each process asks this one for.
@@ -28,22 +28,22 @@ pub(crate) struct Answers {
     /// For each element that this process wants its place among those that come.
     order: Vec<u32>,
     /// Whether this process has all that it is asked for, and nothing else.
-    pub(crate) is_whole: bool,
+    pub is_whole: bool,
     /// Whether it has each only once.
-    pub(crate) is_unique: bool,
+    pub is_unique: bool,
 }
 
 impl Directory {
-    /// A directory of the elements with these numbers, which this process has. A call of all.
-    pub(crate) fn new(ranks: Option<&Arc<dyn Ranks>>, numbers: &[u64]) -> Self {
+    /// A directory of the elements with these numbers, which this process has. Collective.
+    pub fn new(ranks: Option<&Arc<dyn Ranks>>, numbers: &[u64]) -> Self {
         let processes = ranks.map_or(1, |ranks| ranks.count());
         let homes: Vec<usize> = numbers.iter().map(|&number| home(number, processes)).collect();
         let (moved, numbers) = Move::new(ranks, numbers, &|k| slice::from_ref(&homes[k]));
         Self { ranks: ranks.cloned(), moved, numbers }
     }
 
-    /// Asks for the elements with the numbers `wanted`. A call of all.
-    pub(crate) fn ask(self, wanted: &[u64]) -> Answers {
+    /// Asks for the elements with the numbers `wanted`. Collective.
+    pub fn ask(self, wanted: &[u64]) -> Answers {
         let Self { ranks, moved, numbers } = self;
         let processes = ranks.as_ref().map_or(1, |ranks| ranks.count());
         let mut questions = vec![Vec::new(); processes];
@@ -87,13 +87,13 @@ impl Directory {
 }
 
 impl Answers {
-    /// The elements that this process has asked for, in that order. A call of all, where all processes' answers are whole.
-    pub(crate) fn fetch<E: Pod>(&self, elements: &[E]) -> Vec<E> {
+    /// The elements that this process has asked for, in that order. Collective, where all processes' answers are whole.
+    pub fn fetch<E: Pod>(&self, elements: &[E]) -> Vec<E> {
         self.fetch_shares(1, elements)
     }
 
     /// As [`fetch`](Self::fetch) of lists of `share` elements each.
-    pub(crate) fn fetch_shares<E: Pod>(&self, share: usize, elements: &[E]) -> Vec<E> {
+    pub fn fetch_shares<E: Pod>(&self, share: usize, elements: &[E]) -> Vec<E> {
         let here = self.moved.all_shares(share, elements);
         fn pick<E: Copy>(all: &[E], share: usize, places: &[u32]) -> Vec<E> {
             let of = |&place: &u32| &all[place as usize * share..][..share];

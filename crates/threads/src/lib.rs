@@ -1,0 +1,11 @@
+//! Parallel loops whose results do not depend on the number of threads.
+//!
+//! - [`each`], [`each_chunk`]: loops over pieces of work, and over chunks of arrays.
+//! - [`coloring`]: the two-colour schedule of overlapping bands.
+//! - [`disjoint`]: mutable access to the elements of each part of a partition.
+
+mod chunks;
+pub mod coloring;
+pub mod disjoint;
+
+pub use chunks::{each, each_chunk, on_all_threads};
