@@ -140,7 +140,7 @@
 //! # Modules
 //!
 //! - `scheme`: the choices. `simulation`: set-up and life cycle. `solver`: solvers of any scheme behind one door.
-//! - `particles`: what a particle has; bodies, clipped bodies, and meshes of domains that share corners.
+//! - `particles`: what a particle has; bodies, and meshes of domains that share corners.
 //! - `grid`: memory layout, walls, ghost nodes, grid update. `shape`: shape functions and weights.
 //! - `domain`: the domains that weights are means over, of each particle alone or on shared corners.
 //! - `kernel`: sums over weights in vector instructions, for blocks of particles.
@@ -175,7 +175,6 @@ pub use named::UnknownName;
 #[doc(hidden)]
 pub use particles::Particles;
 pub use particles::body::{Annulus, Body};
-pub use particles::clip::{Clip, Facet, Side};
 pub use particles::mesh::{Faces, Interpolation, Load, Mesh, Numbers};
 pub use processes::decomposition::{Arrangement, Share};
 pub use processes::saved_state::{SavedState, SavedStateError, replace_whole};

@@ -9,7 +9,6 @@ use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
 use crate::particles::Particles;
 use crate::particles::body::{self, Annulus, Body};
-use crate::particles::clip::{self, Clip, Facet};
 use crate::processes::decomposition::{Arrangement, Share};
 use crate::processes::saved_state::{SavedState, SavedStateError};
 use crate::scheme::Settings;
@@ -104,21 +103,6 @@ impl<T: Scalar<D>, const D: usize> Body<T, D> {
     ) -> Result<Self, SetupError> {
         T::body_annulus(ring, spacing, per_cell, density)
     }
-
-    /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
-    /// clipped with its sides; and its boundary, facet by facet, but for what lies on the grid's walls. `grid` is in its own axes.
-    ///
-    /// # Errors
-    ///
-    /// [`SetupError::PolygonDimension`] in one dimension.
-    pub fn clipped(
-        grid: &Grid<f64, D>,
-        per_cell: usize,
-        density: f64,
-        clip: &Clip<D>,
-    ) -> Result<(Self, Vec<Facet<D>>), SetupError> {
-        T::body_clipped(grid, per_cell, density, clip)
-    }
 }
 
 impl<T: Scalar<D>, const D: usize> Simulation<T, D> {
@@ -148,15 +132,6 @@ pub trait Scalar<const D: usize>: Simulated<D> {
         settings: Settings<Self>,
         share: Option<Share>,
     ) -> Result<Box<dyn Solver<Self, D>>, SetupError>;
-
-    /// [`Body::clipped`].
-    #[doc(hidden)]
-    fn body_clipped(
-        grid: &Grid<f64, D>,
-        per_cell: usize,
-        density: f64,
-        clip: &Clip<D>,
-    ) -> Result<(Body<Self, D>, Vec<Facet<D>>), SetupError>;
 
     /// [`Body::annulus`].
     #[doc(hidden)]
@@ -191,15 +166,6 @@ macro_rules! scalar {
                     share: Option<Share>,
                 ) -> Result<Box<dyn Solver<Self, $D>>, SetupError> {
                     Ok(Box::new(Simulation::set_up(grid, body, law, settings, share)?))
-                }
-
-                fn body_clipped(
-                    grid: &Grid<f64, $D>,
-                    per_cell: usize,
-                    density: f64,
-                    clip: &Clip<$D>,
-                ) -> Result<(Body<Self, $D>, Vec<Facet<$D>>), SetupError> {
-                    clip::body(grid, per_cell, density, clip)
                 }
 
                 fn body_annulus(

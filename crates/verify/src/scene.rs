@@ -1,6 +1,7 @@
 //! From a solution to a grid with walls and particles.
 
-use mmsmith_mpm::{Grid, Side};
+use mmsmith_clip::Side;
+use mmsmith_mpm::Grid;
 use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
 use nalgebra::SVector;
 

@@ -4,9 +4,8 @@ use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 
-use mmsmith_mpm::{
-    Annulus, Body, Clip, Facet, Load, Mesh, Particles, Settings, Shape, Share, Side, Solver,
-};
+use mmsmith_clip::{Clip, Facet, Side};
+use mmsmith_mpm::{Annulus, Body, Load, Mesh, Particles, Settings, Shape, Share, Solver};
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
@@ -71,7 +70,7 @@ fn clipped<T: Precision<D>, const D: usize>(
         turn: scene.turn,
         offset: placement.offset(),
     };
-    let (mut body, facets) = Body::<T, D>::clipped(&scene.grid(), per_cell, density, &clip)?;
+    let (mut body, facets) = mmsmith_clip::body::<T, D>(&scene.grid(), per_cell, density, &clip)?;
     if let Some(mesh) = &mut body.mesh {
         let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
         for (a, walls) in scene.walls.iter().enumerate() {

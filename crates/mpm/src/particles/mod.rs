@@ -1,7 +1,6 @@
 //! The particles' state.
 
 pub(crate) mod body;
-pub(crate) mod clip;
 pub(crate) mod columns;
 pub(crate) mod mesh;
 

@@ -4,8 +4,7 @@
 //! m_i = sum m_p S_ip;  m_i v_i = sum m_p (v_p + C_p (x_i - x_p)) S_ip;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip
 //! ```
 //!
-//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins and threads in
-//! [`parallel`](mmsmith_threads).
+//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins in [`bins`](crate::grid::bins).
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use mmsmith_mpm::{Clip, Side};
+use mmsmith_clip::{Clip, Side};
 
 const SHAPES: [Shape; 7] = [
     Shape::Linear,
@@ -232,7 +232,7 @@ fn light_nodes_continue_linear_functions() {
         let grid = Grid { lower, spacing: 0.25, cells: [12; D], walls };
         let clip = Clip { sides: vec![Side::Outer { radius }], turn: [1.0, 0.0], offset: 0.1 };
         let (body, _) =
-            Body::clipped(&grid, 2, 2.0, &clip).expect("a body of more than one dimension");
+            mmsmith_clip::body(&grid, 2, 2.0, &clip).expect("a body of more than one dimension");
         let settings = Settings {
             shape: Shape::Cpdi2,
             integrator: Integrator::Cd,

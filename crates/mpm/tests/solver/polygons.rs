@@ -5,9 +5,10 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use mmsmith_clip::{Clip, Facet, Side};
 use mmsmith_mpm::{
-    Body, BodyForce, Clip, Facet, Grid, Integrator, Load, Material, Mesh, NoBodyForce, Scalar,
-    Settings, SetupError, Shape, Side, Simulation, Transfer,
+    Body, BodyForce, Grid, Integrator, Load, Material, Mesh, NoBodyForce, Scalar, Settings,
+    SetupError, Shape, Simulation, Transfer,
 };
 use nalgebra::{SMatrix, SVector, Vector2, vector};
 
@@ -86,7 +87,7 @@ where
     let (sin, cos) = angle.to_radians().sin_cos();
     let turn = if angle == 0.0 { [1.0, 0.0] } else { [cos, sin] };
     let clip = Clip { sides: form.sides(), turn, offset };
-    Body::clipped(&grid(), 2, DENSITY, &clip).expect("a body of more than one dimension")
+    mmsmith_clip::body(&grid(), 2, DENSITY, &clip).expect("a body of more than one dimension")
 }
 
 fn polygons<const D: usize>(body: &Body<f64, D>) -> &Mesh<f64, D> {
@@ -472,7 +473,7 @@ fn corners_on_walls_stay_on_them() {
             let planes = planes.map(|normal| Side::Straight { normal, distance: 0.0 });
             let sides = form.sides().into_iter().chain(planes).collect();
             let clip = Clip { sides, turn: [1.0, 0.0], offset: 0.0 };
-            let (mut body, _) = Body::clipped(&grid, 2, DENSITY, &clip).unwrap();
+            let (mut body, _) = mmsmith_clip::body(&grid, 2, DENSITY, &clip).unwrap();
             let p = &mut body.particles;
             (0..p.len()).for_each(|k| p.v[k] = SVector::from_fn(|a, _| noise(7 * k + a)));
             let on_walls = |own: &Mesh<f64, 2>| own.x.iter().map(|x| x.map(|x| x == 0.0)).collect();
@@ -514,7 +515,7 @@ fn bodies_that_cannot_be_are_refused() {
     let grid = Grid { lower: vector![0.0], spacing: 0.5, cells: [2], walls: [[false; 2]] };
     let sides = vec![Side::Straight { normal: [1.0], distance: 0.7 }];
     let clip = Clip { sides, turn: [1.0, 0.0], offset: 0.0 };
-    let found = Body::<f64, 1>::clipped(&grid, 2, DENSITY, &clip).err();
+    let found = mmsmith_clip::body::<f64, 1>(&grid, 2, DENSITY, &clip).err();
     assert_eq!(found, Some(SetupError::PolygonDimension { dimension: 1 }));
     let mut body = moving(Form::<3>::all()[2], LATTICES[0]);
     body.mesh.as_mut().unwrap().faces.corners[5] = 77;

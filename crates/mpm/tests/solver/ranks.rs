@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+use mmsmith_clip::{Clip, Side};
 use mmsmith_mpm::{
-    Body, BodyForce, Clip, Grid, Integrator, Interpolation, Load, Material, SavedState,
-    SavedStateError, Scalar, Settings, SetupError, Shape, Share, Side, Simulation, StepError,
-    Transfer,
+    Body, BodyForce, Grid, Integrator, Interpolation, Load, Material, SavedState, SavedStateError,
+    Scalar, Settings, SetupError, Shape, Share, Simulation, StepError, Transfer,
 };
 use mmsmith_ranks::{Ranks, counted, in_process};
 use nalgebra::{SMatrix, SVector};
@@ -465,7 +465,7 @@ where
     let sides = vec![Side::Inner { radius: 0.55 }, Side::Outer { radius: 0.95 }];
     // The grid has its own axes; the body flies along those of its own.
     let clip = Clip { sides, turn: if D == 2 { [cos, sin] } else { [1.0, 0.0] }, offset: 0.2 };
-    let (mut body, boundary) = Body::clipped(&grid, 2, 2.0, &clip).unwrap();
+    let (mut body, boundary) = mmsmith_clip::body(&grid, 2, 2.0, &clip).unwrap();
     loaded(&mut body, &boundary);
     let turn = body.mesh.as_ref().unwrap().turn;
     let mut up = SVector::zeros();

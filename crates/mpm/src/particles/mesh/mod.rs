@@ -137,7 +137,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// An empty mesh.
-    pub(crate) fn empty(interpolation: Interpolation, turn: Option<SMatrix<T, D, D>>) -> Self {
+    pub fn empty(interpolation: Interpolation, turn: Option<SMatrix<T, D, D>>) -> Self {
         Self {
             interpolation,
             X: Vec::new(),

@@ -6,12 +6,10 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use mmsmith_lanes::tensor::real;
+use mmsmith_mpm::{Body, Grid, Interpolation, Mesh};
 use nalgebra::{RealField, SVector, Vector3};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
-use crate::grid::Grid;
-use crate::particles::body::Body;
-use crate::particles::mesh::{Interpolation, Mesh};
 
 /// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -14,13 +14,8 @@ mod space;
 use std::collections::BTreeMap;
 
 use mmsmith_lanes::tensor::real;
+use mmsmith_mpm::{Body, Grid, Mesh, Particles, SetupError};
 use nalgebra::{RealField, SMatrix, SVector};
-
-use crate::error::SetupError;
-use crate::grid::Grid;
-use crate::particles::Particles;
-use crate::particles::body::Body;
-use crate::particles::mesh::Mesh;
 
 /// A clipped box with less than this share of its whole volume is a sliver.
 const SLIVER: f64 = 0.2;
@@ -232,8 +227,13 @@ fn at_rest<T: RealField + Copy, const D: usize>(
     Body { particles, half_edges: Vec::new(), mesh: Some(mesh) }
 }
 
-/// See [`Body::clipped`].
-pub(crate) fn body<T: RealField + Copy, const D: usize>(
+/// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
+/// clipped with its sides; and its boundary, facet by facet, but for facets on the walls of the grid. `grid` is in its own axes.
+///
+/// # Errors
+///
+/// [`SetupError::PolygonDimension`] in one dimension.
+pub fn body<T: RealField + Copy, const D: usize>(
     grid: &Grid<f64, D>,
     per_cell: usize,
     density: f64,

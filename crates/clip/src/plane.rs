@@ -3,12 +3,10 @@
 use std::collections::HashMap;
 
 use mmsmith_lanes::tensor::real;
+use mmsmith_mpm::{Body, Grid, Interpolation, Mesh};
 use nalgebra::{Matrix2, RealField, SVector, Vector2, vector};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
-use crate::grid::Grid;
-use crate::particles::body::Body;
-use crate::particles::mesh::{Interpolation, Mesh, cross};
 
 /// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -162,7 +160,7 @@ impl Corners<'_> {
         for (k, (corner, _)) in polygon.iter().enumerate() {
             let next = polygon[(k + 1) % polygon.len()].0;
             let (a, b) = (self.at(*corner) - about, self.at(next) - about);
-            let triangle = cross(&a, &b);
+            let triangle = a.perp(&b);
             area += triangle;
             moment += (a + b) * triangle;
         }
