@@ -12,6 +12,7 @@ use crate::error::SetupError;
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
+use crate::grid::state::GridState;
 use crate::grid::{Grid, Layout};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
@@ -22,7 +23,7 @@ use crate::particles::mesh::Interpolation;
 use crate::processes::decomposition::{Part, Share, admit};
 use crate::scheme::{Settings, VelocityUpdate};
 use crate::step::is_fused;
-use crate::step::state::State;
+use crate::step::state::{EarlyState, State};
 
 /// A value for error messages, of any scalar type.
 pub(crate) fn figure<T: RealField>(value: T) -> f64 {
@@ -227,32 +228,40 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let density = least(&mut mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume));
     let mass_of_cell = density * grid.spacing.powi(D as i32);
     let uniform = particles.uniform();
-    let early = integrator.early() > 0.0;
-    Ok(State {
-        uniform,
-        part,
-        keeps_F_early: early,
+    let corners = corners.map(|corners| {
+        let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
+        Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
+    });
+    let grid = GridState {
         constants: Constants::new(grid, &layout, &bins, settings.time_step, least_mass),
         nodes: now,
-        F_early: if early { vec![SMatrix::identity(); count] } else { Vec::new() },
-        internal_early: if early { particles.internal.clone() } else { Vec::new() },
         reprojected,
         next,
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
-        buffers: BufferPool::new(),
-        corners: corners.map(|corners| {
-            let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
-            Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
-        }),
-        of_time: Vec::new(),
-        shares,
-        particles,
-        domain,
-        law,
-        transfer,
         layout,
         bins,
+    };
+    let is_kept = integrator.early() > 0.0;
+    let early = EarlyState {
+        F: if is_kept { vec![SMatrix::identity(); count] } else { Vec::new() },
+        internal: if is_kept { particles.internal.clone() } else { Vec::new() },
+        is_kept,
+    };
+    let (buffers, of_time) = (BufferPool::new(), Vec::new());
+    Ok(State {
+        particles,
+        domain,
+        corners,
+        law,
+        transfer,
+        shares,
+        uniform,
+        grid,
+        part,
+        early,
+        buffers,
+        of_time,
     })
 }
 

@@ -13,6 +13,7 @@ use crate::domain::corners::Corners;
 use crate::domain::of_particles::axis_too_large;
 use crate::error::{SetupError, StepError};
 use crate::grid::Grid;
+use crate::grid::state::GridState;
 use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::mesh::Mesh;
@@ -149,7 +150,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         let corners = state.corners.as_deref().map(|Corners { shared, .. }| shared);
         let of_corners = corners.into_iter().flat_map(|corners| {
             let all = 0..corners.count();
-            all.filter_map(|corner| invalidity_of_corner(&state.constants, corners, corner))
+            all.filter_map(|corner| invalidity_of_corner(&state.grid.constants, corners, corner))
         });
         let worst = of_particles.chain(of_corners).min();
         let outcome = state.reduce_outcome(Outcome { failure: worst, resort: false });
@@ -172,7 +173,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let planted = self.state.constants.planted;
+        let planted = self.state.grid.constants.planted;
         let halved = self.settings.halve_first_acceleration
             && self.steps_done == 0
             && !planted.is(Fault::NoHalfStep);
@@ -297,7 +298,8 @@ fn error_of<T: Lanes, const D: usize>(
     step: usize,
     time: T,
 ) -> StepError {
-    let State { constants: c, domain, particles, .. } = state;
+    let State { grid, domain, particles, .. } = state;
+    let GridState { constants: c, .. } = grid;
     let corners = state.corners.as_deref().map(|Corners { shared, .. }| shared);
     let (x, F) = (&particles.x[particle], &particles.F[particle]);
     let position = x.iter().map(|&x| figure(x)).collect();

@@ -5,6 +5,7 @@ pub(crate) mod extension;
 pub(crate) mod geometry;
 pub(crate) mod grid_update;
 pub(crate) mod node;
+pub(crate) mod state;
 
 use std::ops::Range;
 

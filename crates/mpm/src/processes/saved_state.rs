@@ -13,6 +13,7 @@ use nalgebra::SVector;
 use thiserror::Error;
 
 use crate::domain::corners::Corners;
+use crate::grid::state::GridState;
 use crate::particles::columns::{EachColumn, MovingColumns, Shares};
 use crate::particles::mesh::Mesh;
 use crate::simulation::Simulation;
@@ -195,7 +196,8 @@ impl EachColumn for Fetch<'_> {
 impl<T: Lanes, const D: usize> State<T, D> {
     /// The arrays of the particles here, but for the number of steps.
     fn arrays(&self) -> Vec<&[u8]> {
-        let Self { particles, corners, bins, part, .. } = self;
+        let Self { particles, corners, grid, part, .. } = self;
+        let GridState { bins, .. } = grid;
         let ids = part.as_ref().map_or(&[][..], |part| part.ids.as_slice());
         let mut arrays = vec![cast_slice(ids), cast_slice(bins.keys())];
         arrays.extend(particles.moving_bytes());
@@ -218,7 +220,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
         let kind = Kind { shares: self.shares, has_corners: self.corners.is_some() };
         let saved = self.agreed(Saved::of_parts(parts, kind))?;
-        let is_grid = saved.keys.iter().all(|&key| self.bins.has_key(key));
+        let is_grid = saved.keys.iter().all(|&key| self.grid.bins.has_key(key));
         self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
         let steps_done = saved.steps_done as u64;
         // Those that have read no part do not know it.
@@ -296,7 +298,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
     /// See [`take_up`](Self::take_up).
     pub(crate) fn put(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
         // The grid no longer belongs to the particles.
-        self.state.is_ahead = false;
+        self.state.grid.is_ahead = false;
         self.steps_done = self.state.take_up(parts)?;
         self.failed = None;
         Ok(())

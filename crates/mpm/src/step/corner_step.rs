@@ -14,6 +14,7 @@ use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Measured, MeasuredPart, SharedCorners};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
+use crate::grid::state::GridState;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
@@ -35,24 +36,25 @@ impl<T: Lanes, const D: usize> State<T, D> {
         body_force: &dyn BodyForce<T, D>,
         times: StepTimes<T>,
     ) -> Outcome {
-        if self.is_ahead {
+        if self.grid.is_ahead {
             self.update_from_corners(body_force, times);
         } else {
             self.p2g(body_force, times);
         }
         if let Some(corners) = &mut self.corners {
-            corners.follow(&self.constants, &self.nodes);
+            corners.follow(&self.grid.constants, &self.grid.nodes);
         }
         let outcome = self.g2p_and_to_corners(body_force, times.end);
         let outcome = self.reduce_outcome(outcome);
         // A sort may bring other particles here, and after a failure the sums are of no use.
-        self.is_ahead = outcome.is_clean();
+        self.grid.is_ahead = outcome.is_clean();
         self.resort_if(outcome)
     }
 
     /// The grid update from the sums that corners have already.
     fn update_from_corners(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, of_time, corners, .. } = self;
+        let Self { particles, grid, of_time, corners, .. } = self;
+        let GridState { constants, layout, bins, nodes, .. } = grid;
         let Some(corners) = corners else { return };
         let Corners { shared: corners, exchange, .. } = &mut **corners;
         let c = *constants;
@@ -66,7 +68,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// G2P of this step, and P2G of the next one, which starts at `t_next`, to the corners.
     fn g2p_and_to_corners(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
-        let Self { particles, constants, bins, of_time, domain, corners, .. } = self;
+        let Self { particles, grid, of_time, domain, corners, .. } = self;
+        let GridState { constants, bins, .. } = grid;
         let (law, transfer, buffers, c) = (&*self.law, self.transfer, &self.buffers, *constants);
         let uniform = self.uniform;
         let Some(corners) = corners else { return Outcome::default() };

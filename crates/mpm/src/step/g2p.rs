@@ -18,6 +18,7 @@ use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::SharedCorners;
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
+use crate::grid::state::GridState;
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
@@ -27,7 +28,7 @@ use crate::particles::Particles;
 use crate::particles::columns::Moving;
 use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::health::{Outcome, SharedOutcome};
-use crate::step::state::{State, invalidity};
+use crate::step::state::{EarlyState, State, invalidity};
 use mmsmith_threads::each;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
@@ -36,8 +37,10 @@ const CHUNK: usize = 1024;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
-        let Self { particles, constants, nodes, domain, corners, buffers, .. } = self;
-        let Self { F_early, internal_early, law, .. } = self;
+        let Self { particles, grid, domain, corners, buffers, .. } = self;
+        let GridState { constants, nodes, .. } = grid;
+        let Self { early, law, .. } = self;
+        let EarlyState { F: F_early, internal: internal_early, .. } = early;
         let c = *constants;
         if let Some(corners) = corners {
             corners.interpolate(&c, nodes);
@@ -82,8 +85,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Velocity by the transfer, position, and F for the rest of the step.
     pub(crate) fn g2p(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, domain, corners, transfer, .. } = self;
-        let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
+        let Self { particles, grid, domain, corners, transfer, .. } = self;
+        let GridState { constants, nodes, bins, .. } = grid;
+        let (law, early) = (&*self.law, Early::of(&self.early.F, &self.early.internal));
         let (c, transfer) = (*constants, *transfer);
         let values = grid_values(nodes, corners.as_deref());
         let pass = G2p { c: &c, bins, domain: &**domain, corners: corners.as_deref() };
@@ -98,7 +102,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL, first G2P: velocity alone.
     pub(crate) fn g2p_velocity(&mut self) {
-        let Self { particles, constants, nodes, domain, corners, transfer, buffers, .. } = self;
+        let Self { particles, grid, domain, corners, transfer, buffers, .. } = self;
+        let GridState { constants, nodes, .. } = grid;
         let (c, domain, transfer) = (*constants, &**domain, *transfer);
         let values = grid_values(nodes, corners.as_deref());
         let buffers = &*buffers;
@@ -114,8 +119,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
-        let Self { particles, constants, nodes, bins, reprojected, domain, corners, .. } = self;
-        let (law, early) = (&*self.law, Early::of(&self.F_early, &self.internal_early));
+        let Self { particles, grid, domain, corners, .. } = self;
+        let GridState { constants, nodes, bins, reprojected, .. } = grid;
+        let (law, early) = (&*self.law, Early::of(&self.early.F, &self.early.internal));
         let c = *constants;
         if let Some(corners) = corners {
             corners.interpolate_reprojected(&c, reprojected);
@@ -142,7 +148,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// After a pass that has moved all particles: the corners that they share arrive at their places too, and are checked.
     fn arrive(&mut self, (found, is_in_doubt): (SharedOutcome, bool)) -> Outcome {
-        let Self { particles, constants, bins, corners, .. } = self;
+        let Self { particles, grid, corners, .. } = self;
+        let GridState { constants, bins, .. } = grid;
         if let Some(corners) = corners {
             let Corners { shared, .. } = &mut **corners;
             shared.commit_positions(false);
@@ -160,10 +167,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
             return;
         }
         self.p2g_momentum();
-        for node in &mut self.nodes {
+        for node in &mut self.grid.nodes {
             node.values.copy_within(..D, D);
         }
-        let Self { particles, constants, nodes, domain, corners, buffers, .. } = self;
+        let Self { particles, grid, domain, corners, buffers, .. } = self;
+        let GridState { constants, nodes, .. } = grid;
         if let Some(corners) = corners {
             corners.interpolate(constants, nodes);
         }

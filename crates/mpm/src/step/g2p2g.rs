@@ -13,6 +13,7 @@ use crate::domain::of_particles::{Domain, OfBlock};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::grid::node::Node;
+use crate::grid::state::GridState;
 use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
@@ -28,8 +29,8 @@ use crate::step::state::State;
 impl<T: Lanes, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
-        let Self { particles, constants: c, layout, bins, nodes, next, uniform, of_time, .. } =
-            self;
+        let Self { particles, grid, uniform, of_time, .. } = self;
+        let GridState { constants: c, layout, bins, nodes, next, .. } = grid;
         let (transfer, shares) = (self.transfer, self.shares);
         let buffers = &self.buffers;
         let (domain, law) = (&*self.domain, &*self.law);

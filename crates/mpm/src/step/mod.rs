@@ -57,14 +57,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
             };
         }
         let early = integrator.early();
-        let dt = self.constants.time_step;
+        let dt = self.grid.constants.time_step;
         let late = dt * real(1.0 - early);
         if early > 0.0 {
             self.p2g_momentum();
             let outcome = self.g2p_stretch(dt * real(early));
             let outcome = self.reduce_outcome(outcome);
             if outcome.failure.is_some() {
-                std::mem::swap(&mut self.particles.F, &mut self.F_early);
+                std::mem::swap(&mut self.particles.F, &mut self.early.F);
                 return outcome;
             }
             self.p2g_force(body_force, times);
@@ -75,7 +75,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.filter(filter);
         }
         if let Some(corners) = &mut self.corners {
-            corners.follow(&self.constants, &self.nodes);
+            corners.follow(&self.grid.constants, &self.grid.nodes);
         }
         let outcome = if integrator.reprojects() {
             self.g2p_velocity();
@@ -90,13 +90,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// A step in a single pass.
     fn fused_step(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) -> Outcome {
-        if !self.is_ahead {
+        if !self.grid.is_ahead {
             self.p2g(body_force, times);
         }
         let outcome = self.g2p2g(body_force, times.end);
         let outcome = self.reduce_outcome(outcome);
         // After a sort or a failure the partial sums on the grid are of no use.
-        self.is_ahead = outcome.is_clean();
+        self.grid.is_ahead = outcome.is_clean();
         self.resort_if(outcome)
     }
 }

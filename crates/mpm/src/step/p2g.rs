@@ -21,6 +21,7 @@ use crate::grid::grid_update::{
     VelocityAndAcceleration,
 };
 use crate::grid::node::Node;
+use crate::grid::state::GridState;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::ToCorners;
@@ -28,13 +29,14 @@ use crate::particles::Particles;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
-use crate::step::state::State;
+use crate::step::state::{EarlyState, State};
 use mmsmith_threads::each;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, of_time, corners, .. } = self;
+        let Self { particles, grid, of_time, corners, .. } = self;
+        let GridState { constants, layout, bins, nodes, .. } = grid;
         let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let (buffers, variables) = (&self.buffers, self.shares.internal);
         let Particles { X, x, v, F, mass, volume, affine, internal, .. } = &*particles;
@@ -61,7 +63,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// P2G of mass and momentum, and from them the velocities at the start of the step.
     pub(crate) fn p2g_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, nodes, corners, .. } = self;
+        let Self { particles, grid, corners, .. } = self;
+        let GridState { constants, layout, bins, nodes, .. } = grid;
         let (domain, transfer) = (&*self.domain, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, affine, .. } = &*particles;
@@ -74,12 +77,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of forces, by the stress of the F that has followed the grid with the weights of the one before; from them
     /// accelerations and the velocities at the end of the step.
     pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
-        let Self { particles, constants, layout, bins, nodes, F_early, of_time, corners, .. } =
-            self;
+        let Self { particles, grid, of_time, corners, .. } = self;
+        let GridState { constants, layout, bins, nodes, .. } = grid;
         let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let buffers = &self.buffers;
         let Particles { X, x, F, mass, volume, internal, .. } = &*particles;
-        let (c, F_early, internal_early) = (*constants, &F_early[..], &self.internal_early[..]);
+        let (c, EarlyState { F: F_early, internal: internal_early, .. }) =
+            (*constants, &self.early);
         let variables = self.shares.internal;
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
@@ -104,7 +108,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
     pub(crate) fn p2g_updated_momentum(&mut self) {
-        let Self { particles, constants, layout, bins, reprojected, corners, .. } = self;
+        let Self { particles, grid, corners, .. } = self;
+        let GridState { constants, layout, bins, reprojected, .. } = grid;
         let (domain, transfer) = (&*self.domain, self.transfer);
         let buffers = &self.buffers;
         let Particles { x, v, F, mass, affine, .. } = &*particles;
@@ -121,8 +126,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// XPIC: the grid's velocities go to the particles and back. `next` gets those of `reprojected`, or of `nodes` at first.
     pub(crate) fn p2g_g2p_velocity(&mut self, is_first: bool) {
-        let Self { particles, constants, layout, bins, nodes, reprojected, next, corners, .. } =
-            self;
+        let Self { particles, grid, corners, .. } = self;
+        let GridState { constants, layout, bins, nodes, reprojected, next, .. } = grid;
         let (domain, buffers) = (&*self.domain, &self.buffers);
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;

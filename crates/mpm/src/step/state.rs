@@ -1,14 +1,12 @@
-//! The state of a running simulation: particles, grid and bins.
+//! The state of a running simulation: particles, grid, and buffers of passes.
 
 use mmsmith_lanes::simd::Lanes;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
-use crate::grid::Layout;
-use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
-use crate::grid::node::Node;
+use crate::grid::state::GridState;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::particles::Particles;
@@ -30,30 +28,26 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) shares: Shares,
     /// Mass and volume of every particle, where they are uniform.
     pub(crate) uniform: Option<(T, T)>,
-    pub(crate) constants: Constants<T, D>,
-    pub(crate) layout: Layout<D>,
-    pub(crate) bins: Bins,
-    pub(crate) nodes: Vec<Node<T, D>>,
+    /// The grid, with the bins of particles.
+    pub(crate) grid: GridState<T, D>,
     /// Where other processes hold the rest of the body: this one's part.
     pub(crate) part: Option<Part>,
-    /// F after the early part of a step, while the weights still need F at its start; empty without such a part.
-    pub(crate) F_early: Vec<SMatrix<T, D, D>>,
-    /// The internal variables that belong to it.
-    pub(crate) internal_early: Vec<T>,
-    /// Whether there is such a part.
-    pub(crate) keeps_F_early: bool,
-    /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
-    pub(crate) reprojected: Vec<Node<T, D>>,
-    /// The fused pass: the grid of the next step while particles add to it; XPIC: the next term of the filter.
-    pub(crate) next: Vec<Node<T, D>>,
-    /// The fused pass: whether `nodes` has the velocities and accelerations of the next step, with no factor on the latter.
-    pub(crate) is_ahead: bool,
-    /// XPIC: the filtered velocity at each node.
-    pub(crate) filtered: Vec<SVector<T, D>>,
+    /// Particles after the early part of a step.
+    pub(crate) early: EarlyState<T, D>,
     /// Buffers for blocks of particles.
     pub(crate) buffers: BufferPool<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
+}
+
+/// F and internal variables after the early part of a step, while the weights still need F at its start.
+pub(crate) struct EarlyState<T, const D: usize> {
+    /// Deformation gradients; empty where steps have no early part.
+    pub(crate) F: Vec<SMatrix<T, D, D>>,
+    /// The internal variables that belong to them.
+    pub(crate) internal: Vec<T>,
+    /// Whether steps have an early part.
+    pub(crate) is_kept: bool,
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -72,7 +66,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// Sorts the particles into bins, those of other processes too.
     pub(crate) fn sort(&mut self) {
-        let Self { constants: c, particles, domain, corners, bins, layout, .. } = self;
+        let Self { grid, particles, domain, corners, .. } = self;
+        let GridState { constants: c, bins, layout, .. } = grid;
         let Particles { x, F, .. } = &*particles;
         let keys = match corners {
             Some(corners) => {
@@ -86,7 +81,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// The reason why a particle is invalid, if it is.
     pub(crate) fn invalidity(&self, p: usize) -> Option<Invalid> {
-        let Self { constants: c, particles: Particles { x, F, .. }, domain, corners, .. } = self;
+        let Self { grid, particles: Particles { x, F, .. }, domain, corners, .. } = self;
+        let GridState { constants: c, .. } = grid;
         invalidity(c, &**domain, corners.as_deref(), p, &x[p], &F[p])
     }
 }

@@ -23,27 +23,27 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// From nodes with the velocity `v` at the start of the step and the acceleration `a` to nodes with `v + dt a` and
     /// `filtered v + dt a`.
     pub(crate) fn filter(&mut self, Filter { order }: Filter) {
-        let planted = self.constants.planted;
+        let planted = self.grid.constants.planted;
         let m = f64::from(order);
         let mut factor = m;
-        let mut filtered = std::mem::take(&mut self.filtered);
+        let mut filtered = std::mem::take(&mut self.grid.filtered);
         filtered.clear();
-        filtered.extend(self.nodes.iter().map(|node| velocity(node) * real::<T>(factor)));
+        filtered.extend(self.grid.nodes.iter().map(|node| velocity(node) * real::<T>(factor)));
         for k in 2..=order {
             self.p2g_g2p_velocity(k == 2);
-            std::mem::swap(&mut self.reprojected, &mut self.next);
+            std::mem::swap(&mut self.grid.reprojected, &mut self.grid.next);
             let k = f64::from(k);
             let sign = if planted.is(Fault::XpicSign) { 1.0 } else { -1.0 };
             factor *= sign * (m - k + 1.0) / k;
-            let (terms, factor) = (&self.reprojected, real::<T>(factor));
+            let (terms, factor) = (&self.grid.reprojected, real::<T>(factor));
             each_chunk(&mut filtered, CHUNK, &|chunk, sums| {
                 for (sum, term) in sums.iter_mut().zip(&terms[chunk * CHUNK..]) {
                     *sum += velocity(term) * factor;
                 }
             });
         }
-        let dt = self.constants.time_step;
-        each_chunk(&mut self.nodes, CHUNK, &|chunk, nodes| {
+        let dt = self.grid.constants.time_step;
+        each_chunk(&mut self.grid.nodes, CHUNK, &|chunk, nodes| {
             for (node, filtered) in nodes.iter_mut().zip(&filtered[chunk * CHUNK..]) {
                 for a in 0..D {
                     let change = node.values[D + a] * dt;
@@ -52,7 +52,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 }
             }
         });
-        self.filtered = filtered;
+        self.grid.filtered = filtered;
     }
 }
 

@@ -27,8 +27,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let is_own = |corner: u32| (corner as usize) < corners.own();
         let first_corner = |p: usize| mesh.corners[mesh.places(p).start];
 
-        let bin_of = |corner: u32| self.bins.bin_of_key(keys[corner as usize]);
-        let mut counts = vec![0_u64; self.bins.rows().count()];
+        let bin_of = |corner: u32| self.grid.bins.bin_of_key(keys[corner as usize]);
+        let mut counts = vec![0_u64; self.grid.bins.rows().count()];
         for corner in (0..known.len()).map(first_corner).filter(|corner| is_own(*corner)) {
             counts[bin_of(corner)] += 1;
         }
@@ -64,7 +64,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Some(moved) = self.give(&|p| &of_particles[p]) else { return Vec::new() };
         let (records, keys) = (records.follow(&moved), moved.lists(&keys));
 
-        let bin = |p: usize, place: usize| self.bins.bin_of_key(keys.of(p)[place]);
+        let bin = |p: usize, place: usize| self.grid.bins.bin_of_key(keys.of(p)[place]);
         let is_other = |p: usize, place: usize| !held.contains(&bin(p, place));
         let (mesh, places) = records.assemble(moved.len(), &loads, kind, is_other);
         let own = places.iter().filter(|[p, place]| !is_other(*p, *place)).count();
@@ -79,7 +79,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Some(corners) = &mut self.corners {
             corners.replace(SharedCorners::of_part(mesh, at_corner, &ids, (own, halo)));
         }
-        self.hold(held, own);
+        self.grid.hold(held, own);
         own_keys
     }
 }

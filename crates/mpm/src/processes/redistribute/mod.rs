@@ -2,19 +2,16 @@
 
 mod mesh;
 
-use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
 use mmsmith_lanes::simd::Lanes;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
-use crate::grid::node::Node;
 use crate::kernel::buffers::BufferPool;
 use crate::particles::Particles;
 use crate::step::state::State;
 use mmsmith_ranks::Move;
-use mmsmith_threads::coloring::Held;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,
@@ -26,13 +23,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 None => self.give_to_bins(keys),
             };
         }
-        self.bins.sort_as(keys);
+        self.grid.bins.sort_as(keys);
     }
 
     /// Gives every particle to the process of its bin. Gives the sub-bins of those that are here then.
     fn give_to_bins(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
-        let bins: Vec<usize> = keys.iter().map(|&key| self.bins.bin_of_key(key)).collect();
-        let mut counts = vec![0_u64; self.bins.rows().count()];
+        let bins: Vec<usize> = keys.iter().map(|&key| self.grid.bins.bin_of_key(key)).collect();
+        let mut counts = vec![0_u64; self.grid.bins.rows().count()];
         bins.iter().for_each(|&bin| counts[bin] += 1);
         let Some(part) = &mut self.part else { return keys };
         let own = part.cut(counts);
@@ -40,7 +37,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Some(moved) = self.give(&|p| slice::from_ref(&holders[p])) {
             moved.replace(&mut keys);
         }
-        self.hold(own, keys.len());
+        self.grid.hold(own, keys.len());
         keys
     }
 
@@ -56,34 +53,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         // Weights in buffers may hold domains of particles that were here.
         self.buffers = BufferPool::new();
         let Particles { x, internal, .. } = &self.particles;
-        if self.keeps_F_early {
-            self.F_early.resize(x.len(), SMatrix::identity());
-            self.internal_early.resize(internal.len(), T::zero());
+        if self.early.is_kept {
+            self.early.F.resize(x.len(), SMatrix::identity());
+            self.early.internal.resize(internal.len(), T::zero());
         }
         self.uniform = self.particles.uniform();
         Some(moved)
-    }
-
-    /// Makes room for the bins `own`, with so many particles or corners, and for the rows that those reach.
-    fn hold(&mut self, own: Range<usize>, points: usize) {
-        let Self { constants, layout, bins, .. } = self;
-        let rows = bins.rows();
-        let held = Held { bands: own, all: rows.count() };
-        let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
-        bins.hold(held, points);
-        if rows == layout.rows() {
-            return;
-        }
-        layout.hold(rows);
-        constants.nodes_before = (layout.first_row * layout.row()) as f64;
-        let resize = |nodes: &mut Vec<Node<T, D>>| {
-            if !nodes.is_empty() {
-                *nodes = vec![Node::zero(); layout.nodes];
-            }
-        };
-        [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
-        if !self.filtered.is_empty() {
-            self.filtered = vec![SVector::zeros(); layout.nodes];
-        }
     }
 }

@@ -1,0 +1,53 @@
+//! The grid of a running simulation: its nodes, and the bins of particles above them.
+
+use std::ops::Range;
+
+use mmsmith_lanes::simd::Lanes;
+use mmsmith_threads::coloring::Held;
+use nalgebra::SVector;
+
+use crate::grid::Layout;
+use crate::grid::bins::Bins;
+use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
+
+/// The grid: what all steps know of it, and its nodes.
+pub(crate) struct GridState<T, const D: usize> {
+    pub(crate) constants: Constants<T, D>,
+    pub(crate) layout: Layout<D>,
+    pub(crate) bins: Bins,
+    pub(crate) nodes: Vec<Node<T, D>>,
+    /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
+    pub(crate) reprojected: Vec<Node<T, D>>,
+    /// The fused pass: the grid of the next step while particles add to it; XPIC: the next term of the filter.
+    pub(crate) next: Vec<Node<T, D>>,
+    /// The fused pass: whether `nodes` has the velocities and accelerations of the next step, with no factor on the latter.
+    pub(crate) is_ahead: bool,
+    /// XPIC: the filtered velocity at each node.
+    pub(crate) filtered: Vec<SVector<T, D>>,
+}
+
+impl<T: Lanes, const D: usize> GridState<T, D> {
+    /// Makes room for the bins `own`, with so many particles or corners, and for the rows that those reach.
+    pub(crate) fn hold(&mut self, own: Range<usize>, points: usize) {
+        let Self { constants, layout, bins, .. } = self;
+        let rows = bins.rows();
+        let held = Held { bands: own, all: rows.count() };
+        let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
+        bins.hold(held, points);
+        if rows == layout.rows() {
+            return;
+        }
+        layout.hold(rows);
+        constants.nodes_before = (layout.first_row * layout.row()) as f64;
+        let resize = |nodes: &mut Vec<Node<T, D>>| {
+            if !nodes.is_empty() {
+                *nodes = vec![Node::zero(); layout.nodes];
+            }
+        };
+        [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
+        if !self.filtered.is_empty() {
+            self.filtered = vec![SVector::zeros(); layout.nodes];
+        }
+    }
+}
