@@ -147,7 +147,7 @@ pub(crate) struct Program<'a> {
 }
 
 /// One box: its factors, and the value of each line.
-struct Part<'a> {
+struct BoxValues<'a> {
     program: &'a Program<'a>,
     factors: Vec<Factor>,
     values: Vec<Term>,
@@ -197,7 +197,7 @@ impl<'a> Program<'a> {
 
     /// Whether the factor is at most `claimed` in the box, except for the remainder.
     pub(crate) fn keeps(&self, inputs: &[(&str, Range)], claimed: f64, remainder: f64) -> bool {
-        let mut part = Part { program: self, factors: Vec::new(), values: Vec::new() };
+        let mut part = BoxValues { program: self, factors: Vec::new(), values: Vec::new() };
         for n in 0..=self.output {
             let value = if self.needed[n] { part.value(n, inputs) } else { Term::of(Range::ONE) };
             let value = value.scaled(Range::ONE.blurred(self.own[n] * UNIT));
@@ -210,7 +210,7 @@ impl<'a> Program<'a> {
     }
 }
 
-impl Part<'_> {
+impl BoxValues<'_> {
     fn range_of(&self, powers: Powers) -> Range {
         let mut range = Range::ONE;
         for (factor, power) in self.factors.iter().zip(powers) {

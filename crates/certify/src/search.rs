@@ -118,7 +118,7 @@ struct Search<'a> {
     limits: Limits,
     slender: f64,
     /// The box and its parts; a part is named by its place in this list.
-    parts: Vec<Part>,
+    parts: Vec<Piece>,
     step: &'a mut dyn FnMut(f64),
 }
 
@@ -158,7 +158,7 @@ fn bound_over(judgement: &Judgement, bounds: &[Interval]) -> f64 {
 }
 
 /// A part of the box.
-enum Part {
+enum Piece {
     /// The factor is at most this many quarters.
     Closed(u32),
     /// The part is halved along an input; the places of its halves.
@@ -214,12 +214,12 @@ impl Search<'_> {
             };
             leaves += 1;
             let first = self.parts.len();
-            self.parts[part.place] = Part::Halved(input, [first, first + 1]);
+            self.parts[part.place] = Piece::Halved(input, [first, first + 1]);
             for half in halves {
                 pending.extend(self.judged(half, 0.5 * part.share, &mut done));
             }
         }
-        let quarters = |part: &Part| if let Part::Closed(n) = part { *n } else { 0 };
+        let quarters = |part: &Piece| if let Piece::Closed(n) = part { *n } else { 0 };
         let worst = self.parts.iter().map(quarters).max().unwrap_or(0);
         let mut tree = String::new();
         self.write(0, &mut tree);
@@ -231,12 +231,12 @@ impl Search<'_> {
         let sides = self.judgement.over(&bounds);
         let place = self.parts.len();
         if let Some(factor) = sides.and_then(|s| s.factor(self.limits.factor, STEPS_OF_FACTOR)) {
-            self.parts.push(Part::Closed(((factor * STEPS_OF_FACTOR) as u32).max(1)));
+            self.parts.push(Piece::Closed(((factor * STEPS_OF_FACTOR) as u32).max(1)));
             *done += share;
             (self.step)(*done);
             return None;
         }
-        self.parts.push(Part::Open);
+        self.parts.push(Piece::Open);
         let factor = bound_over(self.judgement, &bounds);
         Some(Pending { factor, place, bounds, share })
     }
@@ -244,12 +244,12 @@ impl Search<'_> {
     /// Writes a part and the parts within it in pre-order.
     fn write(&self, place: usize, tree: &mut String) {
         match self.parts[place] {
-            Part::Closed(quarters) => tree.extend(letter(quarters)),
-            Part::Halved(input, halves) => {
+            Piece::Closed(quarters) => tree.extend(letter(quarters)),
+            Piece::Halved(input, halves) => {
                 let _ = write!(tree, "{input}");
                 halves.into_iter().for_each(|half| self.write(half, tree));
             }
-            Part::Open => {}
+            Piece::Open => {}
         }
     }
 

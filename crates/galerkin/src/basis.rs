@@ -47,7 +47,7 @@ struct Together {
 
 /// The part of the functions that an operator takes: value or derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum ValueOrSlope {
     Value,
     Slope,
 }
@@ -136,20 +136,26 @@ impl Basis {
     }
 
     /// The row of particle `q`: its first function, and the values from there on.
-    pub(crate) fn row(&self, q: usize, part: Part) -> (usize, &[f64]) {
+    pub(crate) fn row(&self, q: usize, part: ValueOrSlope) -> (usize, &[f64]) {
         let range = q * self.width..(q + 1) * self.width;
         (self.first[q], &self.weights(part)[range])
     }
 
-    fn weights(&self, part: Part) -> &[f64] {
+    fn weights(&self, part: ValueOrSlope) -> &[f64] {
         match part {
-            Part::Value => &self.value,
-            Part::Slope => &self.slope,
+            ValueOrSlope::Value => &self.value,
+            ValueOrSlope::Slope => &self.slope,
         }
     }
 
     /// Evaluates along one axis of an array: `output[o][q][i] = sum_j S_qj input[o][j][i]`, `i < inner`.
-    pub(crate) fn evaluate(&self, part: Part, inner: usize, input: &[f64], output: &mut [f64]) {
+    pub(crate) fn evaluate(
+        &self,
+        part: ValueOrSlope,
+        inner: usize,
+        input: &[f64],
+        output: &mut [f64],
+    ) {
         match self.width {
             1 => self.evaluate_of::<1>(part, inner, input, output),
             2 => self.evaluate_of::<2>(part, inner, input, output),
@@ -161,7 +167,13 @@ impl Basis {
     }
 
     /// The transposed operator: `output[o][j][i] += sum_q S_qj input[o][q][i]`.
-    pub(crate) fn integrate(&self, part: Part, inner: usize, input: &[f64], output: &mut [f64]) {
+    pub(crate) fn integrate(
+        &self,
+        part: ValueOrSlope,
+        inner: usize,
+        input: &[f64],
+        output: &mut [f64],
+    ) {
         match self.width {
             1 => self.integrate_of::<1>(part, inner, input, output),
             2 => self.integrate_of::<2>(part, inner, input, output),
@@ -174,7 +186,7 @@ impl Basis {
 
     fn evaluate_of<const W: usize>(
         &self,
-        part: Part,
+        part: ValueOrSlope,
         inner: usize,
         input: &[f64],
         output: &mut [f64],
@@ -218,7 +230,7 @@ impl Basis {
 
     fn integrate_of<const W: usize>(
         &self,
-        part: Part,
+        part: ValueOrSlope,
         inner: usize,
         input: &[f64],
         output: &mut [f64],
@@ -353,7 +365,7 @@ mod tests {
                 let (points, _) = axis.points(2, Layout::Gauss);
                 let basis = Basis::new(&axis, degree, false, &points).unwrap();
                 met[basis.width] = true;
-                for part in [Part::Value, Part::Slope] {
+                for part in [ValueOrSlope::Value, ValueOrSlope::Slope] {
                     for inner in [1, 2] {
                         let unit = |size: usize, at: usize| {
                             let mut unit = vec![0.0; size * inner];
@@ -379,7 +391,7 @@ mod tests {
         assert_eq!(met, [false, true, true, true, true, true, true]);
     }
 
-    fn sum(basis: &Basis, part: Part, coefficients: &[f64]) -> Vec<f64> {
+    fn sum(basis: &Basis, part: ValueOrSlope, coefficients: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; basis.points];
         basis.evaluate(part, 1, coefficients, &mut values);
         values
@@ -393,9 +405,11 @@ mod tests {
                 let (points, _) = axis.points(3, Layout::Gauss);
                 let basis = Basis::new(&axis, p, false, &points).unwrap();
                 let ones = vec![1.0; basis.functions];
-                for (value, slope) in
-                    sum(&basis, Part::Value, &ones).iter().zip(sum(&basis, Part::Slope, &ones))
-                {
+                for (value, slope) in sum(&basis, ValueOrSlope::Value, &ones).iter().zip(sum(
+                    &basis,
+                    ValueOrSlope::Slope,
+                    &ones,
+                )) {
                     assert!((value - 1.0).abs() < 1e-14 && slope.abs() < 1e-12, "{ends:?} {p}");
                 }
             }
@@ -414,8 +428,8 @@ mod tests {
             let linear: Vec<f64> = (0..basis.functions).map(mean).collect();
             for ((x, value), slope) in points
                 .iter()
-                .zip(sum(&basis, Part::Value, &linear))
-                .zip(sum(&basis, Part::Slope, &linear))
+                .zip(sum(&basis, ValueOrSlope::Value, &linear))
+                .zip(sum(&basis, ValueOrSlope::Slope, &linear))
             {
                 assert!((value - x).abs() < 1e-14 && (slope - 1.0).abs() < 1e-13, "{p}");
             }
@@ -434,7 +448,7 @@ mod tests {
                     let basis = Basis::new(&axis, p, normal, &points).unwrap();
                     let some: Vec<f64> =
                         (0..basis.functions).map(|j| 1.0 + (j as f64 * 1.3).sin()).collect();
-                    let part = if normal { Part::Value } else { Part::Slope };
+                    let part = if normal { ValueOrSlope::Value } else { ValueOrSlope::Slope };
                     let values = sum(&basis, part, &some);
                     assert!(values[0].abs() < 1e-12, "{cells} {p} {normal} {values:?}");
                     assert!(values[cells - 1].abs() < 1e-12, "{cells} {p} {normal} {values:?}");
@@ -457,9 +471,9 @@ mod tests {
                     let some: Vec<f64> =
                         (0..here.functions).map(|j| (j as f64 * 0.7).cos()).collect();
                     let (above, below) = (basis(&moved(step)), basis(&moved(-step)));
-                    let above = sum(&above, Part::Value, &some);
-                    let below = sum(&below, Part::Value, &some);
-                    for (q, slope) in sum(&here, Part::Slope, &some).iter().enumerate() {
+                    let above = sum(&above, ValueOrSlope::Value, &some);
+                    let below = sum(&below, ValueOrSlope::Value, &some);
+                    for (q, slope) in sum(&here, ValueOrSlope::Slope, &some).iter().enumerate() {
                         let difference = (above[q] - below[q]) / (2.0 * step);
                         assert!((slope - difference).abs() < 1e-6, "{ends:?} {p} {normal}");
                     }
@@ -480,7 +494,7 @@ mod tests {
                 };
                 let a = wave(outer * basis.functions * inner, 0.9);
                 let b = wave(outer * basis.points * inner, 1.7);
-                for part in [Part::Value, Part::Slope] {
+                for part in [ValueOrSlope::Value, ValueOrSlope::Slope] {
                     let mut forth = vec![0.0; b.len()];
                     basis.evaluate(part, inner, &a, &mut forth);
                     let mut back = vec![0.0; a.len()];

@@ -38,7 +38,7 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
-use super::basis::{Basis, Part};
+use super::basis::{Basis, ValueOrSlope};
 use super::fit::Fit;
 
 /// The side of a body at an end of an axis.
@@ -164,7 +164,7 @@ impl<const D: usize> Face<D> {
         let mut inner = 1;
         for basis in self.others().map(basis) {
             let mut sums = vec![0.0; forces.len() / basis.points * basis.functions];
-            basis.integrate(Part::Value, inner, &forces, &mut sums);
+            basis.integrate(ValueOrSlope::Value, inner, &forces, &mut sums);
             forces = sums;
             inner *= basis.functions;
         }

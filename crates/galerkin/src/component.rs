@@ -8,7 +8,7 @@ use std::mem;
 use mmsmith_mpm::SetupError;
 use mmsmith_threads::{each, each_chunk};
 
-use super::basis::{Basis, Part};
+use super::basis::{Basis, ValueOrSlope};
 use super::boundary::Face;
 use super::fit::Fit;
 use super::mass::{Band, Mass};
@@ -113,18 +113,18 @@ impl<const D: usize> Component<D> {
             match after.first_mut() {
                 Some(arrays) => {
                     for (part, array) in arrays[..=k].iter_mut().enumerate() {
-                        basis.evaluate(Part::Value, inner, source(part), array);
+                        basis.evaluate(ValueOrSlope::Value, inner, source(part), array);
                     }
-                    basis.evaluate(Part::Slope, inner, source(0), &mut arrays[k + 1]);
+                    basis.evaluate(ValueOrSlope::Slope, inner, source(0), &mut arrays[k + 1]);
                 }
                 None => {
                     if with_values {
-                        basis.evaluate(Part::Value, inner, source(0), values);
+                        basis.evaluate(ValueOrSlope::Value, inner, source(0), values);
                     }
                     for (j, slopes) in slopes[..k].iter_mut().enumerate() {
-                        basis.evaluate(Part::Value, inner, source(j + 1), slopes);
+                        basis.evaluate(ValueOrSlope::Value, inner, source(j + 1), slopes);
                     }
-                    basis.evaluate(Part::Slope, inner, source(0), &mut slopes[k]);
+                    basis.evaluate(ValueOrSlope::Slope, inner, source(0), &mut slopes[k]);
                 }
             }
             inner *= basis.points;
@@ -151,7 +151,7 @@ impl<const D: usize> Component<D> {
                 None if part == 0 => &values[..],
                 None => &slopes[part - 1][..],
             };
-            let mut target = |part: usize, terms: &[(Part, usize)]| {
+            let mut target = |part: usize, terms: &[(ValueOrSlope, usize)]| {
                 let array = match before.last_mut() {
                     Some(arrays) => &mut arrays[part][..],
                     None => &mut *coefficients,
@@ -161,7 +161,7 @@ impl<const D: usize> Component<D> {
                     basis.integrate(weights, inner, source(part), array);
                 }
             };
-            let (of_values, of_slopes) = ((Part::Value, 0), (Part::Slope, k + 1));
+            let (of_values, of_slopes) = ((ValueOrSlope::Value, 0), (ValueOrSlope::Slope, k + 1));
             match of {
                 Factors::Values => target(0, &[of_values]),
                 Factors::Slopes if is_first => target(0, &[of_slopes]),
@@ -169,7 +169,7 @@ impl<const D: usize> Component<D> {
             }
             if of != Factors::Values {
                 for j in 1..=k {
-                    target(j, &[(Part::Value, j)]);
+                    target(j, &[(ValueOrSlope::Value, j)]);
                 }
             }
         }

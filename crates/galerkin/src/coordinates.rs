@@ -38,7 +38,7 @@ pub enum Coordinates {
 
 /// Factors common to the particles in a row along axis 0.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Row<const D: usize> {
+pub(crate) struct RowGeometry<const D: usize> {
     /// Columns are the unit vectors of the components.
     pub(crate) frame: SMatrix<f64, D, D>,
     /// `1/sin(theta)` and `cot(theta)` of the polar angle; one and zero in polar coordinates.
@@ -94,7 +94,10 @@ impl Coordinates {
     }
 
     /// Factors common to the particles whose coordinates differ from these by the first; `None` where components are Cartesian.
-    pub(crate) fn row<const D: usize>(self, coordinates: &SVector<f64, D>) -> Option<Row<D>> {
+    pub(crate) fn row<const D: usize>(
+        self,
+        coordinates: &SVector<f64, D>,
+    ) -> Option<RowGeometry<D>> {
         let frame = self.frame(coordinates)?;
         let [cosecant, cotangent] = match self {
             Self::Cartesian | Self::Polar => [1.0, 0.0],
@@ -103,7 +106,7 @@ impl Coordinates {
                 [sin.recip(), cos / sin]
             }
         };
-        Some(Row { frame, cosecant, cotangent })
+        Some(RowGeometry { frame, cosecant, cotangent })
     }
 
     /// Lengths per unit of each coordinate.
@@ -137,7 +140,7 @@ impl Coordinates {
         u: &SVector<f64, D>,
         slopes: &SMatrix<f64, D, D>,
         reciprocal_radius: f64,
-        row: &Row<D>,
+        row: &RowGeometry<D>,
     ) -> SMatrix<f64, D, D> {
         let mut H = *slopes;
         match self {
@@ -147,7 +150,7 @@ impl Coordinates {
                 H[(1, 1)] = (slopes[(1, 1)] + u[0]) * reciprocal_radius;
             }
             Self::Spherical => {
-                let Row { cosecant, cotangent, .. } = *row;
+                let RowGeometry { cosecant, cotangent, .. } = *row;
                 H[(0, 1)] = (slopes[(0, 1)] - u[1]) * reciprocal_radius;
                 H[(1, 1)] = (slopes[(1, 1)] + u[0]) * reciprocal_radius;
                 H[(2, 1)] = slopes[(2, 1)] * reciprocal_radius;
@@ -166,7 +169,7 @@ impl Coordinates {
         self,
         force: &SMatrix<f64, D, D>,
         reciprocal_radius: f64,
-        row: &Row<D>,
+        row: &RowGeometry<D>,
     ) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
         let (mut values, mut slopes) = (SVector::zeros(), *force);
         match self {
@@ -179,7 +182,7 @@ impl Coordinates {
                 values[1] = -force[(0, 1)] * reciprocal_radius;
             }
             Self::Spherical => {
-                let Row { cosecant, cotangent, .. } = *row;
+                let RowGeometry { cosecant, cotangent, .. } = *row;
                 for c in 0..D {
                     slopes[(c, 1)] *= reciprocal_radius;
                     slopes[(c, 2)] *= cosecant * reciprocal_radius;

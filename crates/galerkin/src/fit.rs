@@ -1,7 +1,7 @@
 //! Coefficients along one axis from values at its particles, and at the ends whose motion is given.
 
 use super::axis::{Axis, Layout};
-use super::basis::{Basis, Part};
+use super::basis::{Basis, ValueOrSlope};
 use super::mass::{Band, Mass};
 
 /// Quadrature points along an axis, with the length that each represents.
@@ -61,7 +61,7 @@ impl Fit {
         }
         let size = basis.functions * inner;
         let mut fitted = vec![0.0; blocks.len() * size];
-        basis.integrate(Part::Value, inner, &weighted, &mut fitted);
+        basis.integrate(ValueOrSlope::Value, inner, &weighted, &mut fitted);
         let ends = [(self.moved[0], 0), (self.moved[1], size - inner)];
         let set = |fitted: &mut [f64]| {
             for (block, fitted) in blocks.clone().zip(fitted.chunks_exact_mut(size)) {
@@ -108,7 +108,7 @@ mod tests {
                 let coefficient = |j: usize| ((j % own) as f64 * 1.7).sin();
                 let coefficients: Vec<f64> = (0..basis.functions).map(coefficient).collect();
                 let mut at_particles = vec![0.0; line.points.len()];
-                basis.evaluate(Part::Value, 1, &coefficients, &mut at_particles);
+                basis.evaluate(ValueOrSlope::Value, 1, &coefficients, &mut at_particles);
                 let mut values = at_particles;
                 if ends[0] == End::Moved {
                     values.insert(0, coefficients[0]);

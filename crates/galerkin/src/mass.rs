@@ -7,7 +7,7 @@ use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_threads::{each, each_chunk};
 
 use super::axis::{Axis, End};
-use super::basis::{Basis, Part};
+use super::basis::{Basis, ValueOrSlope};
 use super::piece;
 
 /// The mass matrix along one axis, which can be solved for.
@@ -70,7 +70,7 @@ impl Band {
         let (size, band) = (basis.functions, basis.width - 1);
         let mut lower = vec![0.0; size * (band + 1)];
         for (q, w) in weights.iter().enumerate() {
-            let (first, row) = basis.row(q, Part::Value);
+            let (first, row) = basis.row(q, ValueOrSlope::Value);
             for (k, a) in row.iter().enumerate() {
                 for (l, b) in row[..=k].iter().enumerate() {
                     if k - l == band && Planted::here().is(Fault::MassBandDropped) {
@@ -148,7 +148,7 @@ impl Mass {
         count: usize,
     ) -> Self {
         let mut sums = vec![0.0; even.functions];
-        even.integrate(Part::Value, 1, weights, &mut sums);
+        even.integrate(ValueOrSlope::Value, 1, weights, &mut sums);
         let copies = if axis.ends[0] == End::Periodic { even.functions - axis.cells } else { 0 };
         let (own, copied) = sums.split_at_mut(even.functions - copies);
         own.iter_mut().zip(copied).for_each(|(own, copy)| *own += *copy);
@@ -427,7 +427,7 @@ mod tests {
         for normal in [false, true] {
             let basis = Basis::new(&axis, 2, normal, &points).unwrap();
             assert_eq!((basis.functions, basis.width), (1, 1));
-            let of_point = |q: usize| weights[q] * basis.row(q, Part::Value).1[0].powi(2);
+            let of_point = |q: usize| weights[q] * basis.row(q, ValueOrSlope::Value).1[0].powi(2);
             let expected: f64 = (0..3).map(of_point).sum();
             let mass = Mass::consistent(&axis, &Band::consistent(&basis, &weights)).unwrap();
             for inner in [1, 3] {
@@ -450,7 +450,7 @@ mod tests {
         let own = if periodic { axis.cells } else { basis.functions };
         let mut dense = DMatrix::<f64>::zeros(own, own);
         for (q, w) in weights.iter().enumerate() {
-            let (first, row) = basis.row(q, Part::Value);
+            let (first, row) = basis.row(q, ValueOrSlope::Value);
             for (k, a) in row.iter().enumerate() {
                 for (l, b) in row.iter().enumerate() {
                     dense[((first + k) % own, (first + l) % own)] += w * a * b;

@@ -24,7 +24,7 @@ use super::basis::{Basis, MOST_DEGREE};
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity, Side};
 use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
 use super::composition::Composition;
-use super::coordinates::{Coordinates, Row};
+use super::coordinates::{Coordinates, RowGeometry};
 use super::fit::{Fit, Line};
 use super::mass::{Band, Mass};
 use super::piece;
@@ -81,7 +81,7 @@ pub struct TotalLagrangian<const D: usize> {
     density: f64,
     /// Curvilinear coordinates: reciprocal radius by place along axis 0, and what a row of places along it has in common.
     reciprocal_radius: Vec<f64>,
-    rows: Vec<Row<D>>,
+    rows: Vec<RowGeometry<D>>,
     steps_done: usize,
     failed: Option<StepError>,
     planted: Planted,
@@ -582,7 +582,7 @@ struct Stress<'a, L, const D: usize> {
     particles: &'a Particles<f64, D>,
     density: f64,
     coordinates: Coordinates,
-    rows: &'a [Row<D>],
+    rows: &'a [RowGeometry<D>],
     reciprocal_radius: &'a [f64],
     planted: Planted,
 }
@@ -636,7 +636,7 @@ struct RowOfPlaces<'a, 'b, const D: usize> {
     volume: &'a [f64],
     values: &'a mut [&'b mut [f64]; D],
     slopes: &'a mut [[&'b mut [f64]; D]; D],
-    at: Option<&'a Row<D>>,
+    at: Option<&'a RowGeometry<D>>,
     coordinates: Coordinates,
     reciprocal_radius: &'a [f64],
     planted: Planted,
@@ -729,7 +729,7 @@ impl<const D: usize> LawOfRows<D> for OwnRows<D> {
 
 /// The Cartesian vector with these components in row `row` of particles.
 fn cartesian<const D: usize>(
-    rows: &[Row<D>],
+    rows: &[RowGeometry<D>],
     row: usize,
     components: &SVector<f64, D>,
 ) -> SVector<f64, D> {
@@ -750,7 +750,7 @@ fn line<const D: usize>(grid: &Grid<D>, k: usize) -> Line {
 }
 
 /// Factors common to a row of particles along axis 0; empty where components are Cartesian.
-fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row<D>> {
+fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<RowGeometry<D>> {
     let mut counts = lines.each_ref().map(|line| line.points.len());
     counts[0] = 1;
     let place = |index: [usize; D]| SVector::from_fn(|k, _| lines[k].points[index[k]]);

@@ -1,6 +1,6 @@
 //! Fields at many points, in flat arrays as hosts hold them.
 
-use crate::staged::{Row, Stage, coordinate};
+use crate::staged::{PerPoint, Stage, coordinate};
 use crate::{InterpretError, resolve, surface};
 use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::{BLOCK, Surface};
@@ -142,7 +142,7 @@ impl Arrays {
         fill(stage, &uniform, count, values, |first, given| {
             let last = (first + BLOCK).min(count) - 1;
             // What a last block has to spare repeats its last point.
-            let row = |&axis: &usize| -> Row<f64> {
+            let row = |&axis: &usize| -> PerPoint<f64> {
                 std::array::from_fn(|i| X[(first + i).min(last) * n + axis])
             };
             given.extend(self.axes.iter().map(row));
@@ -157,7 +157,7 @@ impl Arrays {
     }
 
     /// Block by block the values that are kept of points.
-    fn kept(&self, of: &FromKept, X: &[f64]) -> Vec<Row<f64>> {
+    fn kept(&self, of: &FromKept, X: &[f64]) -> Vec<PerPoint<f64>> {
         let mut flat = vec![0.0; X.len() / self.dimension * of.kept];
         self.of_coordinates(&of.at_points, X, f64::NAN, &mut flat);
         let mut rows = Vec::with_capacity(flat.len().div_ceil(BLOCK));
@@ -176,8 +176,8 @@ impl Arrays {
 pub struct ArraysAtPoints {
     arrays: Arc<Arrays>,
     X: Vec<f64>,
-    body_force: OnceLock<Vec<Row<f64>>>,
-    state: OnceLock<Vec<Row<f64>>>,
+    body_force: OnceLock<Vec<PerPoint<f64>>>,
+    state: OnceLock<Vec<PerPoint<f64>>>,
 }
 
 impl ArraysAtPoints {
@@ -226,7 +226,7 @@ fn fill(
     uniform: &[f64],
     count: usize,
     values: &mut [f64],
-    give: impl Fn(usize, &mut Vec<Row<f64>>) + Sync,
+    give: impl Fn(usize, &mut Vec<PerPoint<f64>>) + Sync,
 ) {
     let entries = stage.section.output_count();
     assert_eq!(values.len(), count * entries, "{entries} values for each of {count} points");

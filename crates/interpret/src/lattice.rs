@@ -1,7 +1,7 @@
 //! The body force at the points of a lattice, from values of its layers.
 
 use crate::Interpretable;
-use crate::staged::{Row, Stage, coordinate};
+use crate::staged::{PerPoint, Stage, coordinate};
 use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{BLOCK, BodyForceAtPoints, Lattice, Solution};
@@ -115,7 +115,7 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for LatticePoints
         for LayerStage { axis, count, stage } in layers {
             let uniform = stage.uniform(D, t, self.parameters);
             for coordinates in self.lattice.coordinates(*axis).chunks(BLOCK) {
-                let mut row: Row<T> = [T::zero(); BLOCK];
+                let mut row: PerPoint<T> = [T::zero(); BLOCK];
                 row[..coordinates.len()].copy_from_slice(coordinates);
                 let first = values.len();
                 values.resize(first + coordinates.len() * count, T::zero());

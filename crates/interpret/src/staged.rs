@@ -7,7 +7,7 @@ use mmsmith_runtime::{BLOCK, BodyForceAtPoints, StateAtPoints, StateRun};
 use mmsmith_stage::Stages;
 
 /// One number for each point of a block.
-pub(crate) type Row<T> = [T; BLOCK];
+pub(crate) type PerPoint<T> = [T; BLOCK];
 
 /// A section with the program of what is the same at all points.
 pub(crate) struct Stage {
@@ -73,9 +73,10 @@ impl<const N: usize> PointStages<N> {
         let mut blocks = Vec::with_capacity(X.len().div_ceil(BLOCK) * self.kept);
         for X in X.chunks(BLOCK) {
             // What a last block has to spare repeats its last point.
-            let coordinate =
-                |axis: usize| -> Row<T> { std::array::from_fn(|n| X[n.min(X.len() - 1)][axis]) };
-            let given: Vec<Row<T>> = self.axes.iter().map(|&axis| coordinate(axis)).collect();
+            let coordinate = |axis: usize| -> PerPoint<T> {
+                std::array::from_fn(|n| X[n.min(X.len() - 1)][axis])
+            };
+            let given: Vec<PerPoint<T>> = self.axes.iter().map(|&axis| coordinate(axis)).collect();
             blocks.extend(self.at_points.section.run(&uniform, &given, &mut rows));
         }
         Points { stages: self, parameters, blocks, len: X.len() }
@@ -87,13 +88,13 @@ pub(crate) struct Points<'a, T, const N: usize> {
     stages: &'a PointStages<N>,
     parameters: &'a [T],
     /// Value `m` of point `n BLOCK + i` is number `i` of row `n kept + m`.
-    blocks: Vec<Row<T>>,
+    blocks: Vec<PerPoint<T>>,
     len: usize,
 }
 
 impl<T: Interpretable, const N: usize> Points<'_, T, N> {
     /// The rows of a block.
-    fn block(&self, number: usize) -> &[Row<T>] {
+    fn block(&self, number: usize) -> &[PerPoint<T>] {
         let kept = self.stages.kept;
         &self.blocks[number * kept..(number + 1) * kept]
     }

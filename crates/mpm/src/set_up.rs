@@ -20,7 +20,7 @@ use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::columns::Shares;
 use crate::particles::mesh::Interpolation;
-use crate::processes::decomposition::{Part, Share, admit};
+use crate::processes::decomposition::{LocalBody, Share, admit};
 use crate::scheme::{Settings, VelocityUpdate};
 use crate::step::is_fused;
 use crate::step::state::{EarlyState, State};
@@ -202,7 +202,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let mut layout = Layout::new(grid, bytes_per_node)?;
     let points = corners.as_ref().map_or(count, SharedCorners::count);
     let mut bins = Bins::new(&layout, points);
-    let part = share.map(Part::new);
+    let part = share.map(LocalBody::new);
     if let Some(part) = &part {
         admit(part.ranks.count(), &layout, bins.rows())?;
         bins.share_out(part.ranks.clone());

@@ -17,7 +17,7 @@ use crate::grid::state::GridState;
 use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::mesh::Mesh;
-use crate::processes::decomposition::{Arrangement, Part, Share};
+use crate::processes::decomposition::{Arrangement, LocalBody, Share};
 use crate::scheme::Settings;
 use crate::set_up::{allocate, check, figure, of_blocks};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
@@ -216,7 +216,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// Which particles this process holds, where there are several.
     pub fn arrangement(&self) -> Option<Arrangement<'_>> {
-        self.state.part.as_ref().map(Part::arrangement)
+        self.state.part.as_ref().map(LocalBody::arrangement)
     }
 
     /// The domains of the particles at the current time, where they share corners.

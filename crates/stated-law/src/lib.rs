@@ -42,7 +42,7 @@ pub use moduli::ModuliAtRest;
 use function::GAUSS;
 use mmsmith_expr::ParseError;
 use nalgebra::{RealField, SMatrix};
-use program::{Given, Part, Program, deformations};
+use program::{Given, Portion, Program, deformations};
 use std::marker::PhantomData;
 use stress::Kinematics;
 use tape::{Tape, Value};
@@ -217,7 +217,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
     ) {
         self.assert_dimension(D);
         let results = P.iter_mut().flatten();
-        self.programs.stress.run(Given::Deformation(F), Part::Whole, results);
+        self.programs.stress.run(Given::Deformation(F), Portion::Whole, results);
     }
 
     /// The strain energy per reference volume above that at rest, a stress; `None` for a law that states its stress, and where F
@@ -236,7 +236,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
         self.assert_dimension(D);
         let energy = self.programs.energy.as_ref()?;
         let F = F.map(nalgebra::convert_unchecked::<T, f64>);
-        let direct = single(energy, &F, Part::Deviation)?;
+        let direct = single(energy, &F, Portion::Deviation)?;
         let H = F - SMatrix::identity();
         let mut work = f64::NAN;
         if H.iter().all(|h| h.abs() <= SMALL) {
@@ -244,7 +244,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
                 matrix(|i, j| GAUSS.map(|[at, _]| at * H[(i, j)]));
             let mut P = on_the_way;
             let results = P.iter_mut().flatten();
-            self.programs.stress.run(Given::Displacement(&on_the_way), Part::Whole, results);
+            self.programs.stress.run(Given::Displacement(&on_the_way), Portion::Whole, results);
             work = 0.0;
             for (n, [_, weight]) in GAUSS.iter().enumerate() {
                 for i in 0..D {
@@ -268,7 +268,7 @@ impl<T: RealField + Copy> StatedLaw<T> {
     pub fn kirchhoff_across<const D: usize>(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         self.assert_dimension(D);
         let F = F.map(nalgebra::convert_unchecked::<T, f64>);
-        single(self.programs.across.as_ref()?, &F, Part::Whole).map(nalgebra::convert)
+        single(self.programs.across.as_ref()?, &F, Portion::Whole).map(nalgebra::convert)
     }
 
     /// The moduli of small strains; `None` where the stress has no derivative at rest.
@@ -326,7 +326,7 @@ compiled! {
 }
 
 /// The one result of a program; `None` where F is no deformation.
-fn single<const D: usize>(program: &Program, F: &SMatrix<f64, D, D>, part: Part) -> Option<f64> {
+fn single<const D: usize>(program: &Program, F: &SMatrix<f64, D, D>, part: Portion) -> Option<f64> {
     let F: [[[f64; 1]; D]; D] = matrix(|i, j| [F[(i, j)]]);
     let mut is_deformation = [true];
     deformations(&F, &mut is_deformation);

@@ -1,7 +1,7 @@
 //! The moduli of small strains.
 
 use crate::matrix;
-use crate::program::{Given, Part, Program};
+use crate::program::{Given, Portion, Program};
 use nalgebra::Matrix3;
 
 /// The moduli of a law at rest, stresses all of them.
@@ -40,7 +40,7 @@ impl ModuliAtRest {
             (values[n] - values[n + 1]) / (2.0 * STEP)
         };
         let mut P = H;
-        stress.run(Given::Displacement(&H), Part::Deviation, P.iter_mut().flatten());
+        stress.run(Given::Displacement(&H), Portion::Deviation, P.iter_mut().flatten());
         let mut tangent = [[[[0.0; 3]; 3]; 3]; 3];
         for (i, j, k, l) in indices::<D>() {
             tangent[i][j][k][l] = slope(&P[i][j], k, l);
@@ -54,7 +54,11 @@ impl ModuliAtRest {
         } else {
             let mut normal = [0.0; MOST];
             if let Some(across) = across {
-                across.run(Given::Displacement(&H), Part::Deviation, std::iter::once(&mut normal));
+                across.run(
+                    Given::Displacement(&H),
+                    Portion::Deviation,
+                    std::iter::once(&mut normal),
+                );
             }
             let lambda = slope(&normal, 0, 0);
             (lambda, 0.5 * (tangent[0][0][0][0] - lambda))

@@ -10,7 +10,7 @@ use std::cell::RefCell;
 
 /// Where the parts of a number are: in rows of the block's memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Place {
+struct Location {
     /// The value at rest.
     rest: f64,
     deviation: usize,
@@ -36,45 +36,45 @@ enum Work {
     },
     /// The deviation alone, `factor x`.
     Multiple {
-        x: Place,
+        x: Location,
         factor: f64,
     },
     /// The value alone, `x + constant`.
     Shift {
-        x: Place,
+        x: Location,
         constant: f64,
     },
     Affine {
-        x: Place,
+        x: Location,
         factor: f64,
         constant: f64,
     },
     Sum {
-        x: Place,
+        x: Location,
         a: f64,
-        y: Place,
+        y: Location,
         b: f64,
         constant: f64,
     },
     Product {
-        x: Place,
-        y: Place,
+        x: Location,
+        y: Location,
     },
     Reciprocal {
-        x: Place,
+        x: Location,
     },
     Power {
-        x: Place,
+        x: Location,
         exponent: f64,
         rest: f64,
     },
     Call {
         function: Function,
-        x: Place,
+        x: Location,
     },
     Angle {
-        y: Place,
-        x: Place,
+        y: Location,
+        x: Location,
     },
 }
 
@@ -90,7 +90,7 @@ struct Step {
 #[derive(Clone, Copy, Debug)]
 enum Output {
     Constant(f64),
-    Varying(Place),
+    Varying(Location),
 }
 
 /// Steps that compute some numbers of a tape.
@@ -112,7 +112,7 @@ pub(crate) enum Given<'a, T, const D: usize, const N: usize> {
 
 /// Parts of a number that are asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum Portion {
     Whole,
     Deviation,
 }
@@ -138,7 +138,7 @@ impl Program {
             }
         }
         let mut program = Program { steps: Vec::new(), outputs: Vec::new(), rows: 0 };
-        let mut places: Vec<Option<Place>> = vec![None; needed.len()];
+        let mut places: Vec<Option<Location>> = vec![None; needed.len()];
         for index in (0..needed.len()).filter(|&index| needed[index]) {
             let [x, y] = operations[index]
                 .operands()
@@ -162,9 +162,9 @@ impl Program {
         &mut self,
         rest: Option<f64>,
         operation: Operation,
-        x: Option<Place>,
-        y: Option<Place>,
-    ) -> Option<Place> {
+        x: Option<Location>,
+        y: Option<Location>,
+    ) -> Option<Location> {
         let reference = rest.unwrap_or(0.0);
         let wanted = match rest {
             None => Wanted::Value,
@@ -178,7 +178,7 @@ impl Program {
                 let (x, y) = (x?, y?);
                 // Without a value at rest deviations are values.
                 let deviation = if reference == 0.0 { y.value } else { x.deviation };
-                return Some(Place { rest: reference, deviation, value: y.value });
+                return Some(Location { rest: reference, deviation, value: y.value });
             }
             Operation::Affine { factor, constant, .. } => {
                 let (x, factor, constant) = (x?, factor.get(), constant.get());
@@ -189,7 +189,7 @@ impl Program {
                     } else {
                         self.add(Work::Shift { x, constant }, Wanted::Value).value
                     };
-                    return Some(Place { rest: reference, deviation: x.deviation, value });
+                    return Some(Location { rest: reference, deviation: x.deviation, value });
                 }
                 match wanted {
                     Wanted::Both => Work::Affine { x, factor, constant },
@@ -209,15 +209,15 @@ impl Program {
             // In the order of the operands.
             Operation::Angle { .. } => Work::Angle { y: y?, x: x? },
         };
-        Some(Place { rest: reference, ..self.add(work, wanted) })
+        Some(Location { rest: reference, ..self.add(work, wanted) })
     }
 
-    fn add(&mut self, work: Work, wanted: Wanted) -> Place {
+    fn add(&mut self, work: Work, wanted: Wanted) -> Location {
         let row = self.rows;
         self.steps.push(Step { work, wanted, row });
         let value = if wanted == Wanted::Both { row + 1 } else { row };
         self.rows = value + 1;
-        Place { rest: 0.0, deviation: row, value }
+        Location { rest: 0.0, deviation: row, value }
     }
 
     /// The results for deformations side by side, in registers as wide as this processor has them; not a number where F is no
@@ -225,7 +225,7 @@ impl Program {
     pub(crate) fn run<'a, T: RealField + Copy, const D: usize, const N: usize>(
         &self,
         given: Given<'_, T, D, N>,
-        part: Part,
+        part: Portion,
         results: impl Iterator<Item = &'a mut [T; N]>,
     ) {
         with_room(self.rows, |rows| {
@@ -240,18 +240,18 @@ impl Program {
     fn take<T: RealField + Copy, const N: usize>(
         &self,
         output: Output,
-        part: Part,
+        part: Portion,
         rows: &[[T; N]],
         valid: &[bool; N],
         result: &mut [T; N],
     ) {
         let not_a_number: T = real(f64::NAN);
         match (output, part) {
-            (Output::Constant(value), Part::Whole) => *result = [real(value); N],
-            (Output::Constant(_), Part::Deviation) => *result = [T::zero(); N],
+            (Output::Constant(value), Portion::Whole) => *result = [real(value); N],
+            (Output::Constant(_), Portion::Deviation) => *result = [T::zero(); N],
             (Output::Varying(place), part) => {
                 let (deviation, value) = (&rows[place.deviation], &rows[place.value]);
-                if part == Part::Deviation || place.rest == 0.0 {
+                if part == Portion::Deviation || place.rest == 0.0 {
                     *result = *deviation;
                 } else {
                     let rest: T = real(place.rest);
@@ -615,6 +615,6 @@ fn affine<T: RealField + Copy, const N: usize>(
 }
 
 #[inline(always)]
-fn parts<T: RealField + Copy>(place: Place, deviation: T, value: T) -> Parts {
+fn parts<T: RealField + Copy>(place: Location, deviation: T, value: T) -> Parts {
     Parts { rest: place.rest, deviation: double(deviation), value: double(value) }
 }

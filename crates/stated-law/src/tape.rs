@@ -187,7 +187,7 @@ impl Operation {
 
 /// An operation, and the value at rest of its result; none where that is not a finite number.
 #[derive(Clone, Copy, Debug)]
-struct Row {
+struct Entry {
     operation: Operation,
     rest: Option<Rest>,
 }
@@ -195,7 +195,7 @@ struct Row {
 /// Operations in the order in which they are done; equal ones are one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
-    rows: Vec<Row>,
+    rows: Vec<Entry>,
     known: HashMap<Operation, Node>,
 }
 
@@ -221,7 +221,7 @@ impl Tape {
         let rest = self.rest_of(operation);
         let node = Node(self.rows.len());
         let rest = rest.value.is_finite().then_some(rest);
-        self.rows.push(Row { operation, rest });
+        self.rows.push(Entry { operation, rest });
         self.known.insert(operation, node);
         node
     }

@@ -11,7 +11,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::of_particles::Domain;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::particles::mesh::{Interpolation, Mesh, Share};
+use crate::particles::mesh::{CornerShare, Interpolation, Mesh};
 use crate::processes::corner_halo::CornerHalo;
 use crate::shape::cells::{PAIRS, volume_of_cell};
 use crate::shape::one_axis::ProductShape;
@@ -58,14 +58,14 @@ pub(crate) struct SharedCorners<T, const D: usize> {
 #[derive(Debug)]
 pub(crate) struct Measured<T, const D: usize> {
     /// For each place in the list of corners.
-    pub(crate) shares: Vec<Share<T, D>>,
+    pub(crate) shares: Vec<CornerShare<T, D>>,
     /// The area of each particle.
     volumes: Vec<T>,
 }
 
 /// Shares of some successive particles.
 pub(crate) struct MeasuredPart<'a, T, const D: usize> {
-    shares: &'a mut [Share<T, D>],
+    shares: &'a mut [CornerShare<T, D>],
     volumes: &'a mut [T],
 }
 
@@ -78,7 +78,7 @@ impl<T: Lanes, const D: usize> Measured<T, D> {
         let (mut shares, mut volumes) = (Vec::new(), Vec::new());
         if !mesh.is_of_cells() {
             let particles = mesh.of_particles.len();
-            shares.resize(mesh.corners.len(), Share { w: T::zero(), g: [T::zero(); D] });
+            shares.resize(mesh.corners.len(), CornerShare { w: T::zero(), g: [T::zero(); D] });
             volumes.resize(particles, T::zero());
             (0..particles).for_each(|p| mesh.means(p, &mut shares[mesh.places(p)]));
         }
@@ -86,7 +86,7 @@ impl<T: Lanes, const D: usize> Measured<T, D> {
     }
 
     /// The shares of a particle and of the particles after it.
-    pub(crate) fn from(&self, mesh: &Mesh<T, D>, first: usize) -> &[Share<T, D>] {
+    pub(crate) fn from(&self, mesh: &Mesh<T, D>, first: usize) -> &[CornerShare<T, D>] {
         self.shares.get(mesh.places(first).start..).unwrap_or_default()
     }
 
@@ -116,7 +116,7 @@ impl<T: Lanes, const D: usize> MeasuredPart<'_, T, D> {
         &self,
         mesh: &Mesh<T, D>,
         (of_all, first): (usize, usize),
-    ) -> &[Share<T, D>] {
+    ) -> &[CornerShare<T, D>] {
         let start = mesh.places(first).start - mesh.places(of_all).start;
         self.shares.get(start..).unwrap_or_default()
     }

@@ -262,7 +262,7 @@ impl<T: Lanes> Factors<T> {
 }
 
 /// A row of nodes along axis 0.
-struct Row<T, const D: usize> {
+struct RowWeights<T, const D: usize> {
     start: usize,
     /// Product of the weights along axes 1 and up.
     S: T,
@@ -284,9 +284,9 @@ fn row<T: Lanes, const D: usize, const W: usize>(
     first: usize,
     strides: &[usize; D],
     index: usize,
-) -> Row<T, D> {
+) -> RowWeights<T, D> {
     let none = || Factors { S: T::one(), G: T::zero(), Z: T::zero() };
-    let mut row = Row { start: first, S: T::one(), slopes: std::array::from_fn(|_| none()) };
+    let mut row = RowWeights { start: first, S: T::one(), slopes: std::array::from_fn(|_| none()) };
     match D {
         1 => {}
         2 => {
@@ -311,7 +311,7 @@ fn row<T: Lanes, const D: usize, const W: usize>(
 fn contributions_to_row<T: Lanes, const D: usize>(
     value: &[T; LANES],
     slope: &[[T; LANES]; D],
-    row: &Row<T, D>,
+    row: &RowWeights<T, D>,
     is_affine: bool,
 ) -> [[T; LANES]; 2] {
     let (mut to_value, mut to_slope) = (*value, slope[0]);
@@ -378,7 +378,7 @@ impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
     fn add_row<const W: usize, L: Weights<T, D, W>>(
         &mut self,
         weights: &L,
-        row: &Row<T, D>,
+        row: &RowWeights<T, D>,
         nodes: &[Node<T, D>; W],
     ) {
         let mut row_value = [T::zero(); LANES];

@@ -13,7 +13,7 @@ use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
 use crate::kernel::cpdi::parallelograms::GROUP;
-use crate::particles::mesh::{Mesh, Share};
+use crate::particles::mesh::{CornerShare, Mesh};
 use crate::shape::cells::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.
@@ -138,7 +138,7 @@ pub(crate) struct ToCorners<'a, T, const D: usize> {
     /// Where the corners are.
     pub(crate) at: &'a [SVector<T, D>],
     /// The shares of the particles there; empty for cells.
-    pub(crate) shares: &'a [Share<T, D>],
+    pub(crate) shares: &'a [CornerShare<T, D>],
     /// The first of the particles, and how many.
     pub(crate) particles: (usize, usize),
     pub(crate) contributions: &'a Contributions<T, D, BLOCK>,
@@ -249,7 +249,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D,
                     }
                 }
                 for place in mesh.places(first + k) {
-                    let Share { w, g } = shares[place - start];
+                    let CornerShare { w, g } = shares[place - start];
                     let x = &at[mesh.corners[place] as usize];
                     let mut arm = [T::zero(); D];
                     for a in 0..D {
@@ -325,7 +325,7 @@ pub(crate) struct FromCorners<'a, T, const D: usize> {
     pub(crate) c: &'a Constants<T, D>,
     pub(crate) corners: &'a SharedCorners<T, D>,
     /// The shares of the particles; empty for cells.
-    pub(crate) shares: &'a [Share<T, D>],
+    pub(crate) shares: &'a [CornerShare<T, D>],
     pub(crate) values: &'a CornerValues<T, D>,
     /// The first of the particles.
     pub(crate) first: usize,
@@ -389,7 +389,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
             for (k, own) in receiver.iter_mut().enumerate() {
                 let mut over = InterpolatedValue::zero();
                 for place in mesh.places(first + k) {
-                    let Share { w, g } = shares[place - start];
+                    let CornerShare { w, g } = shares[place - start];
                     let node = &values.nodes[mesh.corners[place] as usize];
                     over.add(vectors, vectors.load8(&node.values), w, g);
                 }

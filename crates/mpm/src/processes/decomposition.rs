@@ -34,7 +34,7 @@ pub struct Arrangement<'a> {
 }
 
 /// The part of the body that one process holds.
-pub(crate) struct Part {
+pub(crate) struct LocalBody {
     pub(crate) ranks: Arc<dyn Ranks>,
     /// The numbers of the particles here, ascending.
     pub(crate) ids: Arc<Vec<u64>>,
@@ -56,7 +56,7 @@ pub(crate) struct Owned {
 /// A cut is moved where a process has more particles than this share of the mean.
 pub(crate) const UNEVEN: f64 = 1.1;
 
-impl Part {
+impl LocalBody {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
         let ids = Arc::new(ids);
         Self { ranks, ids, own: None, version: 0, cuts: Vec::new() }

@@ -11,7 +11,7 @@ use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
 use crate::particles::Particles;
 use crate::particles::columns::Shares;
-use crate::processes::decomposition::Part;
+use crate::processes::decomposition::LocalBody;
 use crate::scheme::Transfer;
 use crate::step::health::{Invalid, Outcome};
 
@@ -31,7 +31,7 @@ pub(crate) struct State<T, const D: usize> {
     /// The grid, with the bins of particles.
     pub(crate) grid: GridState<T, D>,
     /// Where other processes hold the rest of the body: this one's part.
-    pub(crate) part: Option<Part>,
+    pub(crate) part: Option<LocalBody>,
     /// Particles after the early part of a step.
     pub(crate) early: EarlyState<T, D>,
     /// Buffers for blocks of particles.

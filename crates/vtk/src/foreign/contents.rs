@@ -81,12 +81,12 @@ pub(super) struct Entry {
     pub(super) components: usize,
     /// The number of tuples of `components` numbers that the array must have.
     pub(super) tuples: usize,
-    pub(super) place: Place,
+    pub(super) place: ArrayData,
 }
 
 /// The place and form of the numbers of an array.
 #[derive(Clone, Debug)]
-pub(super) enum Place {
+pub(super) enum ArrayData {
     /// Numbers between blanks.
     Ascii(Range<usize>),
     /// Base64 of header and data.
@@ -112,16 +112,16 @@ impl Contents {
         }
         let size = count * entry.kind.size();
         let unpacked = match &entry.place {
-            Place::Ascii(range) => return parse(&bytes[range.clone()], count),
-            Place::Plain(range) => {
+            ArrayData::Ascii(range) => return parse(&bytes[range.clone()], count),
+            ArrayData::Plain(range) => {
                 return decode(&bytes[range.clone()], entry.kind, self.packing.order);
             }
-            Place::Base64(range) => self.packing.unpack(
+            ArrayData::Base64(range) => self.packing.unpack(
                 Base64::new(&bytes[range.clone()]),
                 range.len() / 4 * 3,
                 size,
             )?,
-            Place::Appended(offset) => {
+            ArrayData::Appended(offset) => {
                 let appended = self.appended.as_ref().ok_or("the file has no appended data")?;
                 let whole = &bytes[appended.start..appended.end];
                 let data = whole.get(*offset..).ok_or_else(|| {

@@ -1,6 +1,6 @@
 //! The arrays of legacy `.vtk` files, in text or binary.
 
-use super::contents::{Cells, Contents, Entry, Kinds, Nodes, Piece, Place};
+use super::contents::{ArrayData, Cells, Contents, Entry, Kinds, Nodes, Piece};
 use super::numbers::{ByteOrder, Kind, Packing};
 
 /// Finds the arrays of a legacy file.
@@ -184,7 +184,7 @@ impl<'a> Scan<'a> {
             let size = size.ok_or_else(|| cut((there / kind.size()).to_string()))?;
             let start = self.at;
             self.at += size;
-            Place::Plain(start..self.at)
+            ArrayData::Plain(start..self.at)
         } else {
             let start = self.at;
             for found in 0..count {
@@ -192,7 +192,7 @@ impl<'a> Scan<'a> {
                     return Err(cut(found.to_string()));
                 }
             }
-            Place::Ascii(start..self.at)
+            ArrayData::Ascii(start..self.at)
         };
         Ok(Entry { name, kind, components, tuples, place })
     }

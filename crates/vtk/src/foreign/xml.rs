@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::contents::{Appended, Cells, Contents, Entry, Kinds, Nodes, Piece, Place};
+use super::contents::{Appended, ArrayData, Cells, Contents, Entry, Kinds, Nodes, Piece};
 use super::numbers::{ByteOrder, Kind, Packing};
 
 /// A limit that no element of a VTK file reaches.
@@ -332,11 +332,11 @@ fn entry(tag: &Tag, text: std::ops::Range<usize>, tuples: usize) -> Result<Entry
     let kind = Kind::of_xml(kind).ok_or_else(|| fail(format!("type={kind:?} is no number")))?;
     let components = tag.count("NumberOfComponents").map_err(fail)?.unwrap_or(1).max(1);
     let place = match tag.get("format") {
-        None | Some("ascii") => Place::Ascii(text),
-        Some("binary") => Place::Base64(text),
+        None | Some("ascii") => ArrayData::Ascii(text),
+        Some("binary") => ArrayData::Base64(text),
         Some("appended") => {
             let offset = tag.count("offset").map_err(fail)?;
-            Place::Appended(offset.ok_or_else(|| fail("its offset is missing".into()))?)
+            ArrayData::Appended(offset.ok_or_else(|| fail("its offset is missing".into()))?)
         }
         Some(other) => return Err(fail(format!("format={other:?} is unknown"))),
     };

@@ -28,13 +28,13 @@ pub(super) struct GroupWeights<T, const D: usize> {
     /// Their products over the axes from 1 on, for a row of nodes.
     of_row: [Lane8<T>; MOST_CORNERS],
     /// The rows of nodes along axis 0 that the group reaches, and how many.
-    rows: [Row; MOST_REACHED / REACHED],
+    rows: [NodeRow; MOST_REACHED / REACHED],
     row_count: usize,
 }
 
 /// A row of nodes along axis 0.
 #[derive(Clone, Copy)]
-struct Row {
+struct NodeRow {
     /// Where it begins, from the first node of a particle on.
     start: usize,
     /// Its place along each axis.
@@ -51,7 +51,7 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
             reached: [REACHED; D],
             hats: [[[zero; REACHED]; D]; MOST_CORNERS],
             of_row: [zero; MOST_CORNERS],
-            rows: [Row { start: 0, place: [0; 3] }; MOST_REACHED / REACHED],
+            rows: [NodeRow { start: 0, place: [0; 3] }; MOST_REACHED / REACHED],
             row_count: 0,
         }
     }
@@ -92,11 +92,11 @@ impl<T: Lanes, const D: usize> GroupWeights<T, D> {
                 for (a, place) in [(1, row), (2, layer)] {
                     start += if a < D { place * strides[a] } else { 0 };
                 }
-                self.rows[layer * rows + row] = Row { start, place: [0, row, layer] };
+                self.rows[layer * rows + row] = NodeRow { start, place: [0, row, layer] };
             }
         }
         for row in 0..self.row_count {
-            let Row { place, .. } = self.rows[row];
+            let NodeRow { place, .. } = self.rows[row];
             for corner in 0..1 << D {
                 let hats = &self.hats[corner];
                 self.of_row[corner] = match D {
@@ -167,7 +167,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                 }
                 let start = own.first_node[k] - first;
                 for row in 0..weights.row_count {
-                    let Row { start: from_first, place } = weights.rows[row];
+                    let NodeRow { start: from_first, place } = weights.rows[row];
                     let nodes = band.get_mut(start + from_first..);
                     let Some(nodes) = nodes.and_then(|n| n.first_chunk_mut::<REACHED>()) else {
                         beyond("a domain beyond its band")
@@ -199,7 +199,7 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
 /// The term of one corner of a particle and one of the nodes around that corner, in P2G or G2P.
 #[derive(Clone, Copy)]
-struct Place<T, const D: usize> {
+struct NodeTerm<T, const D: usize> {
     corner: usize,
     /// Index of the node, from the particle's first on.
     node: usize,
@@ -211,11 +211,11 @@ struct Place<T, const D: usize> {
 
 impl<T: Lanes, const D: usize> Parallelograms<T, D> {
     /// Calls `visit` for each node around each corner of a particle.
-    fn for_nodes(&self, strides: &[usize; D], k: usize, mut visit: impl FnMut(Place<T, D>)) {
+    fn for_nodes(&self, strides: &[usize; D], k: usize, mut visit: impl FnMut(NodeTerm<T, D>)) {
         for corner in 0..1 << D {
             let at: [T; D] = array::from_fn(|a| self.at[corner][a][k / GROUP].0[k % GROUP]);
             for far in 0..1 << D {
-                let mut place = Place { corner, node: 0, hat: T::one(), arm: [T::zero(); D] };
+                let mut place = NodeTerm { corner, node: 0, hat: T::one(), arm: [T::zero(); D] };
                 for a in 0..D {
                     let below = at[a].floor();
                     let (r, is_far) = (at[a] - below, far >> a & 1);
@@ -252,7 +252,7 @@ fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
     let value = contributions.value[k].values;
     let fluxes: [_; D] = array::from_fn(|a| contributions.slope_lanes(k, a, false).0);
     let affine: [_; D] = array::from_fn(|a| contributions.affine_lanes(k, a).0);
-    own.for_nodes(strides, k, |Place { corner, node, hat, arm }| {
+    own.for_nodes(strides, k, |NodeTerm { corner, node, hat, arm }| {
         let Some(Node { values }) = band.get_mut(start + node) else {
             beyond("a corner beyond its band")
         };

@@ -116,7 +116,7 @@ impl<T: RealField + Copy, const D: usize> Load<T, D> {
 
 /// The shares `w` of a mean and `g` of a mean gradient, per length, that a corner of one of a particle's polygons has.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Share<T, const D: usize> {
+pub(crate) struct CornerShare<T, const D: usize> {
     pub(crate) w: T,
     pub(crate) g: [T; D],
 }
@@ -240,7 +240,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
 
     /// Writes the shares of means over a particle's polygons in the reference configuration, as many as it has
     /// [places](Self::places).
-    pub(crate) fn means(&self, p: usize, shares: &mut [Share<T, D>]) {
+    pub(crate) fn means(&self, p: usize, shares: &mut [CornerShare<T, D>]) {
         if D == 3 {
             return polyhedra::means(self, p, shares);
         }
@@ -277,7 +277,12 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// Writes the shares of mean gradients over a particle's polygons between corners at `x`, and returns their area or volume.
-    pub(crate) fn slopes(&self, x: &[SVector<T, D>], p: usize, shares: &mut [Share<T, D>]) -> T {
+    pub(crate) fn slopes(
+        &self,
+        x: &[SVector<T, D>],
+        p: usize,
+        shares: &mut [CornerShare<T, D>],
+    ) -> T {
         if D == 3 {
             return polyhedra::slopes(self, x, p, shares);
         }

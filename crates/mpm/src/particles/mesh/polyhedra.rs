@@ -14,13 +14,13 @@
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
-use super::{Mesh, Share, start};
+use super::{CornerShare, Mesh, start};
 
 /// As [`Mesh::means`].
 pub(super) fn means<T: RealField + Copy, const D: usize>(
     own: &Mesh<T, D>,
     p: usize,
-    shares: &mut [Share<T, D>],
+    shares: &mut [CornerShare<T, D>],
 ) {
     let first = own.places(p).start;
     // Six times the volume.
@@ -64,7 +64,7 @@ pub(super) fn slopes<T: RealField + Copy, const D: usize>(
     own: &Mesh<T, D>,
     x: &[SVector<T, D>],
     p: usize,
-    shares: &mut [Share<T, D>],
+    shares: &mut [CornerShare<T, D>],
 ) -> T {
     let first = own.places(p).start;
     shares.iter_mut().for_each(|share| share.g = [T::zero(); D]);
