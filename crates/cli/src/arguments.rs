@@ -1,21 +1,5 @@
 //! The command line.
 
-/// Declares an argument's values with what they mean to the library.
-macro_rules! choices {
-    ($(#[$doc:meta])* $name:ident => $target:ty { $($(#[$value_doc:meta])* $value:ident,)+ }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-        #[serde(rename_all = "kebab-case")]
-        pub(crate) enum $name { $($(#[$value_doc])* $value,)+ }
-
-        impl From<$name> for $target {
-            fn from(value: $name) -> Self {
-                match value { $($name::$value => Self::$value,)+ }
-            }
-        }
-    };
-}
-
 mod batch;
 mod certify;
 mod check;
@@ -60,14 +44,12 @@ pub(crate) use list::ListOptions;
 pub(crate) use reproduce::ReproduceOptions;
 pub(crate) use resume::ResumeOptions;
 pub(crate) use run::{PictureOptions, RunOptions, Stress};
-pub(crate) use scheme::{
-    Composition, Frame, Grid, HighDegree, Layout, Mass, Precision, SchemeOptions, Start, Weights,
-};
+pub(crate) use scheme::{HighDegree, Layout, Precision, SchemeOptions, Weights};
 pub(crate) use score::ScoreOptions;
 pub(crate) use shared::KeepOptions;
 pub(crate) use stability::StabilityOptions;
 pub(crate) use texts::{CompletionsOptions, ManOptions, ReferenceOptions};
-pub(crate) use tradeoff::{Against, TradeoffOptions};
+pub(crate) use tradeoff::TradeoffOptions;
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
 #[derive(Parser)]

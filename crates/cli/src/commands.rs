@@ -21,6 +21,7 @@ mod remedy;
 mod reproduce;
 mod resume;
 mod run;
+mod schemas;
 mod scheme;
 mod score;
 mod stability;

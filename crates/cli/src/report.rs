@@ -32,7 +32,7 @@ pub(crate) enum Section {
     Note(String),
     /// A table under its title.
     Table(String, Table),
-    /// A line on the columns that the terminal had no room for, with the places that have them.
+    /// A line on the columns of the tables so far that the terminal had no room for, with the places that have them.
     LeftOut(&'static str),
     /// Numbers with all their digits.
     Sheet(Sheet),
@@ -75,7 +75,7 @@ impl Form {
 }
 
 /// Files that a report is asked for in.
-pub(crate) struct Asked<'a>(pub(crate) &'a [(Form, &'a Option<PathBuf>)]);
+pub(crate) struct Asked<'a>(pub(crate) Vec<(Form, &'a Option<PathBuf>)>);
 
 impl Asked<'_> {
     /// Every option, and whether it is given.
@@ -86,7 +86,7 @@ impl Asked<'_> {
     /// Makes sure that all of them can be written.
     pub(crate) fn prepare(&self) -> Result<Files> {
         let mut files = Vec::new();
-        for (form, path) in self.0 {
+        for (form, path) in &self.0 {
             files.extend(Output::prepare_if(path.as_ref())?.map(|output| (*form, output)));
         }
         files.sort_by_key(|(form, _)| *form);
@@ -149,22 +149,16 @@ impl Report {
         Ok(())
     }
 
-    fn tables(&self) -> impl Iterator<Item = (&String, &Table)> {
-        self.sections.iter().filter_map(|section| match section {
-            Section::Table(title, table) => Some((title, table)),
-            _ => None,
-        })
-    }
-
     /// The report for a terminal.
     pub(crate) fn text(&self) -> String {
         let mut text = self.preface.clone() + &self.caption;
-        for section in &self.sections {
+        for (place, section) in self.sections.iter().enumerate() {
             match section {
                 Section::Note(lines) => text += lines,
                 Section::Table(title, table) => text += &format!("\n{title}\n{}", table.text()),
                 Section::LeftOut(has) => {
-                    text += &table::on_left_out(self.tables().map(|(_, table)| table), has);
+                    let tables = tables(&self.sections[..place]);
+                    text += &table::on_left_out(tables.map(|(_, table)| table), has);
                 }
                 Section::Sheet(_) | Section::Plot(_) => {}
             }
@@ -193,14 +187,15 @@ impl Report {
 
     /// Its tables in Markdown.
     fn markdown(&self) -> String {
-        let tables =
-            self.tables().map(|(title, table)| format!("\n## {title}\n\n{}", table.markdown()));
+        let tables = tables(&self.sections)
+            .map(|(title, table)| format!("\n## {title}\n\n{}", table.markdown()));
         format!("# {}{}", self.caption, tables.collect::<String>())
     }
 
     /// Its tables in LaTeX.
     fn latex(&self) -> String {
-        let tables = self.tables().map(|(title, table)| format!("\n% {title}\n{}", table.latex()));
+        let tables =
+            tables(&self.sections).map(|(title, table)| format!("\n% {title}\n{}", table.latex()));
         let head = "% Needs \\usepackage{booktabs}.\n";
         format!("% {}{head}{}", self.caption, tables.collect::<String>())
     }
@@ -213,6 +208,14 @@ impl Report {
         });
         plots.collect()
     }
+}
+
+/// The tables among sections.
+fn tables(sections: &[Section]) -> impl Iterator<Item = (&String, &Table)> {
+    sections.iter().filter_map(|section| match section {
+        Section::Table(title, table) => Some((title, table)),
+        _ => None,
+    })
 }
 
 /// Numbers in rows under a header, with all their digits.

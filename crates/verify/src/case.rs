@@ -1,15 +1,14 @@
 //! The settings of one simulation.
 
-use std::fmt;
-
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{Law, Material, Shape};
+use mmsmith_mpm::{Integrator, Law, Material, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
+use crate::named::Named;
 use crate::precision::Precision;
-use crate::scheme::{Placement, Scheme, Updated};
+use crate::scheme::{Placement, Scheme, Start, Updated};
 use crate::stated_law;
 
 /// The settings of one simulation.
@@ -56,16 +55,6 @@ pub enum CflSpeed {
     PWave,
 }
 
-/// The word that options and JSON have for it.
-impl fmt::Display for CflSpeed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Bar => "bar",
-            Self::PWave => "p-wave",
-        })
-    }
-}
-
 impl CflSpeed {
     pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError>
     where
@@ -103,16 +92,6 @@ pub enum Extent {
     Full,
 }
 
-/// The word that options and JSON have for it.
-impl fmt::Display for Extent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Quarter => "quarter",
-            Self::Full => "full",
-        })
-    }
-}
-
 /// The precision in which the solver computes; errors are always measured in double precision.
 #[derive(Clone, Copy)]
 pub enum Arithmetic<'a> {
@@ -140,6 +119,13 @@ impl Case {
             }
         }
         match self.scheme {
+            Scheme::Updated(Updated { integrator, start, .. })
+                if integrator != Integrator::Cd && start != Start::Halved =>
+            {
+                let instead =
+                    "left out, or the integrator cd, which alone has a first velocity to choose";
+                Err(CaseError::setting("start", start.name(), instead))
+            }
             Scheme::Updated(Updated {
                 placement: Placement::Lattice { offset } | Placement::Clipped { offset, .. },
                 ..
@@ -215,6 +201,8 @@ mod tests {
             let scheme = Scheme::Updated(Updated { placement, ..Updated::default() });
             Case { scheme, ..Case::default() }
         };
+        let (integrator, start) = (Integrator::Usl, Start::Exact);
+        let started = Updated { integrator, start, ..Updated::default() };
         for (case, name) in [
             (Case { cells: 0, ..Case::default() }, "cells = 0"),
             (Case { per_cell: 0, ..Case::default() }, "ppc = 0"),
@@ -223,6 +211,7 @@ mod tests {
             (shifted(0.6), "offset = 0.6"),
             (shifted(f64::NAN), "offset = NaN"),
             (Case { periods: f64::INFINITY, ..Case::default() }, "periods = inf"),
+            (Case { scheme: Scheme::Updated(started), ..Case::default() }, "start = exact"),
         ] {
             let message = case.validate().unwrap_err().to_string();
             assert!(message.starts_with(name), "{message}");

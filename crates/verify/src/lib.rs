@@ -37,6 +37,7 @@ mod interrupt;
 mod inverse;
 mod inversion;
 mod measurement;
+mod named;
 mod order;
 mod points;
 mod precision;
@@ -80,12 +81,13 @@ pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};
 pub use mmsmith_ranks::{Ranks, Sent, gather};
 pub use mmsmith_vtk::Provenance;
+pub use named::{Named, names};
 pub use order::Order;
 pub use record::{Record, TemporalRecord};
 pub use remedy::{Attempt, Remedy, remedy};
 pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
 pub use scene::{loaded_instead, needs_total_frame};
-pub use scheme::{GridPose, Parts, Placement, Scheme, Start, Stepping, Total, Updated};
+pub use scheme::{Choice, Formulation, GridPose, Placement, Scheme, Start, Total, Updated};
 pub use score::{
     AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Exchange, Input,
     Integrated, IntegratedOrders, Judgement, Lag, LawRow, LawVerdict, Placing, Points, Quantity,

@@ -264,15 +264,7 @@ impl<const D: usize> Scene<D> {
         let size = points::size(&domain).ok_or_else(unknown)?;
         let spacing = solution.cell_length() / case.cells as f64;
         let pose = placement.pose();
-        // Whole quarters have no rounding.
-        let (sin, cos) = pose.angle.to_radians().sin_cos();
-        let turn = match pose.angle.rem_euclid(360.0) {
-            0.0 => [1.0, 0.0],
-            90.0 => [0.0, 1.0],
-            180.0 => [-1.0, 0.0],
-            270.0 => [0.0, -1.0],
-            _ => [cos, sin],
-        };
+        let turn = turn(pose.angle);
         let surfaces: Vec<Surface> = match domain {
             Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],
             _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
@@ -315,35 +307,9 @@ impl<const D: usize> Scene<D> {
                     add(low, is_loaded(0));
                     add(high, is_loaded(1));
                 }
-                // Along the axes of the grid.
-                let [cos, sin] = turn;
-                let turned = |X: SVector<f64, D>| -> SVector<f64, D> {
-                    SVector::from_fn(|a, _| match a {
-                        0 => cos * X[0] + sin * X[1 % D],
-                        1 => cos * X[1] - sin * X[0],
-                        _ => X[a],
-                    })
-                };
-                let base: SVector<f64, D> = turned(*lower) + SVector::repeat(pose.shift * spacing);
-                let corners =
-                    (0..1_usize << D).map(|index| {
-                        turned(SVector::from_fn(|a, _| {
-                            if index >> a & 1 == 1 { upper[a] } else { lower[a] }
-                        }))
-                    });
-                let corners: Vec<_> = corners.collect();
-                let (mut first, mut cells) = (SVector::zeros(), [0; D]);
-                for a in 0..D {
-                    let lines = corners.iter().map(|corner| (corner[a] - base[a]) / spacing);
-                    let low = lines.clone().fold(f64::INFINITY, f64::min);
-                    let high = lines.fold(f64::NEG_INFINITY, f64::max);
-                    let margin = walls[a].map(|is_wall| if is_wall { 0.0 } else { reach });
-                    let low = (low + 1e-9).floor() - margin[0];
-                    let high = (high - 1e-9).ceil() + margin[1];
-                    first[a] = base[a] + low * spacing;
-                    cells[a] = (high - low) as usize;
-                }
-                (first, cells)
+                let margins =
+                    walls.map(|pair| pair.map(|is_wall| if is_wall { 0.0 } else { reach }));
+                covering([*lower, *upper], turn, (pose.shift, spacing), &margins)
             }
             _ => return Err(unknown()),
         };
@@ -450,6 +416,51 @@ impl<const D: usize> Scene<D> {
             }
         }
     }
+}
+
+/// Cosine and sine of an angle in degrees; whole quarters have no rounding.
+fn turn(angle: f64) -> [f64; 2] {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    match angle.rem_euclid(360.0) {
+        0.0 => [1.0, 0.0],
+        90.0 => [0.0, 1.0],
+        180.0 => [-1.0, 0.0],
+        270.0 => [0.0, -1.0],
+        _ => [cos, sin],
+    }
+}
+
+/// The lower corner and the cells of a turned and shifted grid that covers a box, with so many more cells at each end of each axis.
+fn covering<const D: usize>(
+    [lower, upper]: [SVector<f64, D>; 2],
+    [cos, sin]: [f64; 2],
+    (shift, spacing): (f64, f64),
+    margins: &[[f64; 2]; D],
+) -> (SVector<f64, D>, [usize; D]) {
+    // Along the axes of the grid.
+    let turned = |X: SVector<f64, D>| -> SVector<f64, D> {
+        SVector::from_fn(|a, _| match a {
+            0 => cos * X[0] + sin * X[1 % D],
+            1 => cos * X[1] - sin * X[0],
+            _ => X[a],
+        })
+    };
+    let base: SVector<f64, D> = turned(lower) + SVector::repeat(shift * spacing);
+    let corner = |index: usize| {
+        turned(SVector::from_fn(|a, _| if index >> a & 1 == 1 { upper[a] } else { lower[a] }))
+    };
+    let corners: Vec<_> = (0..1_usize << D).map(corner).collect();
+    let (mut first, mut cells) = (SVector::zeros(), [0; D]);
+    for a in 0..D {
+        let lines = corners.iter().map(|corner| (corner[a] - base[a]) / spacing);
+        let low = lines.clone().fold(f64::INFINITY, f64::min);
+        let high = lines.fold(f64::NEG_INFINITY, f64::max);
+        let low = (low + 1e-9).floor() - margins[a][0];
+        let high = (high - 1e-9).ceil() + margins[a][1];
+        first[a] = base[a] + low * spacing;
+        cells[a] = (high - low) as usize;
+    }
+    (first, cells)
 }
 
 /// The formulation that models given motions and tractions on the sides of a body, in words.

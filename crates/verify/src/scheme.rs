@@ -4,6 +4,9 @@ use std::fmt;
 
 use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
 use mmsmith_mpm::{Integrator, Shape, Transfer};
+use serde::{Serialize, Serializer};
+
+use crate::named::Named;
 
 /// How particles and grid exchange, and how a run goes on in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,26 +23,13 @@ pub struct Updated {
     /// The weights between particles and grid.
     pub shape: Shape,
     /// The time integration.
-    pub stepping: Stepping,
+    pub integrator: Integrator,
+    /// The first velocity of centred differences; other integrators have no other one than [`Start::Halved`] says.
+    pub start: Start,
     /// How particles get their velocity back from the grid.
     pub transfer: Transfer,
     /// Where the particles lie.
     pub placement: Placement,
-}
-
-/// Time integration; [`Integrator`] says what each does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stepping {
-    /// Update stress first.
-    Usf,
-    /// Update stress last.
-    Usl,
-    /// Modified update stress last.
-    Musl,
-    /// Update stress averaged.
-    Usavg,
-    /// Centred differences, from a first velocity.
-    Cd(Start),
 }
 
 /// How centred differences get their first velocity, half a step before the start.
@@ -105,31 +95,36 @@ pub struct Total {
     pub coordinates: Coordinates,
 }
 
-/// A scheme's parts, each as options, JSON and captions spell it. What a formulation has no choice of is there as well.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parts {
-    /// The formulation: `updated` or `total`.
-    pub frame: &'static str,
-    /// The weights.
-    pub shape: String,
-    /// The time integrator.
-    pub integrator: String,
-    /// The start of centred differences.
-    pub start: String,
-    /// Velocities from the grid.
-    pub transfer: String,
-    /// Where the particles lie.
-    pub layout: &'static str,
-    /// The shift of the particles' lattice, in units of their distance.
-    pub offset: f64,
-    /// How the grid lies against the body.
-    pub pose: GridPose,
-    /// The mass matrix.
-    pub mass: &'static str,
-    /// The order in time of the composition of leapfrog.
-    pub composition: usize,
-    /// The coordinates of the background grid.
-    pub grid: &'static str,
+/// Formulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formulation {
+    /// Updated Lagrangian.
+    Updated,
+    /// Total Lagrangian.
+    Total,
+}
+
+/// The value of a choice.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Choice {
+    /// One of few, or a name with a number in it.
+    Name(String),
+    /// An order.
+    Order(usize),
+    /// A number.
+    Number(f64),
+}
+
+/// As options take it.
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => f.write_str(name),
+            Self::Order(order) => write!(f, "{order}"),
+            Self::Number(value) => write!(f, "{value}"),
+        }
+    }
 }
 
 impl Default for Updated {
@@ -137,69 +132,18 @@ impl Default for Updated {
     fn default() -> Self {
         Self {
             shape: Shape::Gimp,
-            stepping: Stepping::Cd(Start::Halved),
+            integrator: Integrator::Cd,
+            start: Start::Halved,
             transfer: Transfer::Flip,
             placement: Placement::Lattice { offset: 0.0 },
         }
     }
 }
 
-impl Stepping {
-    /// By an integrator, which has that start if it is centred differences.
-    #[must_use]
-    pub fn new(integrator: Integrator, start: Start) -> Self {
-        match integrator {
-            Integrator::Usf => Self::Usf,
-            Integrator::Usl => Self::Usl,
-            Integrator::Musl => Self::Musl,
-            Integrator::Usavg => Self::Usavg,
-            Integrator::Cd => Self::Cd(start),
-        }
-    }
-}
-
-impl From<Stepping> for Integrator {
-    fn from(stepping: Stepping) -> Self {
-        match stepping {
-            Stepping::Usf => Self::Usf,
-            Stepping::Usl => Self::Usl,
-            Stepping::Musl => Self::Musl,
-            Stepping::Usavg => Self::Usavg,
-            Stepping::Cd(_) => Self::Cd,
-        }
-    }
-}
-
-/// The name that the field has for the integrator.
-impl fmt::Display for Stepping {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Integrator::from(*self).fmt(f)
-    }
-}
-
-/// The name that the field has for it.
-impl fmt::Display for Start {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Exact => "exact",
-            Self::Data => "data",
-            Self::Halved => "halved",
-        })
-    }
-}
-
-/// The name of coordinates.
-pub(crate) fn grid_name(coordinates: Coordinates) -> &'static str {
-    match coordinates {
-        Coordinates::Cartesian => "cartesian",
-        Coordinates::Polar => "polar",
-        Coordinates::Spherical => "spherical",
-    }
-}
-
 impl Placement {
     /// The name of the layout.
-    pub(crate) fn name(self) -> &'static str {
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::Lattice { .. } => "lattice",
             Self::BodyFitted => "body-fitted",
@@ -216,7 +160,8 @@ impl Placement {
     }
 
     /// How the grid lies against the body.
-    pub(crate) fn pose(self) -> GridPose {
+    #[must_use]
+    pub fn pose(self) -> GridPose {
         match self {
             Self::Clipped { pose, .. } => pose,
             Self::Lattice { .. } | Self::BodyFitted => GridPose::default(),
@@ -251,49 +196,106 @@ impl Scheme {
 
     /// Whether the first velocities are those of half a step before the start.
     pub(crate) fn starts_early(&self) -> bool {
-        let stepping = self.updated().map(|updated| updated.stepping);
-        matches!(stepping, Some(Stepping::Cd(Start::Exact | Start::Data)))
+        self.updated().is_some_and(|updated| updated.start != Start::Halved)
     }
 
-    /// The parts as they are spelled.
+    /// The formulation.
     #[must_use]
-    pub fn parts(&self) -> Parts {
+    pub fn formulation(&self) -> Formulation {
         match self {
-            Self::Updated(Updated { shape, stepping, transfer, placement }) => Parts {
-                frame: "updated",
-                shape: shape.to_string(),
-                integrator: stepping.to_string(),
-                start: match stepping {
-                    Stepping::Cd(start) => start.to_string(),
-                    _ => Start::Halved.to_string(),
-                },
-                transfer: transfer.to_string(),
-                layout: placement.name(),
-                offset: placement.offset(),
-                pose: placement.pose(),
-                mass: "lumped",
-                composition: Composition::Order2.order(),
-                grid: grid_name(Coordinates::Cartesian),
-            },
-            Self::Total(Total { degree, mass, composition, layout, coordinates }) => Parts {
-                frame: "total",
-                shape: format!("bspline{degree}"),
-                integrator: Integrator::Cd.to_string(),
-                start: Start::Halved.to_string(),
-                transfer: Transfer::Flip.to_string(),
-                layout: match layout {
-                    Layout::Lattice => "lattice",
-                    Layout::Gauss => "gauss",
-                },
-                offset: 0.0,
-                pose: GridPose::default(),
-                mass: match mass {
-                    MassMatrix::Lumped => "lumped",
-                    MassMatrix::Consistent => "consistent",
-                },
-                composition: composition.order(),
-                grid: grid_name(*coordinates),
-            },
+            Self::Updated(_) => Formulation::Updated,
+            Self::Total(_) => Formulation::Total,
         }
+    }
+
+    /// The name of the weights.
+    #[must_use]
+    pub fn shape(&self) -> String {
+        match self {
+            Self::Updated(updated) => updated.shape.to_string(),
+            Self::Total(total) => format!("bspline{}", total.degree),
+        }
+    }
+
+    /// The name of the layout of particles.
+    #[must_use]
+    pub fn layout(&self) -> &'static str {
+        match self {
+            Self::Updated(updated) => updated.placement.name(),
+            Self::Total(total) => total.layout.name(),
+        }
+    }
+
+    /// Every choice of the formulation, and none of the other one, under the name that its option has.
+    #[must_use]
+    pub fn choices(&self) -> Vec<(&'static str, Choice)> {
+        let name = |name: &str| Choice::Name(name.to_owned());
+        let mut all = vec![("formulation", name(self.formulation().name()))];
+        match self {
+            Self::Updated(Updated { integrator, start, transfer, placement, .. }) => {
+                all.extend([
+                    ("layout", name(placement.name())),
+                    ("shape", Choice::Name(self.shape())),
+                    ("transfer", Choice::Name(transfer.to_string())),
+                    ("integrator", name(integrator.name())),
+                ]);
+                if *integrator == Integrator::Cd {
+                    all.push(("start", name(start.name())));
+                }
+                if *placement != Placement::BodyFitted {
+                    all.push(("offset", Choice::Number(placement.offset())));
+                }
+                if placement.is_clipped() {
+                    let GridPose { angle, shift } = placement.pose();
+                    all.push(("grid-angle", Choice::Number(angle)));
+                    all.push(("grid-shift", Choice::Number(shift)));
+                }
+            }
+            Self::Total(Total { mass, composition, layout, coordinates, .. }) => all.extend([
+                ("shape", Choice::Name(self.shape())),
+                ("layout", name(layout.name())),
+                ("grid", name(coordinates.name())),
+                ("mass", name(mass.name())),
+                ("composition", Choice::Order(composition.order())),
+            ]),
+        }
+        all
+    }
+}
+
+/// The [choices](Scheme::choices), and `frame`, which is the formulation under the name that it had.
+impl Serialize for Scheme {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let frame = self.formulation().aliases()[0];
+        let all = self.choices().into_iter().map(|(name, value)| (name.replace('-', "_"), value));
+        serializer.collect_map(all.chain([("frame".to_owned(), Choice::Name(frame.to_owned()))]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(scheme: Scheme) -> Vec<String> {
+        let written = serde_json::to_value(scheme).unwrap();
+        written.as_object().unwrap().keys().cloned().collect()
+    }
+
+    /// What a formulation has no choice of is not written.
+    #[test]
+    fn a_scheme_is_written_with_its_own_choices() {
+        let usual = Updated::default();
+        let common = ["formulation", "frame", "integrator", "layout"];
+        let of_cd = ["offset", "shape", "start", "transfer"];
+        assert_eq!(keys(Scheme::Updated(usual)), [&common[..], &of_cd].concat());
+        let usl = Updated { integrator: Integrator::Usl, ..usual };
+        assert!(!keys(Scheme::Updated(usl)).contains(&"start".to_owned()));
+        let total = keys(Scheme::Total(Total::of_degree(4)));
+        assert_eq!(
+            total,
+            ["composition", "formulation", "frame", "grid", "layout", "mass", "shape"]
+        );
+        let written = serde_json::to_value(Scheme::Total(Total::of_degree(4))).unwrap();
+        assert_eq!((&written["frame"], &written["composition"]), (&"total".into(), &6.into()));
     }
 }

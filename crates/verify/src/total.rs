@@ -13,9 +13,10 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use crate::case::{Case, CflSpeed, Extent, law, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
+use crate::named::Named;
 use crate::precision::Precision;
 use crate::scene::Scene;
-use crate::scheme::{Total, grid_name};
+use crate::scheme::Total;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
 /// solution says.
@@ -91,7 +92,7 @@ impl Total {
     ) -> Result<Grid<D>, CaseError> {
         // As many cells as make none longer than the spacing across, and along the mean circle or sphere.
         let count = |length: f64| (length / scene.spacing - 1e-9).ceil().max(2.0) as usize;
-        let name = grid_name(self.coordinates);
+        let name = self.coordinates.name();
         let axes = match (&scene.domain, self.coordinates) {
             (Domain::Box { lower, upper }, Coordinates::Cartesian) => {
                 std::array::from_fn(|k| Axis {

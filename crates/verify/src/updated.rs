@@ -5,7 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
-use mmsmith_mpm::{Annulus, Body, Load, Mesh, Particles, Settings, Shape, Share, Solver};
+use mmsmith_mpm::{
+    Annulus, Body, Integrator, Load, Mesh, Particles, Settings, Shape, Share, Solver,
+};
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
@@ -14,7 +16,7 @@ use crate::case::{Case, Extent, law};
 use crate::error::{CaseError, SceneError};
 use crate::precision::Precision;
 use crate::scene::Scene;
-use crate::scheme::{Placement, Start, Stepping, Updated};
+use crate::scheme::{Placement, Start, Updated};
 
 /// Refuses what makes no sense on this scene.
 pub(crate) fn admit<const D: usize>(scene: &Scene<D>, updated: &Updated) -> Result<(), CaseError> {
@@ -216,7 +218,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     if particles == 0 {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
-    set_in_motion(&mut body.particles, exact, updated.stepping, time_step.to_f64());
+    set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     if let Some(Mesh { X, x, .. }) = &mut body.mesh {
         let grid = scene.grid::<T>();
         for (x, X) in x.iter_mut().zip(X) {
@@ -233,10 +235,11 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     }
     let settings = Settings {
         shape: updated.shape,
-        integrator: updated.stepping.into(),
+        integrator: updated.integrator,
         transfer: updated.transfer,
         time_step,
-        halve_first_acceleration: updated.stepping == Stepping::Cd(Start::Halved),
+        halve_first_acceleration: updated.integrator == Integrator::Cd
+            && updated.start == Start::Halved,
     };
     let (grid, law) = (scene.grid(), law(model.law())?);
     Ok(T::updated_lagrangian(grid, body, law, settings, share)?)
@@ -246,17 +249,15 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
 fn set_in_motion<T: Real, const D: usize>(
     particles: &mut Particles<T, D>,
     exact: &dyn Solution<f64, D>,
-    stepping: Stepping,
+    start: Start,
     dt: f64,
 ) {
     for p in 0..particles.len() {
         let X = particles.X[p].map(Real::to_f64);
-        let v = match stepping {
-            Stepping::Cd(Start::Exact) => exact.velocity(&X, -dt / 2.0),
-            Stepping::Cd(Start::Data) => {
-                exact.velocity(&X, 0.0) - exact.acceleration(&X, 0.0) * (dt / 2.0)
-            }
-            _ => exact.velocity(&X, 0.0),
+        let v = match start {
+            Start::Exact => exact.velocity(&X, -dt / 2.0),
+            Start::Data => exact.velocity(&X, 0.0) - exact.acceleration(&X, 0.0) * (dt / 2.0),
+            Start::Halved => exact.velocity(&X, 0.0),
         };
         particles.x[p] = (X + exact.displacement(&X, 0.0)).map(Real::nearest);
         particles.v[p] = v.map(Real::nearest);

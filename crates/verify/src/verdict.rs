@@ -3,14 +3,14 @@
 
 use mmsmith_galerkin::{Layout, MassMatrix};
 use mmsmith_measure::norms::{PerField, PerNorm};
-use mmsmith_mpm::{Shape, Transfer};
+use mmsmith_mpm::{Integrator, Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain, Solution};
 use serde::Serialize;
 
 use crate::case::Case;
 use crate::dimension::in_dimension;
 use crate::points;
-use crate::scheme::{Placement, Scheme, Stepping, Total, Updated};
+use crate::scheme::{Placement, Scheme, Total, Updated};
 
 /// How far an order on the finest pair of cases may be from the expected one where nothing else is said.
 pub const ORDER_TOLERANCE: f64 = 0.1;
@@ -238,9 +238,10 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
     let u = match case.scheme {
         Scheme::Updated(Updated {
             shape,
-            stepping: Stepping::Cd(_),
+            integrator: Integrator::Cd,
             transfer: Transfer::Flip,
             placement,
+            ..
         }) => {
             let contiguous = match (placement, shape) {
                 (Placement::Lattice { .. }, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => {
@@ -281,7 +282,7 @@ pub fn expected_in_time(case: &Case) -> Expected {
         Scheme::Total(total) => Some(total.composition.order() as f64),
         // The other transfers lose a part of the velocities in every step, however short.
         Scheme::Updated(Updated {
-            stepping: Stepping::Usf | Stepping::Usl | Stepping::Musl | Stepping::Usavg,
+            integrator: Integrator::Usf | Integrator::Usl | Integrator::Musl | Integrator::Usavg,
             transfer: Transfer::Flip,
             ..
         }) => Some(1.0),

@@ -13,8 +13,8 @@ use mmsmith_mpm::{Body, Grid, Material, NoBodyForce, Particles, Settings, Simula
 use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_verify::{
     Arithmetic, Case, CflSpeed, Composition, Coordinates, Discretized, Integrator, Layout,
-    ORDER_TOLERANCE, Placement, Scheme, Shape, Start, Status, Stepping, Study, Sweep, Total,
-    Transfer, Updated, check, converge, expected_in_space, expected_in_time, verdicts,
+    ORDER_TOLERANCE, Placement, Scheme, Shape, Status, Study, Sweep, Total, Transfer, Updated,
+    check, converge, expected_in_space, expected_in_time, verdicts,
 };
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -655,16 +655,16 @@ fn order_in_two_dimensions(fault: Option<Fault>) -> Vec<String> {
 
 fn known_errors_of_other_schemes(fault: Option<Fault>) -> Vec<String> {
     let exact = solution("axis-aligned", &[]);
-    let cd = Stepping::Cd(Start::Halved);
-    let scheme = |shape, stepping, transfer| {
-        let scheme = Updated { shape, stepping, transfer, ..Updated::default() };
+    let cd = Integrator::Cd;
+    let scheme = |shape, integrator, transfer| {
+        let scheme = Updated { shape, integrator, transfer, ..Updated::default() };
         Case { scheme: Scheme::Updated(scheme), ..Case::default() }
     };
     let mut problems = Vec::new();
     for (case, known) in [
-        (scheme(Shape::Gimp, Stepping::Usl, Transfer::Flip), 1.534e-2),
-        (scheme(Shape::Gimp, Stepping::Musl, Transfer::Flip), 1.692e-2),
-        (scheme(Shape::Gimp, Stepping::Usf, Transfer::Flip), 2.746e-2),
+        (scheme(Shape::Gimp, Integrator::Usl, Transfer::Flip), 1.534e-2),
+        (scheme(Shape::Gimp, Integrator::Musl, Transfer::Flip), 1.692e-2),
+        (scheme(Shape::Gimp, Integrator::Usf, Transfer::Flip), 2.746e-2),
         (scheme(Shape::Ugimp, cd, Transfer::Flip), 1.790e-2),
         (scheme(Shape::Gimp, cd, Transfer::Apic), 7.499e-3),
         (scheme(Shape::Gimp, cd, Transfer::Xpic(2)), 1.577e-2),
@@ -682,8 +682,8 @@ fn known_errors_on_the_ring(fault: Option<Fault>) -> Vec<String> {
 fn order_in_time(fault: Option<Fault>) -> Vec<String> {
     let exact = solution("axis-aligned-1d", &[]);
     let mut problems = Vec::new();
-    for stepping in [Stepping::Usl, Stepping::Musl, Stepping::Usf] {
-        let scheme = Updated { stepping, ..Updated::default() };
+    for integrator in [Integrator::Usl, Integrator::Musl, Integrator::Usf] {
+        let scheme = Updated { integrator, ..Updated::default() };
         let case = Case { scheme: Scheme::Updated(scheme), cells: 16, ..Case::default() };
         let cfls = [0.4, 0.2, 0.1];
         let measure = || {
@@ -696,7 +696,7 @@ fn order_in_time(fault: Option<Fault>) -> Vec<String> {
             study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.differences));
         let verdicts =
             verdicts(&steps, &ok.collect::<Vec<_>>(), &expected_in_time(&case), ORDER_TOLERANCE);
-        problems.extend(judged(&verdicts).into_iter().map(|p| format!("{stepping:?} {p}")));
+        problems.extend(judged(&verdicts).into_iter().map(|p| format!("{integrator:?} {p}")));
     }
     problems
 }

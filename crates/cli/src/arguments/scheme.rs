@@ -9,7 +9,7 @@ use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::{ParameterOptions, parsed};
-use super::values::{finite_number, positive_count, positive_number, thread_count};
+use super::values::{finite_number, one_of, positive_count, positive_number, thread_count};
 
 /// How to simulate; what every measuring command shares.
 #[derive(Args, Clone)]
@@ -20,36 +20,36 @@ pub(crate) struct SchemeOptions {
     /// Formulation: updated Lagrangian evaluates the shape functions in the current configuration in every step, total
     /// Lagrangian once in the reference configuration. Default: updated-lagrangian; total-lagrangian if only this formulation
     /// can model a boundary condition of the solution
-    #[arg(long = "formulation", alias = "frame", value_enum, value_name = "FORMULATION")]
-    pub(crate) frame: Option<Frame>,
+    #[arg(long, alias = "frame", value_parser = one_of::<verify::Formulation>())]
+    pub(crate) formulation: Option<verify::Formulation>,
     /// Mass matrix of the total Lagrangian formulation. Default: consistent
-    #[arg(long, value_enum)]
-    pub(crate) mass: Option<Mass>,
+    #[arg(long, value_parser = one_of::<verify::MassMatrix>())]
+    pub(crate) mass: Option<verify::MassMatrix>,
     /// Order of time stepping in the total Lagrangian formulation, by a symmetric composition of leapfrog steps. Default: 4;
     /// 6 for splines of degree 4 and 5
-    #[arg(long, value_enum)]
-    pub(crate) composition: Option<Composition>,
+    #[arg(long, value_parser = one_of::<verify::Composition>())]
+    pub(crate) composition: Option<verify::Composition>,
     /// Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian
     /// formulation only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls
     #[arg(long, value_enum)]
     pub(crate) layout: Option<Layout>,
     /// Coordinates of the background grid. Default: cartesian; in the total Lagrangian formulation polar for rings and
     /// spherical for shells
-    #[arg(long, value_enum)]
-    pub(crate) grid: Option<Grid>,
+    #[arg(long, value_parser = one_of::<verify::Coordinates>())]
+    pub(crate) grid: Option<verify::Coordinates>,
     /// Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL
     /// number itself, or a CFL number of less than 0.4
-    #[arg(long, value_enum)]
-    pub(crate) cfl_speed: Option<CflSpeed>,
+    #[arg(long, value_parser = one_of::<verify::CflSpeed>())]
+    pub(crate) cfl_speed: Option<verify::CflSpeed>,
     /// Time integrator
-    #[arg(long, value_parser = integrators(), default_value_t = verify::Integrator::Cd)]
+    #[arg(long, value_parser = one_of::<verify::Integrator>(), default_value_t = verify::Integrator::Cd)]
     pub(crate) integrator: verify::Integrator,
     /// Transfer of velocities from the grid to the particles: flip, pic, apic, or xpic2, xpic3, ... (a filter of that order)
     #[arg(long, value_name = "NAME", default_value_t = verify::Transfer::Flip, value_parser = str::parse::<verify::Transfer>)]
     pub(crate) transfer: verify::Transfer,
     /// First velocity of the integrator cd in the updated Lagrangian formulation; refused elsewhere
-    #[arg(long, value_enum, default_value_t = Start::Halved)]
-    pub(crate) start: Start,
+    #[arg(long, value_parser = one_of::<verify::Start>(), default_value = "halved")]
+    pub(crate) start: verify::Start,
     /// Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
@@ -61,8 +61,8 @@ pub(crate) struct SchemeOptions {
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
     /// Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any
-    #[arg(long, value_enum)]
-    pub(crate) extent: Option<Extent>,
+    #[arg(long, value_parser = one_of::<verify::Extent>())]
+    pub(crate) extent: Option<verify::Extent>,
     /// Shift of the lattice of particles along every axis, in particle distances, from -0.5 to 0.5
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) offset: f64,
@@ -161,24 +161,6 @@ fn weights() -> impl TypedValueParser<Value = Weights> {
     PossibleValuesParser::new(values).try_map(|name| name.to_lowercase().parse::<Weights>())
 }
 
-fn integrators() -> impl TypedValueParser<Value = verify::Integrator> {
-    let all = verify::Integrator::ALL;
-    let values = all.map(|own| PossibleValue::new(own.name()).help(own.about()));
-    PossibleValuesParser::new(values)
-        .try_map(|name| name.to_lowercase().parse::<verify::Integrator>())
-}
-
-/// Formulations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Frame {
-    /// Updated Lagrangian: weights anew in each step, from the current configuration
-    #[value(name = "updated-lagrangian", aliases = ["updated", "ul"])]
-    Updated,
-    /// Total Lagrangian: weights once, from the reference configuration
-    #[value(name = "total-lagrangian", aliases = ["total", "tl"])]
-    Total,
-}
-
 /// Layouts of particles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layout {
@@ -191,75 +173,6 @@ pub(crate) enum Layout {
     /// Gauss-Legendre points (total Lagrangian)
     Gauss,
 }
-
-choices!(
-    /// Orders in time.
-    Composition => verify::Composition {
-        /// Leapfrog
-        #[value(name = "2")]
-        Order2,
-        /// Five stages
-        #[value(name = "4")]
-        Order4,
-        /// Nine stages
-        #[value(name = "6")]
-        Order6,
-    }
-);
-
-choices!(
-    /// Starts of centred differences.
-    Start => verify::Start {
-        /// The exact velocity half a step before time zero
-        Exact,
-        /// Velocity and acceleration at time zero
-        Data,
-        /// Velocity at time zero, first acceleration halved
-        Halved,
-    }
-);
-
-choices!(
-    /// Mass matrices.
-    Mass => verify::MassMatrix {
-        /// Row sums on the diagonal
-        Lumped,
-        /// Integrated over the particles
-        Consistent,
-    }
-);
-
-choices!(
-    /// Coordinates of background grids.
-    Grid => verify::Coordinates {
-        /// Cartesian
-        Cartesian,
-        /// Radius and angle
-        Polar,
-        /// Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis
-        Spherical,
-    }
-);
-
-choices!(
-    /// Speeds of CFL numbers.
-    CflSpeed => verify::CflSpeed {
-        /// Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed
-        Bar,
-        /// Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)
-        PWave,
-    }
-);
-
-choices!(
-    /// How much of a ring or a shell.
-    Extent => verify::Extent {
-        /// The part between the planes of symmetry: a quarter of a ring, an eighth of a shell
-        Quarter,
-        /// All of it
-        Full,
-    }
-);
 
 /// Floating-point precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]

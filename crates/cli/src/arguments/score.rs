@@ -2,13 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use mmsmith_verify as verify;
-use serde::Serialize;
 
 use super::shared::ParameterOptions;
 use super::values::{
-    axis, finite_number, peer, positive_count, positive_number, role, thread_count,
+    axis, finite_number, one_of, peer, positive_count, positive_number, role, thread_count,
 };
 
 /// Where another solver's output is, and how it is to be read.
@@ -29,8 +28,8 @@ pub(crate) struct ScoreOptions {
     #[arg(long, value_name = "ROLE=NAME", value_parser = role)]
     pub(crate) map: Vec<(verify::Role, String)>,
     /// Meaning of the points in the files
-    #[arg(long, value_enum, default_value_t = Points::Auto)]
-    pub(crate) points: Points,
+    #[arg(long, value_parser = one_of::<verify::Points>(), default_value = "auto")]
+    pub(crate) points: verify::Points,
     /// Time of a single frame that does not state it
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite_number)]
     pub(crate) time: Option<f64>,
@@ -97,15 +96,3 @@ pub(crate) struct ScoreOptions {
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }
-
-choices!(
-    /// What the points of files are.
-    Points => verify::Points {
-        /// Reference positions if they stay while displacements change, else current ones
-        Auto,
-        /// Current positions
-        Current,
-        /// Reference positions
-        Reference,
-    }
-);

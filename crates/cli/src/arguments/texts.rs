@@ -24,4 +24,7 @@ pub(crate) struct ReferenceOptions {
     /// As functions of the Python package
     #[arg(long)]
     pub(crate) python: bool,
+    /// As schemas of the JSON of all commands, a file each, into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "python")]
+    pub(crate) schemas: Option<PathBuf>,
 }

@@ -7,7 +7,7 @@ use mmsmith_verify as verify;
 use serde::Serialize;
 
 use super::shared::{KeepOptions, ParameterOptions, parsed};
-use super::values::{positive_count, positive_number, seconds, thread_count};
+use super::values::{one_of, positive_count, positive_number, seconds, thread_count};
 
 #[derive(Args)]
 pub(crate) struct TradeoffOptions {
@@ -35,11 +35,11 @@ pub(crate) struct TradeoffOptions {
     #[arg(long, value_enum, default_value_t = Field::U, ignore_case = true)]
     pub(crate) field: Field,
     /// Norm of the error
-    #[arg(long, value_enum, default_value_t = Norm::Linf)]
-    pub(crate) norm: Norm,
+    #[arg(long, value_parser = one_of::<verify::Norm>(), default_value = "linf")]
+    pub(crate) norm: verify::Norm,
     /// Cost
-    #[arg(long, value_enum, default_value_t = Against::Wall)]
-    pub(crate) against: Against,
+    #[arg(long, value_parser = one_of::<verify::Against>(), default_value = "wall")]
+    pub(crate) against: verify::Against,
     /// End time, in periods of the solution
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) periods: f64,
@@ -89,32 +89,6 @@ impl From<Field> for verify::Field {
         }
     }
 }
-
-choices!(
-    /// Norms.
-    Norm => verify::Norm {
-        /// Largest over particles
-        Linf,
-        /// Root of the mean square
-        L2,
-        /// Mean
-        L1,
-    }
-);
-
-choices!(
-    /// Costs.
-    Against => verify::Against {
-        /// Wall-clock time of the steps
-        Wall,
-        /// Processor time of the steps
-        Cpu,
-        /// Number of steps
-        Steps,
-        /// Memory, estimated
-        Memory,
-    }
-);
 
 impl TradeoffOptions {
     /// Cell count and CFL number of every case, where they are stated.

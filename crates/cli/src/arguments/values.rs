@@ -1,7 +1,16 @@
 //! Values of options, read from text; every refusal says which values are right.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mmsmith_ledger::ShardName;
-use mmsmith_verify as verify;
+use mmsmith_verify::{self as verify, Named};
+
+/// One of the choices that the library names.
+pub(super) fn one_of<N: Named>() -> impl TypedValueParser<Value = N> {
+    let value = |one: &N| PossibleValue::new(one.name()).help(one.about()).aliases(one.aliases());
+    PossibleValuesParser::new(N::ALL.iter().map(value)).try_map(|name| {
+        N::named(&name).ok_or_else(|| format!("it must be one of {}", verify::names::<N>()))
+    })
+}
 
 pub(super) fn positive_count(text: &str) -> Result<usize, String> {
     match text.trim().parse() {

@@ -45,18 +45,18 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     }
     let given = Given::of(&options.name, &options.scheme);
     let study = Converge { problem, given, sweep, base, cases, orders };
-    let files = [
+    let files = Asked(vec![
         (Form::Json, &options.scheme.json),
         (Form::Plot, &options.plot),
         (Form::Csv, &options.csv),
         (Form::Markdown, &options.markdown),
         (Form::Latex, &options.latex),
-    ];
+    ]);
     let request = Request {
         solution: &options.name,
         kept: &options.kept,
         threads: options.scheme.threads,
-        files: Asked(&files),
+        files,
         others: &[
             ("--expect", options.expect.is_some()),
             ("--tolerance", options.tolerance.is_some()),

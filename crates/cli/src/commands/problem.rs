@@ -3,7 +3,7 @@
 use anyhow::Result;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Arithmetic, Case, CaseError, Coordinates, Discretized, Extent, POLAR_ANGLES, Parts,
+    Arithmetic, Case, CaseError, Coordinates, Discretized, Extent, Integrator, Named, POLAR_ANGLES,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -81,39 +81,27 @@ impl Problem {
     ) -> Value {
         let Self { selection, settled, .. } = self;
         let Case { scheme, per_cell, cfl_speed, periods, .. } = settled.case;
-        let parts = scheme.parts();
-        let mut settings = json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "solution": selection.name(),
-            "parameters": selection.parameters(),
-            "frame": parts.frame,
-            "shape": parts.shape,
-            "mass": parts.mass,
-            "composition": parts.composition,
-            "layout": parts.layout,
-            "grid": parts.grid,
-            "cfl_speed": cfl_speed.to_string(),
-            "transfer": parts.transfer,
-            "integrator": parts.integrator,
-            "start": parts.start,
-            "cells": cells,
-            "ppc": per_cell,
-            "cfl": cfl,
-            "periods": periods,
-            "offset": parts.offset,
-            "extent": extent.map(|extent| extent.to_string()),
-            "precision": settled.precision,
-            "threads": rayon::current_num_threads(),
-        });
+        let mut settings = json!(scheme);
+        for (name, value) in [
+            ("version", json!(env!("CARGO_PKG_VERSION"))),
+            ("solution", json!(selection.name())),
+            ("parameters", json!(selection.parameters())),
+            ("cells", json!(cells)),
+            ("ppc", json!(per_cell)),
+            ("cfl", json!(cfl)),
+            ("cfl_speed", json!(cfl_speed.name())),
+            ("periods", json!(periods)),
+            ("extent", json!(extent.map(Extent::name))),
+            ("precision", json!(settled.precision)),
+            ("threads", json!(rayon::current_num_threads())),
+        ] {
+            settings[name] = value;
+        }
         if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
             settings["polar_angles"] = json!(POLAR_ANGLES);
         }
         if let Some(ranks) = processes::ranks() {
             settings["ranks"] = ranks.count().into();
-        }
-        if scheme.updated().is_some_and(|updated| updated.placement.is_clipped()) {
-            settings["grid_angle"] = json!(parts.pose.angle);
-            settings["grid_shift"] = json!(parts.pose.shift);
         }
         terminal::detail_once(&settings);
         settings
@@ -129,16 +117,17 @@ impl Problem {
     pub(super) fn setting(&self, extent: Option<Extent>) -> String {
         let Self { selection, settled, .. } = self;
         let Case { scheme, per_cell, periods, .. } = settled.case;
-        let Parts { shape, integrator, .. } = scheme.parts();
         let part = |extent| match (extent, selection.dimension()) {
             // Three planes of symmetry.
             (Extent::Quarter, 3) => ", eighth".to_owned(),
-            _ => format!(", {extent}"),
+            (extent, _) => format!(", {}", extent.name()),
         };
         let extent = extent.map(part).unwrap_or_default();
         format!(
-            "({}){extent}: {shape} + {integrator}{}, {per_cell} particles per cell and direction, {}, {}",
+            "({}){extent}: {} + {}{}, {per_cell} particles per cell and direction, {}, {}",
             selection.told_parameters(),
+            scheme.shape(),
+            scheme.updated().map_or(Integrator::Cd, |updated| updated.integrator),
             scheme::words(&scheme),
             number::of_periods(periods),
             word(settled.precision),

@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use mmsmith_verify::{
-    Attempt, Case, CflSpeed, LARGEST_USUAL_CFL, OnPWaves, Remedy, Row, Scheme, Shape, Status,
-    StepError, Updated, needs_total_frame, on_p_waves, remedy,
+    Attempt, Case, CflSpeed, Choice, LARGEST_USUAL_CFL, Named, OnPWaves, Remedy, Row, Scheme,
+    Shape, Status, StepError, Updated, needs_total_frame, on_p_waves, remedy,
 };
 use serde_json::{Value, json};
 
@@ -44,9 +44,10 @@ impl Advice {
                 Some(remedy(&model.exact, model.arithmetic(), case)?)
             }
         };
-        let says_frame = needs_total_frame(&model.exact).is_some();
+        let says_formulation = needs_total_frame(&model.exact).is_some();
         let attempts = tried.iter().flat_map(|tried| &tried.attempts);
-        let options: Vec<_> = attempts.map(|attempt| options(&attempt.case, says_frame)).collect();
+        let options: Vec<_> =
+            attempts.map(|attempt| options(&attempt.case, says_formulation)).collect();
         let found = tried.as_ref().and_then(Remedy::found).zip(options.last());
         let command = found.map(|(found, options)| solution.command(&found.case, options));
         let is_too_large = matches!(row.status, Status::Stopped(StepError::TooLarge { .. }));
@@ -136,52 +137,25 @@ fn short(status: &Status) -> String {
 }
 
 /// The options that say a case, but for solution and cells; the updated formulation is named where it is not the usual one.
-fn options(case: &Case, says_frame: bool) -> String {
-    let parts = case.scheme.parts();
-    let mut words = Vec::new();
+fn options(case: &Case, says_formulation: bool) -> String {
+    let usual = Scheme::Updated(Updated::default()).choices();
+    // Mass and composition are those that suit the splines.
+    let of_total = ["formulation", "shape", "layout", "grid"];
+    let is_said = |one: &(&'static str, Choice)| match (&case.scheme, one.0) {
+        (Scheme::Total(_), name) => of_total.contains(&name),
+        (Scheme::Updated(_), "formulation") => says_formulation,
+        (Scheme::Updated(_), "grid-angle" | "grid-shift") => one.1 != Choice::Number(0.0),
+        (Scheme::Updated(_), _) => !usual.contains(one),
+    };
+    let said = case.scheme.choices().into_iter().filter(is_said);
+    let mut words: Vec<String> = said.map(|(name, value)| format!("--{name} {value}")).collect();
     let mut say = |option: &str, value: &str| words.push(format!("--{option} {value}"));
-    match &case.scheme {
-        Scheme::Updated(updated) => {
-            let Updated { shape, stepping, transfer, placement } = Updated::default();
-            if says_frame {
-                say("formulation", "updated-lagrangian");
-            }
-            if updated.placement != placement {
-                say("layout", parts.layout);
-            }
-            if updated.shape != shape {
-                say("shape", &parts.shape);
-            }
-            if updated.transfer != transfer {
-                say("transfer", &parts.transfer);
-            }
-            if updated.stepping != stepping {
-                say("integrator", &parts.integrator);
-                if parts.start != "halved" {
-                    say("start", &parts.start);
-                }
-            }
-        }
-        Scheme::Total(_) => {
-            say("formulation", "total-lagrangian");
-            say("shape", &parts.shape);
-            say("layout", parts.layout);
-            say("grid", parts.grid);
-        }
-    }
-    if parts.offset != 0.0 {
-        say("offset", &number::exact(parts.offset));
-    }
-    if !parts.pose.is_usual() {
-        say("grid-angle", &number::exact(parts.pose.angle));
-        say("grid-shift", &number::exact(parts.pose.shift));
-    }
     if case.per_cell != 2 {
         say("ppc", &case.per_cell.to_string());
     }
     say("cfl", &number::exact(case.cfl));
     if case.cfl_speed != CflSpeed::Bar {
-        say("cfl-speed", &case.cfl_speed.to_string());
+        say("cfl-speed", case.cfl_speed.name());
     }
     words.join(" ")
 }
@@ -220,7 +194,7 @@ impl<'a> Given<'a> {
             text += &format!(" --precision {}", word(self.precision));
         }
         if let Some(extent) = case.extent {
-            text += &format!(" --extent {extent}");
+            text += &format!(" --extent {}", extent.name());
         }
         format!("{text} {options}")
     }

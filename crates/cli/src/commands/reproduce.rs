@@ -14,9 +14,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{
-    Case, CostModel, Expected, Field, FrameOutput, ORDER_TOLERANCE, Outputs, Progress, Row, Shape,
-    Start, Status, StepError, Stepping, Study, Sweep, Temporal, expected_in_space,
-    expected_in_time,
+    Case, CostModel, Expected, Field, FrameOutput, Integrator, ORDER_TOLERANCE, Outputs, Progress,
+    Row, Scheme, Shape, Start, Status, StepError, Study, Sweep, Temporal, Updated,
+    expected_in_space, expected_in_time,
 };
 
 use super::converge::{
@@ -39,18 +39,18 @@ use crate::{number, sheets, terminal};
 const PROBLEMS: [&str; 2] = ["axis-aligned", "ring"];
 /// The study's density, which the library's solutions do not have.
 const DENSITY: (&str, f64) = ("rho0", 1.0);
-const CD: Stepping = Stepping::Cd(Start::Halved);
+const CD: Integrator = Integrator::Cd;
 /// The schemes compared in space.
-const SPACE: [(Shape, Stepping); 5] = [
+const SPACE: [(Shape, Integrator); 5] = [
     (Shape::Gimp, CD),
-    (Shape::Gimp, Stepping::Usl),
-    (Shape::Gimp, Stepping::Usf),
+    (Shape::Gimp, Integrator::Usl),
+    (Shape::Gimp, Integrator::Usf),
     (Shape::Ugimp, CD),
     (Shape::Linear, CD),
 ];
 /// The schemes compared in time.
-const TIME: [(Shape, Stepping); 3] =
-    [(Shape::Gimp, CD), (Shape::Gimp, Stepping::Usl), (Shape::Ugimp, CD)];
+const TIME: [(Shape, Integrator); 3] =
+    [(Shape::Gimp, CD), (Shape::Gimp, Integrator::Usl), (Shape::Ugimp, CD)];
 const CELLS: [usize; 5] = [8, 16, 32, 64, 128];
 const CFLS: [f64; 8] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 /// The grid of the studies in time and of the particle files.
@@ -61,7 +61,7 @@ const FRAMES: u64 = 17;
 const SMALL_STEP_CELLS: [usize; 4] = [8, 16, 32, 64];
 const SMALL_STEP: f64 = 0.05;
 /// The schemes whose differences on one grid are measured, and the CFL numbers.
-const DIFFERENCES: [(Shape, Stepping); 2] = [(Shape::Gimp, CD), (Shape::Gimp, Stepping::Usl)];
+const DIFFERENCES: [(Shape, Integrator); 2] = [(Shape::Gimp, CD), (Shape::Gimp, Integrator::Usl)];
 const DIFFERENCE_CFLS: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
 /// The gentle study: these differences with a small amplitude on a fine grid, where the order of centred differences shows.
 const GENTLE: f64 = 1e-3;
@@ -72,14 +72,14 @@ const GENTLE_RANGE: f64 = 0.15;
 
 /// A study of one scheme.
 struct Series {
-    scheme: (Shape, Stepping),
+    scheme: (Shape, Integrator),
     study: Study,
     verdicts: Verdicts,
 }
 
 /// The differences of one scheme on one grid.
 struct Differences {
-    scheme: (Shape, Stepping),
+    scheme: (Shape, Integrator),
     found: Temporal,
     verdicts: Verdicts,
 }
@@ -197,11 +197,11 @@ impl Pace {
 /// The seconds of a scheme's differences: every run once, and once more with half the finest step.
 fn difference_seconds(
     pace: &Pace,
-    (shape, stepping): (Shape, Stepping),
+    (shape, integrator): (Shape, Integrator),
     cells: usize,
     cfls: &[f64],
 ) -> f64 {
-    let base = usual(shape, stepping, cells);
+    let base = usual(shape, integrator, cells);
     let finest = cfls.iter().copied().reduce(f64::min).map(|cfl| cfl / 2.0);
     let all = cfls.iter().copied().chain(finest);
     pace.seconds(&all.map(|cfl| Case { cfl, ..base }).collect::<Vec<_>>())
@@ -211,8 +211,8 @@ fn difference_seconds(
 fn total_seconds(paces: &[Pace], budget: f64) -> f64 {
     let mut total = limits::seconds(&paces[0]);
     for pace in paces {
-        let study = |(shape, stepping), sweep: &Sweep, cfl: f64| {
-            pace.seconds(&sweep.cases(&Case { cfl, ..usual(shape, stepping, GRID) }))
+        let study = |(shape, integrator), sweep: &Sweep, cfl: f64| {
+            pace.seconds(&sweep.cases(&Case { cfl, ..usual(shape, integrator, GRID) }))
         };
         let usual_cfl = Case::default().cfl;
         for scheme in SPACE {
@@ -222,7 +222,7 @@ fn total_seconds(paces: &[Pace], budget: f64) -> f64 {
             total += study(scheme, &Sweep::Cfls(CFLS.to_vec()), usual_cfl);
         }
         let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
-        total += study((Shape::Gimp, Stepping::Usl), &few, SMALL_STEP);
+        total += study((Shape::Gimp, Integrator::Usl), &few, SMALL_STEP);
         for scheme in DIFFERENCES {
             total += difference_seconds(pace, scheme, GRID, &DIFFERENCE_CFLS);
         }
@@ -256,7 +256,7 @@ struct TimeLadder<'a> {
 /// Measures the differences of a scheme on one grid and writes them into `folder`.
 fn measure_differences(
     selection: &Selection,
-    scheme: (Shape, Stepping),
+    scheme: (Shape, Integrator),
     ladder: &TimeLadder<'_>,
     folder: &Path,
     bar: &Bar,
@@ -286,7 +286,7 @@ fn measure_differences(
 }
 
 /// The files of a study of one scheme.
-fn files(folder: &Path, kind: &str, scheme: (Shape, Stepping)) -> Result<Files> {
+fn files(folder: &Path, kind: &str, scheme: (Shape, Integrator)) -> Result<Files> {
     let stem = format!("{kind}-{}-{}", scheme.0, scheme.1);
     Files::of_stem(folder, &stem, &[Form::Json, Form::Csv])
 }
@@ -295,7 +295,7 @@ fn files(folder: &Path, kind: &str, scheme: (Shape, Stepping)) -> Result<Files> 
 fn measure_series(
     selection: &Selection,
     kind: &str,
-    (scheme, sweep): ((Shape, Stepping), &Sweep),
+    (scheme, sweep): ((Shape, Integrator), &Sweep),
     cfl: f64,
     folder: &Path,
     (pace, agenda): (&Pace, &Agenda),
@@ -334,7 +334,7 @@ fn measure_problem(
     agenda: &Agenda,
 ) -> Result<Results> {
     let selection = studied(problem, &[])?;
-    let series = |kind: &str, scheme: (Shape, Stepping), sweep: &Sweep, cfl: f64| {
+    let series = |kind: &str, scheme: (Shape, Integrator), sweep: &Sweep, cfl: f64| {
         measure_series(&selection, kind, (scheme, sweep), cfl, folder, (pace, agenda))
     };
     let usual_cfl = Case::default().cfl;
@@ -345,7 +345,7 @@ fn measure_problem(
     let time = TIME.map(|scheme| series("time", scheme, &cfls, usual_cfl));
     let time = time.into_iter().collect::<Result<Vec<_>>>()?;
     let few = Sweep::Cells(SMALL_STEP_CELLS.to_vec());
-    let usl = (Shape::Gimp, Stepping::Usl);
+    let usl = (Shape::Gimp, Integrator::Usl);
     let small_step = series("small-step", usl, &few, SMALL_STEP)?;
     let differences = DIFFERENCES.map(|scheme| {
         let cfls = &DIFFERENCE_CFLS;
@@ -365,7 +365,8 @@ fn measure_problem(
     let mut outputs = Outputs { frames: Some(&frames), ..Outputs::new(silent) };
     let model = &pace.model;
     model.discretized(&usual(Shape::Gimp, CD, GRID))?.run(&mut outputs)?;
-    let exact_start = usual(Shape::Gimp, Stepping::Cd(Start::Exact), GRID);
+    let exact_start = Updated { start: Start::Exact, ..Updated::default() };
+    let exact_start = Case { scheme: Scheme::Updated(exact_start), ..usual(Shape::Gimp, CD, GRID) };
     let exact_start = model.discretized(&exact_start)?.run(&mut Outputs::new(&mut |_| ()))?;
     pictures::write_contrast(&selection, model, problem, folder)?;
     let results = Results { problem, space, time, small_step, differences, exact_start };
@@ -568,6 +569,6 @@ fn compare(series: &[Series], first: &str, label: impl Fn(&Row) -> String) -> Ta
     table
 }
 
-fn name((shape, stepping): (Shape, Stepping)) -> String {
-    format!("{shape}+{stepping}")
+fn name((shape, integrator): (Shape, Integrator)) -> String {
+    format!("{shape}+{integrator}")
 }

@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Parts, Row, RunTraffic, Scheme,
-    Status, energy_drift,
+    Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Row, RunTraffic, Scheme, Status,
+    energy_drift,
 };
 use serde_json::{Map, Value, json};
 
@@ -46,8 +46,7 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
     let cells = options.cells.unwrap_or(problem.settled.case.cells);
     let cases = problem.model.admit(&[Case { cells, ..problem.settled.case }])?;
     let [case] = cases.as_slice() else { bail!("a run has one case") };
-    let report = [(Form::Json, &options.scheme.json)];
-    let files = Asked(&report).prepare()?;
+    let files = Asked(vec![(Form::Json, &options.scheme.json)]).prepare()?;
     let history = Output::prepare_if(options.history.as_ref())?;
     let plot = Output::prepare_if(options.plot.as_ref())?;
     if let Some(folder) = options.vtk.as_ref().filter(|_| processes::is_first()) {
@@ -193,10 +192,10 @@ impl Ran {
 
     /// A picture of the drift of energy.
     fn drift(&self, problem: &Problem, case: &Case) -> String {
-        let Parts { shape, integrator, .. } = case.scheme.parts();
+        let shape = case.scheme.shape();
         let curve = match case.scheme {
             Scheme::Total(_) => shape,
-            Scheme::Updated(_) => format!("{shape} + {integrator}"),
+            Scheme::Updated(updated) => format!("{shape} + {}", updated.integrator),
         };
         let course = course(curve, &problem.model, self.moments());
         let name = problem.selection.name();

@@ -3,14 +3,12 @@
 use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
-    self as verify, Case, CaseError, CflSpeed, Coordinates, GridPose, Integrator,
-    LARGEST_USUAL_CFL, Parts, Placement, Scheme, Shape, Stepping, Total, Transfer, USUAL_CFL,
-    Updated, UsualStep, usual_step,
+    self as verify, Case, CaseError, CflSpeed, Composition, Coordinates, Formulation, GridPose,
+    Integrator, LARGEST_USUAL_CFL, MassMatrix, Named, Placement, Scheme, Shape, Start, Total,
+    Transfer, USUAL_CFL, Updated, UsualStep, usual_step,
 };
 
-use crate::arguments::{
-    Composition, Frame, Grid, Layout, Mass, Precision, SchemeOptions, Start, Weights,
-};
+use crate::arguments::{Layout, Precision, SchemeOptions, Weights};
 use crate::number;
 
 /// The default number of cells.
@@ -45,8 +43,8 @@ pub(super) struct Choice {
 }
 
 /// Usual case of a solution that the updated Lagrangian formulation models, with the given weights and integrator.
-pub(super) fn usual(shape: verify::Shape, stepping: Stepping, cells: usize) -> Case {
-    let scheme = Scheme::Updated(Updated { shape, stepping, ..Updated::default() });
+pub(super) fn usual(shape: Shape, integrator: Integrator, cells: usize) -> Case {
+    let scheme = Scheme::Updated(Updated { shape, integrator, ..Updated::default() });
     Case { scheme, cells, ..Case::default() }
 }
 
@@ -64,8 +62,8 @@ impl Settled {
     /// Options that make no scheme together.
     pub(super) fn settle(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Self> {
         let needed = verify::needs_total_frame(exact);
-        let is_total = match options.frame {
-            Some(frame) => frame == Frame::Total,
+        let is_total = match options.formulation {
+            Some(formulation) => formulation == Formulation::Total,
             None => needed.is_some() && !says_updated(options),
         };
         refuse_start(options, is_total)?;
@@ -74,7 +72,7 @@ impl Settled {
         } else {
             Scheme::Updated(updated(options)?)
         };
-        let speed = options.cfl_speed.map(CflSpeed::from);
+        let speed = options.cfl_speed;
         let said = UsualStep {
             cfl: options.cfl.unwrap_or(USUAL_CFL),
             speed: speed.unwrap_or(CflSpeed::Bar),
@@ -92,7 +90,7 @@ impl Settled {
             cfl: step.cfl,
             cfl_speed: step.speed,
             periods: options.periods,
-            extent: options.extent.map(Into::into),
+            extent: options.extent,
         };
         let loaded = verify::loaded_instead(exact, &case);
         let mut settled = Self {
@@ -103,9 +101,9 @@ impl Settled {
             too_long: step.too_long,
         };
         if let Scheme::Total(scheme) = scheme
-            && (options.frame.is_none() || options.shape.is_none())
+            && (options.formulation.is_none() || options.shape.is_none())
         {
-            let reason = needed.filter(|_| options.frame.is_none());
+            let reason = needed.filter(|_| options.formulation.is_none());
             if reason.is_some() && matches!(exact, AnySolution::Three(_)) {
                 settled.case.cells = USUAL_CELLS_OF_SOLIDS;
             }
@@ -153,12 +151,13 @@ impl Settled {
             text +=
                 &format!(": the updated formulation does not model {} on {}", condition, surface);
         }
-        let Parts { shape, grid, layout, .. } = self.case.scheme.parts();
+        let shape = self.case.scheme.shape();
+        let (grid, layout) = (scheme.coordinates.name(), scheme.layout.name());
         text += &format!(
             "\n  as with --formulation total-lagrangian --shape {shape} --grid {grid} --layout {layout} --ppc {per_cell}"
         );
         if *cfl_is_chosen {
-            text += &format!(" --cfl {cfl} --cfl-speed {cfl_speed}");
+            text += &format!(" --cfl {cfl} --cfl-speed {}", cfl_speed.name());
         }
         text + "\n" + &self.step()
     }
@@ -174,7 +173,8 @@ impl Settled {
         let too_long = number::rounded(too_long, 2);
         format!(
             "CFL {cfl} on {waves}: the usual {USUAL_CFL} would be {too_long} on the fastest P-waves of this motion, more than \
-             {LARGEST_USUAL_CFL}\n  as with --cfl {cfl} --cfl-speed {cfl_speed}\n"
+             {LARGEST_USUAL_CFL}\n  as with --cfl {cfl} --cfl-speed {}\n",
+            cfl_speed.name()
         )
     }
 
@@ -211,11 +211,11 @@ fn per_cell(scheme: &Scheme) -> usize {
 
 fn updated(options: &SchemeOptions) -> Result<Updated> {
     let total_only = [
-        ("--mass consistent", options.mass == Some(Mass::Consistent)),
+        ("--mass consistent", options.mass == Some(MassMatrix::Consistent)),
         ("--composition", options.composition.is_some_and(|order| order != Composition::Order2)),
         ("--layout gauss", options.layout == Some(Layout::Gauss)),
-        ("--grid polar", options.grid == Some(Grid::Polar)),
-        ("--grid spherical", options.grid == Some(Grid::Spherical)),
+        ("--grid polar", options.grid == Some(Coordinates::Polar)),
+        ("--grid spherical", options.grid == Some(Coordinates::Spherical)),
     ];
     if let Some((option, _)) = total_only.iter().find(|(_, given)| *given) {
         bail!(
@@ -249,7 +249,8 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
             return Err(CaseError::setting("offset", format!("{offset:?}"), instead).into());
         }
     };
-    Ok(Updated { shape, stepping: stepping(options), transfer: options.transfer, placement })
+    let SchemeOptions { integrator, start, transfer, .. } = *options;
+    Ok(Updated { shape, integrator, start, transfer, placement })
 }
 
 fn pose(options: &SchemeOptions) -> GridPose {
@@ -273,16 +274,12 @@ fn refuse_pose(options: &SchemeOptions) -> Result<()> {
     Ok(())
 }
 
-fn stepping(options: &SchemeOptions) -> Stepping {
-    Stepping::new(options.integrator, options.start.into())
-}
-
 /// Refuses a start for integrators that have none to choose.
 fn refuse_start(options: &SchemeOptions, is_total: bool) -> Result<()> {
-    let start = verify::Start::from(options.start);
-    if start == verify::Start::Halved {
+    if options.start == Start::Halved {
         return Ok(());
     }
+    let start = options.start.name();
     if is_total {
         bail!(
             "--start {start}: the total Lagrangian formulation starts from the exact velocity at time zero; leave --start out, or write \
@@ -326,8 +323,8 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
         ),
     };
     if options.integrator != Integrator::Cd {
-        let (value, instead) = (stepping(options), "cd in the total Lagrangian formulation");
-        return Err(CaseError::setting("integrator", value, instead).into());
+        let instead = "cd in the total Lagrangian formulation";
+        return Err(CaseError::setting("integrator", options.integrator, instead).into());
     }
     if options.offset != 0.0 {
         let value = format!("{:?}", options.offset);
@@ -337,28 +334,28 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
     refuse_pose(options)?;
     let usual = Total::of_degree(degree);
     Ok(Total {
-        mass: options.mass.map_or(usual.mass, Into::into),
-        composition: options.composition.map_or(usual.composition, Into::into),
+        mass: options.mass.unwrap_or(usual.mass),
+        composition: options.composition.unwrap_or(usual.composition),
         layout,
-        coordinates: options.grid.map_or_else(|| Total::coordinates_for(exact), Into::into),
+        coordinates: options.grid.unwrap_or_else(|| Total::coordinates_for(exact)),
         ..usual
     })
 }
 
 /// Settings beside weights and integrator, in words; of the updated Lagrangian formulation those that are not the usual ones.
 pub(super) fn words(scheme: &Scheme) -> String {
-    let Parts { composition, mass, layout, grid, start, pose, .. } = scheme.parts();
     match scheme {
         Scheme::Updated(updated) => {
-            let mut text = match updated.stepping {
-                Stepping::Cd(_) => format!(" ({start} start)"),
+            let pose = updated.placement.pose();
+            let mut text = match updated.integrator {
+                Integrator::Cd => format!(" ({} start)", updated.start.name()),
                 _ => String::new(),
             };
             if updated.transfer != Transfer::Flip {
                 text += &format!(", transfer {}", updated.transfer);
             }
             if !matches!(updated.placement, Placement::Lattice { .. }) {
-                text += &format!(", {layout} layout");
+                text += &format!(", {} layout", updated.placement.name());
             }
             if pose.angle != 0.0 {
                 text += &format!(", grid turned by {} degrees", pose.angle);
@@ -377,7 +374,11 @@ pub(super) fn words(scheme: &Scheme) -> String {
                 }
             };
             format!(
-                " of order {composition}, total Lagrangian, {mass} mass, {layout} layout, {grid} grid{part}"
+                " of order {}, total Lagrangian, {} mass, {} layout, {} grid{part}",
+                total.composition.order(),
+                total.mass.name(),
+                total.layout.name(),
+                total.coordinates.name(),
             )
         }
     }

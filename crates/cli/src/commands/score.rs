@@ -11,8 +11,8 @@ use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Agreement, Case, Input, ORDER_TOLERANCE, Placing, Remark, Scheme, Score,
-    ScoreOptions as Reading, ScoreRow, Start, Stepping, Times, Updated, against,
-    compare_recordings, score as measure,
+    ScoreOptions as Reading, ScoreRow, Times, Updated, against, compare_recordings,
+    score as measure,
 };
 use mmsmith_vtk::foreign::column;
 use serde_json::json;
@@ -20,16 +20,15 @@ use serde_json::json;
 use super::blind;
 use crate::arguments::ScoreOptions;
 use crate::expect;
-use crate::json::Output;
 use crate::library::Selection;
 use crate::processes::with_threads;
-use crate::terminal;
+use crate::report::{Asked, Files, Form, Report, Section};
 
 pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let inputs = inputs::inputs(options)?;
     let how = reading(&selection, options)?;
-    let output = Output::prepare_if(options.json.as_ref())?;
+    let output = Asked(vec![(Form::Json, &options.json)]).prepare()?;
     with_threads(options.threads, || {
         let exact = selection.build()?;
         if options.differences.is_empty() {
@@ -50,7 +49,7 @@ fn reading(selection: &Selection, options: &ScoreOptions) -> Result<Reading> {
     }
     Ok(Reading {
         map,
-        points: options.points.into(),
+        points: options.points,
         times: times(options)?,
         placing: Placing {
             origin: options.origin.clone(),
@@ -87,7 +86,7 @@ fn scored(
     exact: &AnySolution<f64>,
     inputs: &[Input],
     how: &Reading,
-    output: Option<Output>,
+    output: Files,
 ) -> Result<bool> {
     let mut score = measure(exact, inputs, how)?;
     let set = &options.parameters.set;
@@ -107,7 +106,7 @@ fn at_density_one(
     name: &str,
     inputs: &[Input],
     how: &Reading,
-    output: Option<Output>,
+    output: Files,
 ) -> Result<bool> {
     let selection = selection.with(&[(name.to_owned(), 1.0)])?;
     let exact = selection.build()?;
@@ -129,25 +128,27 @@ fn tell(
     exact: &AnySolution<f64>,
     score: &Score,
     how: &Reading,
-    output: Option<Output>,
+    output: Files,
 ) -> Result<bool> {
-    // Before anything is said: what cannot be compared is refused.
     let agreements = agreements(options, exact, score, how)?;
-    terminal::say(&text::text(selection, score))?;
-    for (row, agreement) in score.rows.iter().zip(&agreements) {
-        terminal::say(&text::of_agreement(options, row, agreement))?;
-    }
     let blind = blind::measure(selection)?;
-    terminal::say(&(text::verdict(score) + &blind::text(&blind)))?;
-    if let Some(output) = output {
-        let mut document = document::document(selection, options, score);
-        document["blind_spots"] = json!(blind);
-        if !agreements.is_empty() {
-            document["against"] = json!(agreements);
-        }
-        output.write(&document)?;
+    let mut sections = text::of_score(selection, score);
+    let beside = score.rows.iter().zip(&agreements);
+    sections.extend(beside.map(|(row, agreement)| text::of_agreement(options, row, agreement)));
+    sections.push(Section::Note(text::verdict(score) + &blind::text(&blind)));
+    let report = Report {
+        caption: text::caption(selection),
+        sections,
+        settings: document::settings(selection, options),
+        results: document::results(score),
+        verdict: score.verdict.passed,
+        ..Report::new("score")
+    };
+    let report = report.with("blind_spots", json!(blind));
+    match agreements.is_empty() {
+        true => report.publish(output),
+        false => report.with("against", json!(agreements)).publish(output),
     }
-    Ok(score.verdict.passed != Some(false))
 }
 
 /// The recordings against each other; whether all of them are whole.
@@ -157,21 +158,23 @@ fn compared(
     exact: &AnySolution<f64>,
     inputs: &[Input],
     how: &Reading,
-    output: Option<Output>,
+    output: Files,
 ) -> Result<bool> {
     let compared = compare_recordings(exact, inputs, &options.differences, how)?;
-    terminal::say(&text::of_differences(selection, &compared))?;
-    if let Some(output) = output {
-        let mut document = document::settings(selection, options);
-        document["differences"] = json!(compared.rows);
-        if let Some(orders) = &compared.orders {
-            document["orders"] = json!(orders);
-        }
-        let rows = compared.rows.iter().map(|row| (&row.file, &row.findings[..]));
-        document["findings"] = document::findings(rows);
-        output.write(&document)?;
+    let rows = compared.rows.iter().map(|row| (&row.file, &row.findings[..]));
+    let report = Report {
+        caption: text::caption(selection),
+        sections: text::of_differences(selection, &compared),
+        settings: document::settings(selection, options),
+        verdict: Some(compared.rows.iter().all(|row| row.status == "ok")),
+        ..Report::new("score")
+    };
+    let report =
+        report.with("differences", json!(compared.rows)).with("findings", document::findings(rows));
+    match &compared.orders {
+        Some(orders) => report.with("orders", json!(orders)).publish(output),
+        None => report.publish(output),
     }
-    Ok(compared.rows.iter().all(|row| row.status == "ok"))
 }
 
 /// The runs beside the recordings, where such are asked for.
@@ -182,8 +185,7 @@ fn agreements(
     how: &Reading,
 ) -> Result<Vec<Agreement>> {
     let Some((shape, integrator)) = options.against else { return Ok(vec![]) };
-    let stepping = Stepping::new(integrator, Start::Halved);
-    let scheme = Scheme::Updated(Updated { shape, stepping, ..Updated::default() });
+    let scheme = Scheme::Updated(Updated { shape, integrator, ..Updated::default() });
     let run = |row: &ScoreRow| {
         let cells = row.cells.unwrap_or_default();
         let case =

@@ -72,24 +72,17 @@ pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     if options.search.is_some() {
         return random::search(options, &criteria);
     }
-    let files = [
-        (Form::Json, &options.scheme.json),
-        (Form::Plot, &options.plot),
-        (Form::Csv, &options.csv),
-    ];
-    survey(options, |found| conduct(found, &request(options, &files)))
+    survey(options, |found| conduct(found, &request(options)))
 }
 
 /// The request for a study with these options.
-fn request<'a>(
-    options: &'a StabilityOptions,
-    files: &'a [(Form, &'a Option<std::path::PathBuf>)],
-) -> Request<'a> {
+fn request(options: &StabilityOptions) -> Request<'_> {
+    let StabilityOptions { scheme, plot, csv, .. } = options;
     Request {
         solution: &options.name,
         kept: &options.kept,
         threads: options.scheme.threads,
-        files: Asked(files),
+        files: Asked(vec![(Form::Json, &scheme.json), (Form::Plot, plot), (Form::Csv, csv)]),
         others: &[],
     }
 }
@@ -209,7 +202,7 @@ impl Study for Survey<'_> {
 fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let scheme = SchemeOptions { cfl: Some(cfl), ..options.scheme.clone() };
-    let files = Asked(&[(Form::Json, &scheme.json)]).prepare()?;
+    let files = Asked(vec![(Form::Json, &scheme.json)]).prepare()?;
     let Point { problem, .. } = Point::new(Vec::new(), selection, &scheme, options.cells)?;
     let cases = problem.model.admit(&[problem.settled.case])?;
     let extent = extent(&cases);

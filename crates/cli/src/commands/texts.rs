@@ -7,9 +7,9 @@ use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
 use mmsmith_solutions::CATALOGUE;
 
-use super::python;
+use super::{python, schemas};
 use crate::arguments::{CompletionsOptions, ManOptions, ReferenceOptions, examples, line};
-use crate::json::Output;
+use crate::json::{Output, make_folder};
 use crate::terminal;
 
 /// Says the script that lets a shell complete commands.
@@ -53,10 +53,18 @@ pub(crate) fn man(options: &ManOptions) -> Result<bool> {
     Ok(true)
 }
 
-/// Says the whole command line as Markdown, or as functions of the Python package.
+/// Says the whole command line as Markdown or as functions of the Python package, or writes the schemas of its JSON.
 pub(crate) fn reference(options: &ReferenceOptions) -> Result<bool> {
     let mut whole = line();
     whole.build();
+    if let Some(folder) = &options.schemas {
+        make_folder(folder)?;
+        for (name, schema) in schemas::all()? {
+            let file = Output::prepare(&folder.join(format!("{name}.json")))?;
+            file.write_text(&(schemas::lines(&schema, 0) + "\n"))?;
+        }
+        return Ok(true);
+    }
     if options.python {
         terminal::print(python::module(&whole).as_bytes())?;
         return Ok(true);

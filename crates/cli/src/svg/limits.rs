@@ -12,6 +12,7 @@ const CELL: (f64, f64) = (62.0, 38.0);
 const MAP: f64 = 76.0;
 /// Height of the line's frame.
 const HEIGHT: f64 = 300.0;
+const BOTTOM: f64 = TOP + HEIGHT;
 /// Eight steps of the map viridis from dark to light, which keep their order in black and white.
 const COLOURS: [&str; 8] =
     ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
@@ -167,9 +168,9 @@ pub(crate) struct Limits<'a> {
 impl Limits<'_> {
     pub(crate) fn svg(&self) -> String {
         let count = self.values.len();
-        let width = (LEFT + CELL.0 * count as f64 + 16.0).max(480.0);
-        let right = width - 16.0;
-        let bottom = TOP + HEIGHT;
+        let right = (LEFT + CELL.0 * count as f64 + 16.0).max(480.0) - 16.0;
+        let all = self.measured.iter().copied().flatten().chain(self.analytic.iter().copied());
+        let frame = Frame { count, right, high: all.fold(0.0_f64, f64::max) * 1.1 };
         let told: Vec<_> = self
             .values
             .iter()
@@ -180,16 +181,31 @@ impl Limits<'_> {
             })
             .collect();
         let description = format!("Limits over {}: {}.", self.x, told.join("; "));
-        let mut text = open("limits", width, bottom + 112.0, self.title, &description);
+        let mut text = open("limits", right + 16.0, BOTTOM + 112.0, self.title, &description);
         let _ = writeln!(
             text,
             r##"<text x="16" y="22" font-size="15" font-weight="bold">{}</text>"##,
             escape(self.title)
         );
-        let all = self.measured.iter().copied().flatten().chain(self.analytic.iter().copied());
-        let high = all.fold(0.0_f64, f64::max) * 1.1;
-        let x = |place: usize| LEFT + (right - LEFT) * (place as f64 + 0.5) / count as f64;
-        let y = |value: f64| bottom - HEIGHT * value / high;
+        self.axes(&frame, &mut text);
+        let line: Vec<_> = self
+            .analytic
+            .iter()
+            .enumerate()
+            .map(|(place, value)| format!("{:.1},{:.1}", frame.x(place), frame.y(*value)))
+            .collect();
+        let _ = writeln!(
+            text,
+            r##"<polyline class="analytic" points="{}" fill="none" stroke="#d55e00" stroke-width="2" stroke-dasharray="7 3"/>"##,
+            line.join(" ")
+        );
+        self.points(&frame, &mut text);
+        self.legend(&frame, &mut text);
+        text
+    }
+
+    fn axes(&self, frame: &Frame, text: &mut String) {
+        let &Frame { right, high, .. } = frame;
         let step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
             .into_iter()
             .find(|step| high / step <= 8.0)
@@ -200,35 +216,27 @@ impl Limits<'_> {
                 text,
                 r##"<path d="M{LEFT} {at:.1}H{right}" stroke="#ddd"/><text x="{:.1}" y="{:.1}" text-anchor="end" font-size="13">{}</text>"##,
                 LEFT - 6.0,
-                y(value) + 5.0,
+                frame.y(value) + 5.0,
                 (value * 100.0).round() / 100.0,
-                at = y(value),
+                at = frame.y(value),
             );
         }
         for (place, value) in self.values.iter().enumerate() {
             let _ = writeln!(
                 text,
                 r##"<text x="{:.1}" y="{}" text-anchor="middle" font-size="13">{}</text>"##,
-                x(place),
-                bottom + 18.0,
+                frame.x(place),
+                BOTTOM + 18.0,
                 escape(value)
             );
         }
-        let line: Vec<_> = self
-            .analytic
-            .iter()
-            .enumerate()
-            .map(|(place, value)| format!("{:.1},{:.1}", x(place), y(*value)))
-            .collect();
-        let _ = writeln!(
-            text,
-            r##"<polyline class="analytic" points="{}" fill="none" stroke="#d55e00" stroke-width="2" stroke-dasharray="7 3"/>"##,
-            line.join(" ")
-        );
+    }
+
+    fn points(&self, frame: &Frame, text: &mut String) {
         let mut parts: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
         for (place, value) in self.measured.iter().enumerate() {
             match (value, parts.last_mut()) {
-                (Some(value), Some(part)) => part.push((x(place), y(*value))),
+                (Some(value), Some(part)) => part.push((frame.x(place), frame.y(*value))),
                 // The line has a gap where no limit was found.
                 _ => parts.push(Vec::new()),
             }
@@ -249,7 +257,11 @@ impl Limits<'_> {
                     writeln!(text, r##"<circle cx="{x:.1}" cy="{y:.1}" r="5" fill="#0072b2"/>"##);
             }
         }
-        let (first, second) = (bottom + 70.0, bottom + 94.0);
+    }
+
+    fn legend(&self, frame: &Frame, text: &mut String) {
+        let right = frame.right;
+        let (first, second) = (BOTTOM + 70.0, BOTTOM + 94.0);
         let _ = writeln!(
             text,
             r##"<rect x="{LEFT}" y="{TOP}" width="{}" height="{HEIGHT}" fill="none" stroke="#333"/>
@@ -262,16 +274,32 @@ impl Limits<'_> {
 </svg>"##,
             right - LEFT,
             (LEFT + right) / 2.0,
-            bottom + 42.0,
+            BOTTOM + 42.0,
             escape(self.x),
-            (TOP + bottom) / 2.0,
+            (TOP + BOTTOM) / 2.0,
             LEFT + 22.0,
             LEFT + 54.0,
             first + 5.0,
             LEFT + 54.0,
             second + 5.0
         );
-        text
+    }
+}
+
+/// Places and numbers of a line on the picture.
+struct Frame {
+    count: usize,
+    right: f64,
+    high: f64,
+}
+
+impl Frame {
+    fn x(&self, place: usize) -> f64 {
+        LEFT + (self.right - LEFT) * (place as f64 + 0.5) / self.count as f64
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        BOTTOM - HEIGHT * value / self.high
     }
 }
 

@@ -57,122 +57,48 @@ impl Role {
     /// Its own name, which is the first one looked for.
     #[must_use]
     pub fn name(self) -> &'static str {
-        self.usual_names()[0]
+        let names = self.names();
+        names.split_once(' ').map_or(names, |(first, _)| first)
     }
 
     /// The names under which programs write it, the likeliest first. Names of up to two letters are meant letter by letter; longer
     /// ones in any case, with and without underscores.
-    #[must_use]
-    pub fn usual_names(self) -> &'static [&'static str] {
+    pub fn usual_names(self) -> impl Iterator<Item = &'static str> {
+        self.names().split(' ')
+    }
+
+    fn names(self) -> &'static str {
         match self {
-            Self::Displacement => &[
-                "displacement",
-                "displacements",
-                "disp",
-                "displ",
-                "u",
-                "U",
-                "d",
-                "D",
-                "mp_displacement",
-                "total_displacement",
-                "displacement_vector",
-                "nodal_displacement",
-                "u_h",
-                "uh",
-                "f_displacement",
-            ],
-            Self::Velocity => &[
-                "velocity",
-                "velocities",
-                "vel",
-                "v",
-                "V",
-                "mp_velocity",
-                "velocity_vector",
-                "v_h",
-            ],
+            Self::Displacement => {
+                "displacement displacements disp displ u U d D mp_displacement total_displacement displacement_vector \
+                 nodal_displacement u_h uh f_displacement"
+            }
+            Self::Velocity => "velocity velocities vel v V mp_velocity velocity_vector v_h",
             Self::DeformationGradient => {
-                &["deformation_gradient", "defgrad", "def_grad", "F", "mp_deformation_gradient"]
+                "deformation_gradient defgrad def_grad F mp_deformation_gradient"
             }
-            Self::DisplacementGradient => &[
-                "displacement_gradient",
-                "H",
-                "grad_u",
-                "gradu",
-                "grad_displacement",
-                "gradient_of_displacement",
-            ],
-            Self::FirstPiolaKirchhoff => &[
-                "first_piola_kirchhoff",
-                "first_piola_kirchhoff_stress",
-                "pk1",
-                "pk1_stress",
-                "first_pk_stress",
-                "P",
-                "piola_stress",
-            ],
-            Self::Cauchy => &[
-                "cauchy",
-                "cauchy_stress",
-                "stress",
-                "stresses",
-                "sigma",
-                "S",
-                "s",
-                "mp_cauchy_stress_vector",
-                "mp_cauchy_stress",
-                "stress_tensor",
-                "cauchy_stress_tensor",
-            ],
-            Self::Kirchhoff => &["kirchhoff", "kirchhoff_stress", "tau"],
-            Self::VolumeRatio => {
-                &["J", "jacobian", "detF", "det_deformation_gradient", "volume_ratio"]
+            Self::DisplacementGradient => {
+                "displacement_gradient H grad_u gradu grad_displacement gradient_of_displacement"
             }
-            Self::Density => &["density", "rho", "mp_density", "mass_density"],
-            Self::ReferencePosition => &[
-                "reference_position",
-                "reference_positions",
-                "initial_position",
-                "initial_positions",
-                "reference_coordinates",
-                "initial_coordinates",
-                "X",
-                "X0",
-                "x0",
-                "original_position",
-            ],
-            Self::Id => &[
-                "id",
-                "ID",
-                "ids",
-                "particle_id",
-                "global_node_id",
-                "global_node_ids",
-                "vtkOriginalPointIds",
-                "vtkOriginalCellIds",
-                "node_id",
-                "node_ids",
-                "point_id",
-                "point_ids",
-                "global_id",
-                "global_ids",
-                "element_id",
-                "cell_id",
-                "mp_id",
-                "particle_index",
-                "index",
-                "tag",
-                "pid",
-                "nid",
-                "gid",
-                "label",
-                "orig_id",
-                "original_id",
-                "material_point_id",
-                "particle_label",
-                "particle_number",
-            ],
+            Self::FirstPiolaKirchhoff => {
+                "first_piola_kirchhoff first_piola_kirchhoff_stress pk1 pk1_stress first_pk_stress P piola_stress"
+            }
+            Self::Cauchy => {
+                "cauchy cauchy_stress stress stresses sigma S s mp_cauchy_stress_vector mp_cauchy_stress \
+                 stress_tensor cauchy_stress_tensor"
+            }
+            Self::Kirchhoff => "kirchhoff kirchhoff_stress tau",
+            Self::VolumeRatio => "J jacobian detF det_deformation_gradient volume_ratio",
+            Self::Density => "density rho mp_density mass_density",
+            Self::ReferencePosition => {
+                "reference_position reference_positions initial_position initial_positions reference_coordinates \
+                 initial_coordinates X X0 x0 original_position"
+            }
+            Self::Id => {
+                "id ID ids particle_id global_node_id global_node_ids vtkOriginalPointIds vtkOriginalCellIds node_id \
+                 node_ids point_id point_ids global_id global_ids element_id cell_id mp_id particle_index index tag \
+                 pid nid gid label orig_id original_id material_point_id particle_label particle_number"
+            }
         }
     }
 
@@ -193,13 +119,10 @@ impl Role {
 
     /// The arrays that have a usual name, the likeliest first: those that have it letter by letter before others.
     fn named(self, arrays: &[ArrayHead]) -> impl Iterator<Item = &ArrayHead> {
-        let names = self.usual_names();
-        let exact =
-            names.iter().flat_map(|name| arrays.iter().filter(move |array| array.name == *name));
-        let alike = names.iter().filter(|name| plain(name).len() > 2).flat_map(|name| {
-            let name = plain(name);
-            arrays.iter().filter(move |array| plain(&array.name) == name)
-        });
+        let exact = |name: &'static str| arrays.iter().filter(move |array| array.name == name);
+        let alike = |name: String| arrays.iter().filter(move |array| plain(&array.name) == name);
+        let long = self.usual_names().map(plain).filter(|name| name.len() > 2);
+        let (exact, alike) = (self.usual_names().flat_map(exact), long.flat_map(alike));
         exact.chain(alike)
     }
 

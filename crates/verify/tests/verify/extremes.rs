@@ -2,14 +2,14 @@
 
 use mmsmith_solutions::{AnySolution, CATALOGUE, Precision, build};
 use mmsmith_verify::{
-    Arithmetic, Case, Coordinates, Criteria, Discretized, Layout, Outputs, PerField, PerNorm,
-    Placement, Row, Scheme, Search, Shape, Start, Status, Stepping, Total, Transfer, Updated,
-    is_stable, run, stability,
+    Arithmetic, Case, Coordinates, Criteria, Discretized, Integrator, Layout, Outputs, PerField,
+    PerNorm, Placement, Row, Scheme, Search, Shape, Status, Total, Transfer, Updated, is_stable,
+    run, stability,
 };
 
 const SHAPES: [Shape; 3] = [Shape::Linear, Shape::Ugimp, Shape::Gimp];
-const STEPPINGS: [Stepping; 4] =
-    [Stepping::Cd(Start::Halved), Stepping::Usf, Stepping::Usl, Stepping::Musl];
+const INTEGRATORS: [Integrator; 4] =
+    [Integrator::Cd, Integrator::Usf, Integrator::Usl, Integrator::Musl];
 
 fn solution<T: Precision>(name: &str, set: &[(&str, f64)]) -> AnySolution<T> {
     let description = CATALOGUE.iter().find(|known| known.name == name).expect("a solution");
@@ -53,7 +53,7 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
 fn schemes() -> Vec<Case> {
     let usual = Updated::default();
     let updated = SHAPES.into_iter().flat_map(|shape| {
-        STEPPINGS.into_iter().map(move |stepping| Updated { shape, stepping, ..usual })
+        INTEGRATORS.into_iter().map(move |integrator| Updated { shape, integrator, ..usual })
     });
     let updated = updated.chain(further(usual)).map(Scheme::Updated);
     let all = updated.chain([Scheme::Total(Total::of_degree(3))]);
@@ -66,7 +66,7 @@ fn further(usual: Updated) -> impl Iterator<Item = Updated> {
     let transfers = [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)];
     let shapes = shapes.into_iter().map(move |shape| Updated { shape, ..usual });
     let transfers = transfers.into_iter().map(move |transfer| Updated { transfer, ..usual });
-    shapes.chain(transfers).chain([Updated { stepping: Stepping::Usavg, ..usual }])
+    shapes.chain(transfers).chain([Updated { integrator: Integrator::Usavg, ..usual }])
 }
 
 fn total_on(coordinates: Coordinates, case: Case) -> Case {
@@ -214,7 +214,7 @@ fn particles_may_lie_on_cell_edges_and_on_walls() {
             assert_eq!(at_rest.errors, PerField::default(), "{case:?}");
             let moving = row(&exact, &case);
             assert!(moving.errors.u.linf.is_finite(), "{case:?}: {}", moving.status);
-            if updated.shape == Shape::Gimp && updated.stepping == Stepping::Cd(Start::Halved) {
+            if updated.shape == Shape::Gimp && updated.integrator == Integrator::Cd {
                 assert_eq!(moving.status, Status::Ok);
             }
         }

@@ -5,17 +5,17 @@ use crate::hand_coded;
 use hand_coded::{AxisAligned, Coded, Plane};
 use mmsmith_solutions::{AnySolution, Boundary, Condition, Domain, Surface};
 use mmsmith_verify::{
-    Arithmetic, Case, Extent, MOST_MOMENTS, Moment, Outputs, Row, Scheme, Start, Status, Stepping,
-    Total, Updated, energy_drift, run,
+    Arithmetic, Case, Extent, Integrator, MOST_MOMENTS, Moment, Outputs, Row, Scheme, Start,
+    Status, Total, Updated, energy_drift, run,
 };
 use nalgebra::{SMatrix, SVector, vector};
 use std::f64::consts::PI;
 
-const STEPPINGS: [Stepping; 4] =
-    [Stepping::Cd(Start::Halved), Stepping::Usl, Stepping::Usf, Stepping::Musl];
+const INTEGRATORS: [Integrator; 4] =
+    [Integrator::Cd, Integrator::Usl, Integrator::Usf, Integrator::Musl];
 
-fn scheme(stepping: Stepping) -> Scheme {
-    Scheme::Updated(Updated { stepping, ..Updated::default() })
+fn scheme(integrator: Integrator) -> Scheme {
+    Scheme::Updated(Updated { integrator, ..Updated::default() })
 }
 
 fn history<S: Plane>(solution: S, case: &Case) -> (Row, Vec<Moment>) {
@@ -81,23 +81,23 @@ impl Plane for Flight {
 
 #[test]
 fn a_body_that_only_flies_gains_and_loses_nothing() {
-    for stepping in STEPPINGS {
+    for integrator in INTEGRATORS {
         let extent = Some(Extent::Full);
-        let case = Case { scheme: scheme(stepping), extent, cells: 8, ..Case::default() };
+        let case = Case { scheme: scheme(integrator), extent, cells: 8, ..Case::default() };
         let (row, history) = history(Flight, &case);
-        assert_eq!(row.status, Status::Ok, "{stepping:?}");
+        assert_eq!(row.status, Status::Ok, "{integrator:?}");
         let mass = history[0].exact.energy() / (0.5 * Flight::VELOCITY.norm_squared());
         assert!((mass / (0.75 * PI) - 1.0).abs() < 0.1, "{mass}");
         // It flies through several cells, and slows down to a part of its energy.
         let last = &history[history.len() - 1].exact;
         assert!(last.energy() < 0.7 * history[0].exact.energy());
         let (gained, lost) = extremes(&history);
-        assert!(gained.max(-lost) < 1e-10, "{stepping:?}: {gained:e} {lost:e}");
+        assert!(gained.max(-lost) < 1e-10, "{integrator:?}: {gained:e} {lost:e}");
         for Moment { velocity_time, computed, exact, .. } in &history {
             let expected = (Flight::VELOCITY + Flight::ACCELERATION * *velocity_time) * mass;
             for axis in 0..2 {
                 assert!((exact.momentum[axis] - expected[axis]).abs() < 1e-9);
-                assert!((computed.momentum[axis] - expected[axis]).abs() < 1e-8, "{stepping:?}");
+                assert!((computed.momentum[axis] - expected[axis]).abs() < 1e-8, "{integrator:?}");
             }
         }
     }
@@ -106,19 +106,19 @@ fn a_body_that_only_flies_gains_and_loses_nothing() {
 #[test]
 fn what_does_not_move_has_no_energy_and_no_drift() {
     let rest = AxisAligned { A: 0.0, ..AxisAligned::default() };
-    for stepping in STEPPINGS {
-        let case = Case { scheme: scheme(stepping), cells: 6, ..Case::default() };
+    for integrator in INTEGRATORS {
+        let case = Case { scheme: scheme(integrator), cells: 6, ..Case::default() };
         let (_, history) = history(rest.clone(), &case);
         assert!(history.len() > 10);
-        assert!(energy_drift(&history).iter().all(|&(_, drift)| drift == 0.0), "{stepping:?}");
-        assert!(history.iter().all(|m| m.computed == m.exact && m.u.linf == 0.0), "{stepping:?}");
+        assert!(energy_drift(&history).iter().all(|&(_, drift)| drift == 0.0), "{integrator:?}");
+        assert!(history.iter().all(|m| m.computed == m.exact && m.u.linf == 0.0), "{integrator:?}");
     }
 }
 
 #[test]
 fn exact_sums_are_those_of_the_formulas_at_the_scheme_s_own_times() {
     let case = Case { cells: 16, ..Case::default() };
-    let early = scheme(Stepping::Cd(Start::Exact));
+    let early = Scheme::Updated(Updated { start: Start::Exact, ..Updated::default() });
     for scheme in [case.scheme, early, Scheme::Total(Total::of_degree(3))] {
         let case = Case { scheme, ..case };
         let is_updated = scheme.updated().is_some();
@@ -177,11 +177,15 @@ fn a_run_that_breaks_down_has_its_history_until_then() {
 }
 
 /// The mean drift of energy in each of ten periods.
-fn means(stepping: Stepping) -> Vec<f64> {
-    let case = Case { scheme: scheme(stepping), cells: 12, periods: 10.0, ..Case::default() };
+fn means(integrator: Integrator) -> Vec<f64> {
+    let case = Case { scheme: scheme(integrator), cells: 12, periods: 10.0, ..Case::default() };
     let (row, history) = history(AxisAligned::default(), &case);
     // With so much energy the error exceeds the motion in the end.
-    assert!(row.status == Status::Ok || row.status.is_not_judged(), "{stepping:?}: {}", row.status);
+    assert!(
+        row.status == Status::Ok || row.status.is_not_judged(),
+        "{integrator:?}: {}",
+        row.status
+    );
     let drift = energy_drift(&history);
     const PERIOD: f64 = 0.02;
     let of = |period: usize| {
@@ -195,14 +199,14 @@ fn means(stepping: Stepping) -> Vec<f64> {
 
 #[test]
 fn usf_gains_energy_in_every_period_and_centred_differences_and_usl_do_not() {
-    let usf = means(Stepping::Usf);
+    let usf = means(Integrator::Usf);
     assert!(usf.windows(2).all(|pair| pair[1] > pair[0] + 0.1), "{usf:?}");
     assert!(usf[9] > 3.0, "{usf:?}");
     // They take up a share that belongs to the grid, not to the time step, and keep it: 16 % on 12 cells.
-    for stepping in [Stepping::Cd(Start::Halved), Stepping::Usl] {
-        let means = means(stepping);
-        assert!(means.iter().all(|mean| mean.abs() < 0.2), "{stepping:?} {means:?}");
+    for integrator in [Integrator::Cd, Integrator::Usl] {
+        let means = means(integrator);
+        assert!(means.iter().all(|mean| mean.abs() < 0.2), "{integrator:?} {means:?}");
         let late = (means[4] - means[9]).abs();
-        assert!(late < 0.01, "{stepping:?} {means:?}");
+        assert!(late < 0.01, "{integrator:?} {means:?}");
     }
 }

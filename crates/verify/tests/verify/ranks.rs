@@ -6,8 +6,8 @@ use hand_coded::{AxisAligned, Coded, FreeSheet, Plane, Ring};
 use mmsmith_ranks::in_process;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Arithmetic, Case, Extent, GridPose, Outputs, Placement, Row, Scheme, Shape, Snapshot, Start,
-    Status, Stepping, Total, Transfer, Updated, run,
+    Arithmetic, Case, Extent, GridPose, Integrator, Outputs, Placement, Row, Scheme, Shape,
+    Snapshot, Status, Total, Transfer, Updated, run,
 };
 
 /// A row without what differs from run to run.
@@ -52,21 +52,21 @@ fn agrees<S: Plane + Clone>(solution: &S, case: &Case, counts: &[usize]) -> Row 
     alone
 }
 
-fn updated(shape: Shape, stepping: Stepping, transfer: Transfer) -> Scheme {
+fn updated(shape: Shape, integrator: Integrator, transfer: Transfer) -> Scheme {
     let placement = Updated::default().placement;
-    Scheme::Updated(Updated { shape, stepping, transfer, placement })
+    Scheme::Updated(Updated { shape, integrator, transfer, placement, ..Updated::default() })
 }
 
-const CD: Stepping = Stepping::Cd(Start::Halved);
+const CD: Integrator = Integrator::Cd;
 
 #[test]
 fn errors_and_histories_have_the_bits_of_one_process() {
     let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(2)];
     let shapes = [Shape::Gimp, Shape::Bspline2, Shape::Cpdi, Shape::Cpdi2, Shape::Linear];
-    let steppings = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl];
+    let integrators = [CD, Integrator::Usl, Integrator::Usf, Integrator::Musl];
     for (n, shape) in shapes.into_iter().enumerate() {
         for (m, transfer) in transfers.into_iter().enumerate() {
-            let scheme = updated(shape, steppings[(n + m) % 4], transfer);
+            let scheme = updated(shape, integrators[(n + m) % 4], transfer);
             // 64 cells are 9 bins.
             let case = Case { scheme, cells: 64, periods: 0.03, ..Case::default() };
             agrees(&AxisAligned::default(), &case, &[2, 4]);
@@ -89,8 +89,8 @@ fn errors_and_histories_have_the_bits_of_one_process() {
 #[test]
 fn a_body_with_free_sides_has_the_bits_of_one_process() {
     for (n, shape) in Shape::ALL.into_iter().enumerate() {
-        let stepping = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl][n % 4];
-        let scheme = updated(shape, stepping, Transfer::Flip);
+        let integrator = [CD, Integrator::Usl, Integrator::Usf, Integrator::Musl][n % 4];
+        let scheme = updated(shape, integrator, Transfer::Flip);
         let case = Case { scheme, cells: 48, periods: 0.3, cfl: 0.3, ..Case::default() };
         let row = agrees(&FreeSheet { A: 0.1 }, &case, &[2, 5]);
         assert!(row.status == Status::Ok && row.errors.u.linf < 2e-2, "{row:?}");
@@ -99,7 +99,7 @@ fn a_body_with_free_sides_has_the_bits_of_one_process() {
 
 #[test]
 fn a_run_that_fails_is_told_alike_by_all() {
-    let scheme = updated(Shape::Linear, Stepping::Usl, Transfer::Flip);
+    let scheme = updated(Shape::Linear, Integrator::Usl, Transfer::Flip);
     let case = Case { scheme, cells: 64, cfl: 1.9, ..Case::default() };
     let row = agrees(&AxisAligned::default(), &case, &[2, 6]);
     assert!(matches!(row.status, Status::Stopped(_) | Status::Unstable { .. }), "{row:?}");
@@ -108,15 +108,17 @@ fn a_run_that_fails_is_told_alike_by_all() {
 #[test]
 fn clipped_particles_have_the_bits_of_one_process() {
     let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(2)];
-    for (n, stepping) in [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl].into_iter().enumerate()
+    for (n, integrator) in
+        [CD, Integrator::Usl, Integrator::Usf, Integrator::Musl].into_iter().enumerate()
     {
         let moved = GridPose { angle: 17.0, shift: 0.3 };
         for (m, pose) in [GridPose::default(), moved].into_iter().enumerate() {
             let updated = Updated {
                 shape: [Shape::Cpdi2, Shape::Bspline2, Shape::Bspline3][(n + m) % 3],
-                stepping,
+                integrator,
                 transfer: transfers[(n + 2 * m) % 3],
                 placement: Placement::Clipped { offset: 0.29, pose },
+                ..Updated::default()
             };
             let scheme = Scheme::Updated(updated);
             let case = Case { scheme, cells: 64, periods: 0.02, ..Case::default() };

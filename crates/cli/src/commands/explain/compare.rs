@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 use mmsmith_verify::{
-    Case, CostModel, Discretized, Integrator, Outputs, Parts, Scheme, Shape, Status, median,
+    Case, CostModel, Discretized, Formulation, Integrator, MassMatrix, Outputs, Scheme, Shape,
+    Status, median,
 };
 use serde::Serialize;
 
-use crate::arguments::{Frame, HighDegree, Mass, SchemeOptions, Weights};
+use crate::arguments::{HighDegree, SchemeOptions, Weights};
 use crate::commands::predict;
 use crate::commands::problem::Model;
 use crate::commands::scheme::Settled;
@@ -132,7 +133,7 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     let (cd, usl, musl) = (Integrator::Cd, Integrator::Usl, Integrator::Musl);
     let all = if mmsmith_verify::needs_total_frame(&model.exact).is_none() {
         let total = SchemeOptions {
-            frame: Some(Frame::Total),
+            formulation: Some(Formulation::Total),
             cfl: Some(0.2),
             ..said(Shape::Bspline3, cd)
         };
@@ -144,7 +145,7 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
             total,
         ]
     } else {
-        let lumped = SchemeOptions { mass: Some(Mass::Lumped), ..said(Shape::Bspline3, cd) };
+        let lumped = SchemeOptions { mass: Some(MassMatrix::Lumped), ..said(Shape::Bspline3, cd) };
         vec![
             said(Shape::Bspline2, cd),
             said(Shape::Bspline3, cd),
@@ -155,9 +156,9 @@ fn schemes(model: &Model) -> Result<Vec<(String, Case)>> {
     };
     let told = |options: &SchemeOptions| {
         let case = Settled::settle(options, &model.exact)?.case;
-        let Parts { shape, integrator, .. } = case.scheme.parts();
+        let shape = case.scheme.shape();
         let mut words = match case.scheme {
-            Scheme::Updated(_) => format!("{shape} + {integrator}"),
+            Scheme::Updated(updated) => format!("{shape} + {}", updated.integrator),
             Scheme::Total(_) => format!("{shape}, total Lagrangian"),
         };
         if options.mass.is_some() {

@@ -10,6 +10,7 @@ use crate::arguments::TradeoffOptions;
 use crate::commands::tradeoff::{Swept, sweep};
 use crate::json::Output;
 use crate::progress::Agenda;
+use crate::report::{Files, Form};
 use crate::terminal;
 
 /// Measures both problems for `budget` seconds each and writes their data into the folders of `out`.
@@ -22,39 +23,36 @@ pub(super) fn section(out: &Path, budget: f64, agenda: &Agenda) -> Result<Sectio
     let mut section = Section::new("cost", "Speed against accuracy", &said);
     for problem in PROBLEMS {
         let folder = out.join(problem);
-        let file = |name: &str| Output::prepare(&folder.join(name));
-        let [json, csv, plot, advice] =
-            ["tradeoff.json", "tradeoff.csv", "tradeoff.svg", "tradeoff.md"].map(file);
-        let (json, csv, plot, advice) = (json?, csv?, plot?, advice?);
+        let files = Files::of_stem(&folder, "tradeoff", &[Form::Json, Form::Csv, Form::Plot])?;
+        let advice = Output::prepare(&folder.join("tradeoff.md"))?;
         let mut options = TradeoffOptions::usual(problem, budget);
         options.parameters.set = study_parameters(&[]);
-        let Swept::All(report) = sweep(&options, &agenda.next(budget))? else {
+        let Swept::All(found) = sweep(&options, &agenda.next(budget))? else {
             bail!("the report needs the whole sweep, not a shard's part of it");
         };
-        let (svg, front) = (report.picture(), report.front());
+        let (report, front) = (found.report()?, found.front());
         let said = format!("\n{problem}: the front of error against cost\n{}", front.text());
         agenda.aside(|| terminal::say(&said))?;
-        json.write(&report.document()?)?;
-        csv.write_text(&report.sheet().csv()?)?;
-        plot.write_text(&svg)?;
-        advice.write_text(&report.advice())?;
+        let svg = report.plot();
+        report.write(files)?;
+        advice.write_text(&found.advice())?;
         section.heading(problem);
         section.figures(&[(
             svg,
             format!("{problem}/tradeoff.svg"),
             format!(
                 "{} settings of {problem}; red: the front, to which no other is both cheaper and more accurate. {}",
-                report.settings(),
-                report.definition()
+                found.runs(),
+                found.definition()
             ),
         )]);
         section.table(&front, &format!("{problem}: the front, from cheap to dear"));
         section.table(
-            &report.costs(),
+            &found.costs(),
             &format!("{problem}: seconds to each error, by the cheapest setting of each kind"),
         );
-        section.list("Advice", &report.sentences());
-        section.list("What each setting buys, the others being equal", &report.main_effects());
+        section.list("Advice", &found.sentences());
+        section.list("What each setting buys, the others being equal", &found.main_effects());
         section.files(problem, "tradeoff", &["json", "csv", "svg", "md"]);
     }
     Ok(section)

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Case, Moment, Outputs, Row, Shape, Status, Stepping, energy_drift};
+use mmsmith_verify::{Case, Integrator, Moment, Outputs, Row, Shape, Status, energy_drift};
 use serde_json::json;
 
 use super::section::Section;
@@ -19,15 +19,15 @@ use crate::table::Table;
 
 const CELLS: usize = 16;
 const PERIODS: f64 = 10.0;
-const STEPPINGS: [Stepping; 4] = [CD, Stepping::Usl, Stepping::Usf, Stepping::Musl];
+const INTEGRATORS: [Integrator; 4] = [CD, Integrator::Usl, Integrator::Usf, Integrator::Musl];
 
-fn case(stepping: Stepping) -> Case {
-    Case { periods: PERIODS, ..usual(Shape::Gimp, stepping, CELLS) }
+fn case(integrator: Integrator) -> Case {
+    Case { periods: PERIODS, ..usual(Shape::Gimp, integrator, CELLS) }
 }
 
 /// The runs of a problem.
-pub(super) fn cases() -> [Case; STEPPINGS.len()] {
-    STEPPINGS.map(case)
+pub(super) fn cases() -> [Case; INTEGRATORS.len()] {
+    INTEGRATORS.map(case)
 }
 
 /// Runs both problems with every integrator and writes the histories into the folders of `out`.
@@ -46,9 +46,9 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
         let mut curves = Vec::new();
         let header = ["scheme", "least", "largest", "at the end", "momentum", "status"];
         let mut table = Table::new(1, header);
-        for stepping in STEPPINGS {
-            let scheme = (Shape::Gimp, stepping);
-            let base = case(stepping);
+        for integrator in INTEGRATORS {
+            let scheme = (Shape::Gimp, integrator);
+            let base = case(integrator);
             let known = Problem::of(selection.clone(), base)?;
             let cases = known.model.admit(&[base])?;
             let [one] = cases.as_slice() else { bail!("a run has one case") };

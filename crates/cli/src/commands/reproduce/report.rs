@@ -241,8 +241,8 @@ fn files(results: &Results) -> String {
     let schemes = schemes.chain(DIFFERENCES.map(|one| ("differences", one)));
     let gentle = DIFFERENCES.map(|one| ("gentle", one)).into_iter();
     let gentle = gentle.filter(|_| problem == PROBLEMS[0]);
-    for (kind, (shape, stepping)) in schemes.chain(gentle) {
-        stems.push(format!("{kind}-{shape}-{stepping}"));
+    for (kind, (shape, integrator)) in schemes.chain(gentle) {
+        stems.push(format!("{kind}-{shape}-{integrator}"));
     }
     let mut text = format!(
         "<h3>Files</h3>\n<ul>\n<li>particles of gimp+cd: <a href=\"{problem}/particles/{problem}.pvd\">{problem}.pvd</a></li>\n"

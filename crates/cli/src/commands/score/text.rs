@@ -7,12 +7,13 @@ use mmsmith_verify::{
 use crate::arguments::ScoreOptions;
 use crate::library::Selection;
 use crate::number;
+use crate::report::Section;
 use crate::table::{self, Table};
 use crate::units::{Units, with_unit};
 
 /// Recordings compared with each other.
-pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> String {
-    let mut text = format!("{} ({})\n", selection.name(), selection.told_parameters());
+pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> Vec<Section> {
+    let mut text = String::new();
     for row in &compared.rows {
         text += &format!(
             "{} and {}: {} particles, {} frame(s) at the same times\n",
@@ -25,6 +26,7 @@ pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> S
     fields.sort_unstable();
     fields.dedup();
     let units = Units::of(selection);
+    let mut sections = vec![Section::Note(text)];
     for field in fields {
         let mut table = Table::new(0, ["dt", "linf", "rate", "l2", "rate", "l1", "rate", "status"]);
         for (index, row) in compared.rows.iter().enumerate() {
@@ -40,38 +42,40 @@ pub(super) fn of_differences(selection: &Selection, compared: &Differences) -> S
             table.row(line);
         }
         let table = table.with_unit(&["dt"], units.map(Units::time));
-        text += &format!("\ndifference of {}\n{}", named(field, units), table.text());
+        sections.push(Section::Table(format!("difference of {}", named(field, units)), table));
     }
-    text
+    sections
 }
 
-pub(super) fn text(selection: &Selection, score: &Score) -> String {
-    let mut text = format!("{} ({})\n", selection.name(), selection.told_parameters());
-    for row in &score.rows {
-        text += &heading(row);
-    }
+/// The line on a solution.
+pub(super) fn caption(selection: &Selection) -> String {
+    format!("{} ({})\n", selection.name(), selection.told_parameters())
+}
+
+/// Recordings against the exact solution.
+pub(super) fn of_score(selection: &Selection, score: &Score) -> Vec<Section> {
     let units = Units::of(selection);
-    match &score.orders {
-        None => text += &score.rows.iter().map(|row| errors(row, units)).collect::<String>(),
-        Some(_) => {
-            let tables = tables(score).into_iter();
-            let mut tables: Vec<(Quantity, Table)> = tables
-                .map(|(field, table)| (field, table.with_unit(&["h"], units.map(Units::length))))
-                .collect();
-            table::align(&mut tables);
-            for (field, table) in &tables {
-                text += &format!("\nerror of {}\n{}", named(*field, units), table.text());
-            }
-            text += &integrated(score).unwrap_or_default();
-            let has = "A wider terminal and --json have them.";
-            text += &table::on_left_out(tables.iter().map(|(_, table)| table), has);
-        }
+    let mut text: String = score.rows.iter().map(heading).collect();
+    if score.orders.is_none() {
+        text.extend(score.rows.iter().map(|row| errors(row, units)));
+        return vec![Section::Note(text)];
     }
-    text
+    let mut tables: Vec<(Quantity, Table)> = tables(score)
+        .into_iter()
+        .map(|(field, table)| (field, table.with_unit(&["h"], units.map(Units::length))))
+        .collect();
+    table::align(&mut tables);
+    let titled =
+        |(field, table)| Section::Table(format!("error of {}", named(field, units)), table);
+    let mut sections = vec![Section::Note(text)];
+    sections.extend(tables.into_iter().map(titled));
+    sections.extend(integrated(score));
+    sections.push(Section::LeftOut("A wider terminal and --json have them."));
+    sections
 }
 
 /// The errors integrated over the elements of meshes; nothing where there are none.
-fn integrated(score: &Score) -> Option<String> {
+fn integrated(score: &Score) -> Option<Section> {
     let orders = score.integrated_orders.as_ref()?;
     let mut table = Table::new(0, ["cells", "h", "l2", "rate", "h1", "rate"]);
     for (index, row) in score.rows.iter().enumerate() {
@@ -87,7 +91,7 @@ fn integrated(score: &Score) -> Option<String> {
     let fit = |order: &Order| [String::new(), table::rate(order.fit)];
     let label = ["fit in h".to_owned(), String::new()];
     table.row(label.into_iter().chain(fit(&orders.l2)).chain(fit(&orders.h1)));
-    Some(format!("\nerror of u over the elements, and of its gradient (h1)\n{}", table.text()))
+    Some(Section::Table("error of u over the elements, and of its gradient (h1)".into(), table))
 }
 
 /// A field with the unit of its errors, where it is known.
@@ -184,7 +188,7 @@ pub(super) fn of_agreement(
     options: &ScoreOptions,
     row: &ScoreRow,
     agreement: &Agreement,
-) -> String {
+) -> Section {
     let header = ["error", "linf", "mms", "digits", "l2", "mms", "digits", "l1", "mms", "digits"];
     let mut table = Table::new(1, header).sparing(7..10);
     for (field, digits) in &agreement.digits {
@@ -196,12 +200,12 @@ pub(super) fn of_agreement(
         table.row(line);
     }
     let scheme = options.against.map(|(shape, integrator)| format!("{shape} + {integrator}"));
-    format!(
-        "\n{} beside mms, {}, {} steps of dt = {}\n{}",
+    let title = format!(
+        "{} beside mms, {}, {} steps of dt = {}",
         row.file,
         scheme.unwrap_or_default(),
         agreement.run.steps,
-        number::rounded(agreement.run.dt, 4),
-        table.text()
-    )
+        number::rounded(agreement.run.dt, 4)
+    );
+    Section::Table(title, table)
 }

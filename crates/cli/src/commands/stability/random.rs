@@ -1,7 +1,7 @@
 //! Failures inside the region believed stable, looked for by random settings.
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Case, CflSpeed, Criteria, Discretized, GridPose, Observed, is_stable};
+use mmsmith_verify::{Case, CflSpeed, Criteria, Discretized, Named, Observed, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ use crate::commands::problem::Problem;
 use crate::commands::study::{Show, Study, conduct};
 use crate::keep::Order;
 use crate::library::Selection;
-use crate::report::{Form, Report, Section};
+use crate::report::{Report, Section};
 
 /// Draws for one setting; the specification may refuse some.
 const MOST_DRAWS: usize = 100;
@@ -30,7 +30,7 @@ pub(super) fn search(options: &StabilityOptions, criteria: &Criteria) -> Result<
         cases.push(problem.model.discretized(&problem.settled.case)?);
     }
     let study = RandomSettings { options, criteria, common, points: &points, cases };
-    conduct(&study, &request(options, &[(Form::Json, &options.scheme.json)]))
+    conduct(&study, &request(options))
 }
 
 /// Runs of random settings.
@@ -152,36 +152,22 @@ fn draw(options: &StabilityOptions, common: &Problem, sample: usize) -> Result<P
 /// The command line that repeats a setting.
 fn command(options: &StabilityOptions, problem: &Problem) -> String {
     let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent } = problem.settled.case;
-    let parts = scheme.parts();
     let mut text = format!(
-        "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --offset {:?} --shape {} --integrator {} --start {} \
-         --transfer {} --layout {} --periods {periods:?} --precision {} --error-multiple {:?} --energy-rate {:?}",
+        "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --periods {periods:?} --precision {} --error-multiple {:?} \
+         --energy-rate {:?}",
         options.name,
-        parts.offset,
-        parts.shape,
-        parts.integrator,
-        parts.start,
-        parts.transfer,
-        parts.layout,
         word(problem.settled.precision),
         options.error_multiple,
         options.energy_rate,
     );
-    if !parts.pose.is_usual() {
-        let GridPose { angle, shift } = parts.pose;
-        text += &format!(" --grid-angle {angle:?} --grid-shift {shift:?}");
-    }
-    if scheme.total().is_some() {
-        text += &format!(
-            " --formulation total-lagrangian --mass {} --composition {} --grid {}",
-            parts.mass, parts.composition, parts.grid
-        );
+    for (name, value) in scheme.choices() {
+        text += &format!(" --{name} {value}");
     }
     if cfl_speed != CflSpeed::Bar {
-        text += &format!(" --cfl-speed {cfl_speed}");
+        text += &format!(" --cfl-speed {}", cfl_speed.name());
     }
     if let Some(extent) = extent {
-        text += &format!(" --extent {extent}");
+        text += &format!(" --extent {}", extent.name());
     }
     for (name, value) in problem.selection.parameters() {
         text += &format!(" --set {name}={value:?}");

@@ -2,9 +2,10 @@
 
 use anyhow::{Context, Error, Result, bail};
 use clap::ValueEnum;
+use mmsmith_verify::{Named, names};
 
 use super::Point;
-use crate::arguments::{Precision, SchemeOptions, StabilityOptions, Start};
+use crate::arguments::{Precision, SchemeOptions, StabilityOptions};
 use crate::library::Selection;
 
 /// Draft of a point, while settings are put into it.
@@ -71,7 +72,7 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
         "precision" => scheme.precision = word::<Precision>(text)?,
         "shape" => scheme.shape = Some(text.parse().map_err(Error::msg)?),
         "integrator" => scheme.integrator = text.parse()?,
-        "start" => scheme.start = word::<Start>(text)?,
+        "start" => scheme.start = named(text)?,
         "units" => {
             let power = text.parse::<i32>().ok().filter(|power| power.abs() <= 100);
             let power =
@@ -84,6 +85,10 @@ fn put(draft: &mut Draft, name: &str, text: &str) -> Result<()> {
         }
     }
     Ok(())
+}
+
+fn named<N: Named>(text: &str) -> Result<N> {
+    N::named(text).with_context(|| format!("'{text}' is none of {}", names::<N>()))
 }
 
 fn word<V: ValueEnum>(text: &str) -> Result<V> {

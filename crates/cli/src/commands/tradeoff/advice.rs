@@ -2,11 +2,12 @@
 
 use mmsmith_verify::{Entry, TOLERANCES};
 
-use super::{Report, words};
+use super::measured::Measured;
+use super::words;
 use crate::table::Table;
 use crate::{machine, number};
 
-impl Report<'_> {
+impl Measured<'_> {
     /// The page, in Markdown.
     pub(in crate::commands) fn advice(&self) -> String {
         let mut text = format!(

@@ -1,5 +1,8 @@
 use std::sync::{Mutex, PoisonError};
 
+use mmsmith_verify::Entry;
+
+use super::measured::MAIN_EFFECTS;
 use super::*;
 
 /// Seconds that a step of a particle counts, and a run beside its steps. No machine is as slow, so that a sweep of minutes
@@ -45,10 +48,10 @@ impl Counted {
     }
 }
 
-fn sweep_of(options: &TradeoffOptions) -> Report<'_> {
+fn sweep_of(options: &TradeoffOptions) -> Measured<'_> {
     let bar = Bar::new("planning");
     match sweep_in(options, Time::Counted(Counted::default()), &bar).expect("a sweep") {
-        Swept::All(report) => *report,
+        Swept::All(report) => report,
         Swept::Part(part) => panic!("{part}"),
     }
 }
@@ -65,7 +68,7 @@ fn a_sweep_keeps_its_budget_and_its_promises() {
     let chosen = report.found.for_tolerance.as_ref().expect("a setting");
     assert_eq!(chosen.proof.errors, report.found.entries[chosen.entry].row.errors);
 
-    let text = report.text();
+    let text = report.report().expect("a report").text();
     assert!(text.contains("run once more") && text.contains("it holds"), "{text}");
     assert!(!text.contains("knob"), "{text}");
     let main = report.main_effects();
@@ -73,13 +76,13 @@ fn a_sweep_keeps_its_budget_and_its_promises() {
     assert!(report.effects().len() > MAIN_EFFECTS);
     assert!(main.iter().all(|line| text.contains(line)));
     assert!(text.contains(" largest of "), "{text}");
-    let document = report.document().expect("a document");
+    let document = report.report().map(|report| report.document()).expect("a document");
     assert_eq!(document["knobs"], json!(report.effects()));
     assert_eq!(document["effects"].as_array().map(Vec::len), Some(report.found.effects.len()));
     let advice = report.advice();
     assert!(advice.contains("## What accuracy costs"), "{advice}");
     assert!(advice.contains("For an error of 1e-2 take"), "{advice}");
-    assert!(report.picture().contains("class=\"pareto\""));
+    assert!(report.report().expect("a report").plot().contains("class=\"pareto\""));
     // The same again: nothing depends on what else the machine does.
     let again = sweep_of(&options).found;
     let settings = |found: &Tradeoff| found.entries.iter().map(|e| e.setting).collect::<Vec<_>>();

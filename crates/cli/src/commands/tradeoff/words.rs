@@ -1,16 +1,12 @@
 //! Settings of a sweep in words: for people, for JSON, and as options of `mms run`.
 
 use mmsmith_verify::{
-    Coordinates, Effect, Entry, Layout, MassMatrix, Parts, Placement, Range, Scheme, Setting,
-    SettingName, Stepping, TimeEffect, Transfer, Updated,
+    Coordinates, Effect, Entry, Integrator, Layout, MassMatrix, Named, Placement, Range, Scheme,
+    Setting, SettingName, TimeEffect, Transfer, Updated,
 };
 use serde_json::{Value, json};
 
 use crate::number;
-
-fn parts(setting: &Setting) -> Parts {
-    setting.case.scheme.parts()
-}
 
 fn precision(setting: &Setting) -> &'static str {
     if setting.single { "f32" } else { "f64" }
@@ -18,34 +14,37 @@ fn precision(setting: &Setting) -> &'static str {
 
 /// Kind of a setting, by which it is drawn and tabulated: the weights, the formulation, and whether particles fit the body.
 pub(super) fn kind(setting: &Setting) -> String {
-    let Parts { shape, layout, .. } = parts(setting);
-    match setting.case.scheme {
+    let scheme = &setting.case.scheme;
+    let shape = scheme.shape();
+    match scheme {
         Scheme::Total(_) => format!("{shape}, total Lagrangian"),
         Scheme::Updated(Updated { placement: Placement::Lattice { .. }, .. }) => shape,
-        Scheme::Updated(_) => format!("{shape}, {layout}"),
+        Scheme::Updated(updated) => format!("{shape}, {}", updated.placement.name()),
     }
 }
 
 /// The scheme: everything but grid and time step.
 pub(super) fn scheme(setting: &Setting) -> String {
-    let Parts { shape, integrator, transfer, composition, mass, layout, .. } = parts(setting);
+    let scheme = &setting.case.scheme;
+    let shape = scheme.shape();
     let mut told = Vec::new();
-    match setting.case.scheme {
-        Scheme::Updated(updated) => {
+    match scheme {
+        Scheme::Updated(Updated { integrator, transfer, .. }) => {
             told.push(format!("{shape} + {integrator}"));
-            if updated.transfer != Transfer::Flip {
-                told.push(transfer);
+            if *transfer != Transfer::Flip {
+                told.push(transfer.to_string());
             }
         }
         Scheme::Total(total) => {
-            told.push(format!("{shape}, total Lagrangian, order {composition} in time"));
+            let order = total.composition.order();
+            told.push(format!("{shape}, total Lagrangian, order {order} in time"));
             if total.mass == MassMatrix::Lumped {
-                told.push(format!("{mass} mass"));
+                told.push(format!("{} mass", total.mass.name()));
             }
         }
     }
-    if !is_lattice(&setting.case.scheme) {
-        told.push(layout.into());
+    if !is_lattice(scheme) {
+        told.push(scheme.layout().into());
     }
     told.push(format!("ppc {}", setting.case.per_cell));
     if setting.single {
@@ -73,28 +72,31 @@ pub(super) fn line(setting: &Setting) -> String {
 /// The options of `mms run` that run a setting.
 pub(super) fn options(setting: &Setting) -> String {
     let case = &setting.case;
-    let Parts { shape, integrator, transfer, composition, mass, layout, grid, .. } = parts(setting);
-    let mut text = format!("--cells {} --shape {shape}", case.cells);
+    let mut text = format!("--cells {} --shape {}", case.cells, case.scheme.shape());
     match case.scheme {
-        Scheme::Updated(updated) => {
-            if !matches!(updated.stepping, Stepping::Cd(_)) {
+        Scheme::Updated(Updated { integrator, transfer, .. }) => {
+            if integrator != Integrator::Cd {
                 text += &format!(" --integrator {integrator}");
             }
-            if updated.transfer != Transfer::Flip {
+            if transfer != Transfer::Flip {
                 text += &format!(" --transfer {transfer}");
             }
         }
-        Scheme::Total(_) => {
+        Scheme::Total(total) => {
             text += &format!(
-                " --formulation total-lagrangian --mass {mass} --composition {composition}"
+                " --formulation total-lagrangian --mass {} --composition {}",
+                total.mass.name(),
+                total.composition.order()
             );
         }
     }
     if !is_lattice(&case.scheme) {
-        text += &format!(" --layout {layout}");
+        text += &format!(" --layout {}", case.scheme.layout());
     }
-    if case.scheme.total().is_some_and(|total| total.coordinates != Coordinates::Cartesian) {
-        text += &format!(" --grid {grid}");
+    if let Some(total) = case.scheme.total()
+        && total.coordinates != Coordinates::Cartesian
+    {
+        text += &format!(" --grid {}", total.coordinates.name());
     }
     text += &format!(" --ppc {} --cfl {}", case.per_cell, case.cfl);
     if setting.single {
@@ -105,23 +107,18 @@ pub(super) fn options(setting: &Setting) -> String {
 
 /// The scheme as it is written to JSON, in the words of the options.
 pub(super) fn document(setting: &Setting) -> Value {
-    let (case, parts) = (&setting.case, parts(setting));
-    json!({
-        "frame": parts.frame,
-        "shape": parts.shape,
-        "integrator": parts.integrator,
-        "mass": parts.mass,
-        "composition": parts.composition,
-        "layout": parts.layout,
-        "grid": parts.grid,
-        "transfer": parts.transfer,
-        "start": parts.start,
-        "ppc": case.per_cell,
-        "cfl_asked": case.cfl,
-        "cfl_speed": case.cfl_speed.to_string(),
-        "precision": precision(setting),
-        "threads": setting.threads,
-    })
+    let case = &setting.case;
+    let mut document = json!(case.scheme);
+    for (name, value) in [
+        ("ppc", json!(case.per_cell)),
+        ("cfl_asked", json!(case.cfl)),
+        ("cfl_speed", json!(case.cfl_speed.name())),
+        ("precision", json!(precision(setting))),
+        ("threads", json!(setting.threads)),
+    ] {
+        document[name] = value;
+    }
+    document
 }
 
 /// Effect of the change of a setting.
@@ -131,14 +128,20 @@ pub(super) fn effect(effect: &Effect, from: &Entry, to: &Entry) -> String {
         SettingName::Cells => format!("{} cells", setting.case.cells),
         SettingName::Cfl => format!("CFL {}", setting.case.cfl),
         SettingName::Ppc => format!("ppc {}", setting.case.per_cell),
-        SettingName::Shape => parts(setting).shape,
+        SettingName::Shape => setting.case.scheme.shape(),
         SettingName::Integrator => match setting.case.scheme {
-            Scheme::Updated(_) => parts(setting).integrator,
-            Scheme::Total(_) => format!("order {} in time", parts(setting).composition),
+            Scheme::Updated(updated) => updated.integrator.to_string(),
+            Scheme::Total(total) => format!("order {} in time", total.composition.order()),
         },
-        SettingName::Transfer => parts(setting).transfer,
-        SettingName::Layout => parts(setting).layout.to_owned(),
-        SettingName::Mass => format!("{} mass", parts(setting).mass),
+        SettingName::Transfer => {
+            let updated = setting.case.scheme.updated();
+            updated.map_or(Transfer::Flip, |updated| updated.transfer).to_string()
+        }
+        SettingName::Layout => setting.case.scheme.layout().to_owned(),
+        SettingName::Mass => {
+            let total = setting.case.scheme.total();
+            format!("{} mass", total.map_or(MassMatrix::Lumped, |total| total.mass).name())
+        }
         SettingName::Precision => precision(setting).to_owned(),
         SettingName::Threads => number::counted(setting.threads, "thread"),
     };

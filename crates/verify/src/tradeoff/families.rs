@@ -1,0 +1,89 @@
+//! Families of schemes that may fit a solution.
+
+use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
+use mmsmith_mpm::{Integrator, Shape, Transfer};
+
+use super::{LADDER, Setting};
+use crate::case::Case;
+use crate::discretized::Plan;
+use crate::scheme::{Placement, Scheme, Total, Updated};
+
+/// The families that may fit a solution, in the order in which they are tried; those that do not fit it are left out.
+/// `base` says the periods, the extent and the speed of CFL numbers, and the CFL number to begin with.
+#[must_use]
+pub fn families(
+    base: &Setting,
+    more_threads: Option<usize>,
+    has_single: bool,
+    plan: &dyn Fn(&Setting) -> Option<Plan>,
+) -> Vec<Setting> {
+    let mut all = Vec::new();
+    let with = |scheme: Scheme, per_cell: usize| Setting {
+        case: Case { scheme, per_cell, ..base.case },
+        ..*base
+    };
+    let square = Updated::default();
+    let fitted =
+        Updated { shape: Shape::Cpdi2, placement: Placement::BodyFitted, ..Updated::default() };
+    for usual in [square, fitted] {
+        let mut add = |scheme: Updated, per_cell| all.push(with(Scheme::Updated(scheme), per_cell));
+        add(usual, 2);
+        let shapes = [
+            Shape::Linear,
+            Shape::Ugimp,
+            Shape::Gimp,
+            Shape::Cpdi,
+            Shape::Cpdi2,
+            Shape::Bspline2,
+            Shape::Bspline3,
+        ];
+        for shape in shapes.into_iter().filter(|shape| *shape != usual.shape) {
+            add(Updated { shape, ..usual }, 2);
+        }
+        for integrator in [Integrator::Usl, Integrator::Usf, Integrator::Musl, Integrator::Usavg] {
+            add(Updated { integrator, ..usual }, 2);
+        }
+        for per_cell in [1, 3, 4] {
+            add(usual, per_cell);
+        }
+        add(Updated { shape: Shape::Bspline3, ..usual }, 4);
+        for transfer in [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)] {
+            add(Updated { transfer, ..usual }, 2);
+        }
+    }
+    if let Some(threads) = more_threads {
+        all.push(Setting { threads, ..with(Scheme::Updated(square), 2) });
+    }
+    if has_single {
+        for shape in [Shape::Gimp, Shape::Ugimp] {
+            let scheme = Scheme::Updated(Updated { shape, ..square });
+            all.push(Setting { single: true, ..with(scheme, 2) });
+        }
+    }
+    for coordinates in [Coordinates::Cartesian, Coordinates::Polar, Coordinates::Spherical] {
+        for degree in 2..=5 {
+            let lattice = Total { coordinates, ..Total::of_degree(degree) };
+            let gauss = Total { layout: Layout::Gauss, ..lattice };
+            let mut add = |scheme: Total, per_cell| all.push(with(Scheme::Total(scheme), per_cell));
+            for per_cell in [2, 3, 4] {
+                add(lattice, per_cell);
+            }
+            for per_cell in [degree - 1, degree, degree + 1] {
+                add(gauss, per_cell);
+            }
+            for composition in [Composition::Order2, Composition::Order4, Composition::Order6] {
+                if composition != gauss.composition {
+                    add(Total { composition, ..gauss }, degree);
+                }
+            }
+            let (mass, composition) = (MassMatrix::Lumped, Composition::Order2);
+            add(Total { mass, composition, ..lattice }, 2);
+        }
+    }
+    let fits = |setting: &Setting| {
+        let at = |cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
+        LADDER.iter().any(|&cells| plan(&at(cells)).is_some())
+    };
+    all.retain(fits);
+    all
+}
