@@ -9,11 +9,11 @@ use super::{Entry, Setting, median};
 use crate::scheme::{Placement, Scheme, Total, Updated};
 
 /// Shorter runs are not compared by their time.
-const LEAST_TIMED_S: f64 = 0.05;
+pub(super) const LEAST_TIMED_S: f64 = 0.05;
 /// Times that differ by no more than this share may do so by chance, however few timings there are.
 const SCATTER: f64 = 0.05;
 /// The most pairs of runs that an effect is told of, the finest ones.
-const MOST_PAIRS: usize = 3;
+pub(super) const MOST_PAIRS: usize = 3;
 /// Effects below this factor are not worth telling.
 const LEAST_EFFECT: f64 = 1.1;
 

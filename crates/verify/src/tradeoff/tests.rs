@@ -3,7 +3,12 @@ use std::cell::{Cell, RefCell};
 use mmsmith_measure::norms::{PerField, PerNorm};
 use proptest::prelude::*;
 
+use mmsmith_mpm::Shape;
+
+use super::effects::{LEAST_TIMED_S, MOST_PAIRS};
+use super::sweep::neighbours;
 use super::*;
+use crate::run::Status;
 
 /// A machine whose errors and times are formulas; its clock goes on by the times.
 struct Formula {
