@@ -424,7 +424,10 @@ impl<E> Sweep<'_, E> {
 }
 
 /// The setting on the next coarser and the next finer grid that fit.
-pub(super) fn neighbours(setting: &Setting, plan: &dyn Fn(&Setting) -> Option<Plan>) -> Vec<Setting> {
+pub(super) fn neighbours(
+    setting: &Setting,
+    plan: &dyn Fn(&Setting) -> Option<Plan>,
+) -> Vec<Setting> {
     let cells = setting.case.cells;
     let at = |cells| Setting { case: Case { cells, ..setting.case }, ..*setting };
     let fits = |&cells: &usize| plan(&at(cells)).is_some();
