@@ -49,14 +49,17 @@ mod composition;
 mod coordinates;
 mod fit;
 mod mass;
+mod set_up;
 mod simulation;
 mod solver;
+mod stress;
 
 pub use axis::{Axis, End, Layout};
 pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use coordinates::Coordinates;
-pub use simulation::{Grid, MassMatrix, Scheme, TotalLagrangian};
+pub use set_up::{Grid, MassMatrix, Scheme};
+pub use simulation::TotalLagrangian;
 pub use solver::SetUp;
 
 /// How many of so many numbers a thread takes at a time: four pieces for each thread, so that none waits long for the last, but not so few

@@ -7,7 +7,8 @@ use mmsmith_mpm::{
 use nalgebra::SVector;
 
 use crate::boundary::BoundaryData;
-use crate::simulation::{Grid, Scheme, TotalLagrangian};
+use crate::set_up::{Grid, Scheme};
+use crate::simulation::TotalLagrangian;
 
 /// A simulation in the total Lagrangian formulation, and its motion at time 0.
 pub struct SetUp<'a, const D: usize> {
