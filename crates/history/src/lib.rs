@@ -1,0 +1,30 @@
+//! Materials with memory along exact motions.
+//!
+//! Where the motion is known, so is the deformation gradient `F(X, t)` of each particle. Its internal variables `z` follow the rate
+//! equations of the law, an ordinary differential equation in time at fixed `X`, and their slopes in `X` follow the equation's derivative:
+//!
+//! ```text
+//! z' = g(F, F', z),    (z_,J)' = dg/dF : F_,J + dg/dF' : F'_,J + dg/dz . z_,J
+//! ```
+//!
+//! The body force that makes the motion exact is `b = a - Div P(F, z) / rho0`, by the chain rule. One generic function of a
+//! [`LawWithHistory`] gives rates and, by [`Dual`] numbers, their slopes. A host needs nothing but `b`: no source in its return map.
+//!
+//! [`Trajectory`] follows one particle. The solver's own laws are written by hand in `mmsmith-laws` and share no formula with these.
+
+#![allow(non_snake_case)]
+
+mod extrapolation;
+mod j2;
+mod law;
+mod number;
+mod tensor;
+mod trajectory;
+mod viscoelastic;
+
+pub use j2::{Hardening, J2, Overstress};
+pub use law::{Branch, Kinematics, LawWithHistory, Variable};
+pub use number::{Dual, Number};
+pub use tensor::{Tensor, determinant, identity};
+pub use trajectory::{Change, HistoryError, Motion, Trajectory, divergence};
+pub use viscoelastic::{Maxwell, Viscoelastic};

@@ -1,0 +1,186 @@
+//! Numbers that rates are computed with: doubles, and dual numbers over them.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A number with the operations that rates and stresses of laws need.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// A number that depends on nothing.
+    fn constant(value: f64) -> Self;
+    /// The value, without slopes.
+    fn value(self) -> f64;
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// The natural logarithm.
+    fn ln(self) -> Self;
+    /// The exponential function.
+    fn exp(self) -> Self;
+    /// A power with a constant exponent.
+    fn powf(self, exponent: f64) -> Self;
+    /// A multiple.
+    fn times(self, factor: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn value(self) -> f64 {
+        self
+    }
+
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+
+    fn ln(self) -> Self {
+        self.ln()
+    }
+
+    fn exp(self) -> Self {
+        self.exp()
+    }
+
+    fn powf(self, exponent: f64) -> Self {
+        self.powf(exponent)
+    }
+
+    fn times(self, factor: f64) -> Self {
+        self * factor
+    }
+}
+
+/// A number of type `N` with its slopes in `K` directions (forward mode; A. Griewank and A. Walther, "Evaluating Derivatives", 2nd ed.,
+/// chapter 3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dual<N, const K: usize> {
+    /// The number.
+    pub value: N,
+    /// Its slopes.
+    pub slopes: [N; K],
+}
+
+impl<N: Number, const K: usize> Dual<N, K> {
+    /// This number where a function has the value `value` and the slope `slope`.
+    fn of(self, value: N, slope: N) -> Self {
+        Self { value, slopes: self.slopes.map(|own| own * slope) }
+    }
+
+    fn with(self, other: Self, value: N, slope: impl Fn(N, N) -> N) -> Self {
+        let slopes = std::array::from_fn(|k| slope(self.slopes[k], other.slopes[k]));
+        Self { value, slopes }
+    }
+}
+
+impl<N: Number, const K: usize> Add for Dual<N, K> {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.with(other, self.value + other.value, |a, b| a + b)
+    }
+}
+
+impl<N: Number, const K: usize> Sub for Dual<N, K> {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self.with(other, self.value - other.value, |a, b| a - b)
+    }
+}
+
+impl<N: Number, const K: usize> Mul for Dual<N, K> {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let (x, y) = (self.value, other.value);
+        self.with(other, x * y, |a, b| a * y + x * b)
+    }
+}
+
+impl<N: Number, const K: usize> Div for Dual<N, K> {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        let quotient = self.value / other.value;
+        self.with(other, quotient, |a, b| (a - quotient * b) / other.value)
+    }
+}
+
+impl<N: Number, const K: usize> Neg for Dual<N, K> {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self { value: -self.value, slopes: self.slopes.map(|slope| -slope) }
+    }
+}
+
+impl<N: Number, const K: usize> Number for Dual<N, K> {
+    fn constant(value: f64) -> Self {
+        Self { value: N::constant(value), slopes: [N::constant(0.0); K] }
+    }
+
+    fn value(self) -> f64 {
+        self.value.value()
+    }
+
+    fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        self.of(root, N::constant(0.5) / root)
+    }
+
+    fn ln(self) -> Self {
+        self.of(self.value.ln(), N::constant(1.0) / self.value)
+    }
+
+    fn exp(self) -> Self {
+        let value = self.value.exp();
+        self.of(value, value)
+    }
+
+    fn powf(self, exponent: f64) -> Self {
+        let slope = self.value.powf(exponent - 1.0).times(exponent);
+        self.of(self.value.powf(exponent), slope)
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self {
+            value: self.value.times(factor),
+            slopes: self.slopes.map(|slope| slope.times(factor)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Slopes, and slopes of slopes, against differences.
+    #[test]
+    fn slopes_are_those_of_the_functions() {
+        fn f<N: Number>(x: N, y: N) -> N {
+            (x * y + x.sqrt()).ln() - (y / x).exp() * x.powf(1.3) - -y.times(3.0)
+        }
+        let (x, y, h) = (1.3, 0.7, 1e-5);
+        let dual = |value: f64, slopes: [f64; 2]| Dual { value, slopes };
+        let found = f(dual(x, [1.0, 0.0]), dual(y, [0.0, 1.0]));
+        let of_x = (f(x + h, y) - f(x - h, y)) / (2.0 * h);
+        let of_y = (f(x, y + h) - f(x, y - h)) / (2.0 * h);
+        assert!((found.slopes[0] - of_x).abs() < 1e-9 && (found.slopes[1] - of_y).abs() < 1e-9);
+        assert_eq!(found.value, f(x, y));
+        // The slope along x of the slope along y.
+        let nested = |value: f64, inner: f64, outer: f64| Dual {
+            value: Dual { value, slopes: [inner] },
+            slopes: [Dual { value: outer, slopes: [0.0] }],
+        };
+        let mixed = f(nested(x, 1.0, 0.0), nested(y, 0.0, 1.0)).slopes[0].slopes[0];
+        let slope_y = |x: f64| f(dual(x, [0.0; 2]), dual(y, [0.0, 1.0])).slopes[1];
+        assert!((mixed - (slope_y(x + h) - slope_y(x - h)) / (2.0 * h)).abs() < 1e-9);
+    }
+}
