@@ -107,7 +107,7 @@ fn extrapolated(
         if error.is_nan() {
             return None;
         }
-        if column >= 2 && error <= tolerance * size {
+        if column >= 1 && error <= tolerance * size {
             return Some(column + 1);
         }
     }

@@ -10,7 +10,7 @@
 //! The body force that makes the motion exact is `b = a - Div P(F, z) / rho0`, by the chain rule. One generic function of a
 //! [`LawWithHistory`] gives rates and, by [`Dual`] numbers, their slopes. A host needs nothing but `b`: no source in its return map.
 //!
-//! [`Trajectory`] follows one particle. The solver's own laws are written by hand in `mmsmith-laws` and share no formula with these.
+//! [`Trajectory`] follows one particle. A [`Table`] has the fields of a body, from trajectories at Chebyshev nodes. The solver's own laws are written by hand in `mmsmith-laws` and share no formula with these.
 
 #![allow(non_snake_case)]
 
@@ -18,6 +18,7 @@ mod extrapolation;
 mod j2;
 mod law;
 mod number;
+mod table;
 mod tensor;
 mod trajectory;
 mod viscoelastic;
@@ -25,6 +26,7 @@ mod viscoelastic;
 pub use j2::{Hardening, J2, Overstress};
 pub use law::{Branch, Kinematics, LawWithHistory, Variable};
 pub use number::{Dual, Number};
+pub use table::{AtPoint, Grid, Series, Table};
 pub use tensor::{Tensor, determinant, identity};
 pub use trajectory::{Change, HistoryError, Motion, Trajectory, divergence};
 pub use viscoelastic::{Maxwell, Viscoelastic};

@@ -68,39 +68,36 @@ pub(crate) fn inverse<N: Number>(A: &Tensor<N>) -> Tensor<N> {
     tensor(|i, j| cofactor(A, j, i) * reciprocal)
 }
 
-/// Gauss's rule on the interval from 0 to 1: points and weights.
-const GAUSS: [[f64; 2]; 8] = [
-    [0.019_855_071_751_231_884, 0.050_614_268_145_188_13],
-    [0.101_666_761_293_186_63, 0.111_190_517_226_687_23],
-    [0.237_233_795_041_835_5, 0.156_853_322_938_943_64],
-    [0.408_282_678_752_175_1, 0.181_341_891_689_181],
-    [0.591_717_321_247_825, 0.181_341_891_689_181],
-    [0.762_766_204_958_164_5, 0.156_853_322_938_943_64],
-    [0.898_333_238_706_813_4, 0.111_190_517_226_687_23],
-    [0.980_144_928_248_768_1, 0.050_614_268_145_188_13],
-];
-
 /// The logarithm of a symmetric positive tensor, by inverse scaling and squaring: square roots until the tensor is next to the identity,
-/// then `ln(I + X) = int_0^1 X (I + s X)^-1 ds` by Gauss's rule, which is the Pade approximant (N. J. Higham, "Functions of Matrices",
-/// SIAM (2008), chapter 11). Equal principal values are no special case, for slopes neither.
+/// then `ln(A) = 2 artanh(Y)`, `Y = (A - I)(A + I)^-1`, by its series (N. J. Higham, "Functions of Matrices", SIAM (2008), chapter 11).
+/// Equal principal values are no special case, for slopes neither.
 pub(crate) fn logarithm<N: Number>(A: &Tensor<N>) -> Tensor<N> {
-    /// Up to here the rule leaves less than rounding.
+    /// Up to here the series is short.
     const NEAR: f64 = 0.25;
     let mut root = *A;
-    let mut scale = 1.0;
+    let mut scale = 2.0;
     while distance_from_identity(&root) > NEAR && scale < 1e3 {
         root = square_root(&root);
         scale *= 2.0;
     }
     let one = identity::<N>();
     let X = tensor(|i, j| root[i][j] - one[i][j]);
-    let mut all = tensor(|_, _| N::constant(0.0));
-    for [at, weight] in GAUSS {
-        let shifted = tensor(|i, j| one[i][j] + X[i][j].times(at));
-        let term = product(&X, &inverse(&shifted));
-        all = tensor(|i, j| all[i][j] + term[i][j].times(weight * scale));
+    let Y = product(&X, &inverse(&sum(&root, &one)));
+    let square = product(&Y, &Y);
+    // The first power whose term is below rounding.
+    let size = (0..9).map(|k| Y[k / 3][k % 3].value().powi(2)).sum::<f64>().sqrt();
+    let mut terms = 1;
+    while size.powi(2 * terms) > 1e-18 && terms < 16 {
+        terms += 1;
     }
-    all
+    let of = |term: i32| 1.0 / f64::from(2 * term + 1);
+    let mut all = tensor(|i, j| one[i][j].times(of(terms)));
+    for term in (0..terms).rev() {
+        let next = product(&square, &all);
+        all = tensor(|i, j| next[i][j] + one[i][j].times(of(term)));
+    }
+    let all = product(&Y, &all);
+    tensor(|i, j| all[i][j].times(scale))
 }
 
 fn distance_from_identity<N: Number>(A: &Tensor<N>) -> f64 {

@@ -3,8 +3,8 @@
 #![allow(non_snake_case, clippy::unwrap_used)]
 
 use mmsmith_history::{
-    Branch, Dual, Hardening, J2, Kinematics, LawWithHistory, Maxwell, Tensor, Trajectory,
-    Viscoelastic, divergence,
+    Branch, Dual, Hardening, HistoryError, J2, Kinematics, LawWithHistory, Maxwell, Table, Tensor,
+    Trajectory, Viscoelastic, divergence,
 };
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -151,7 +151,6 @@ fn flow_keeps_the_yield_condition_and_the_volume() {
         assert!(found.changes.is_empty(), "{:?}", found.changes);
         for (t, z) in times(20).into_iter().zip(&found.states) {
             for residual in residuals(&law, &motion(t), z) {
-                println!("{t} {residual:e}");
                 assert!(residual < 1e-12, "{t}: {residual:e}");
             }
         }
@@ -268,5 +267,38 @@ fn stresses_of_maxwell_elements_relax() {
     let (_, without) = divergence(&elastic, &motion(0.5), &[]);
     for k in 0..9 {
         assert!((with[k / 3][k % 3] - without[k / 3][k % 3]).abs() < 1e-6);
+    }
+}
+
+/// The divergence of the stress and the plastic strain of a block that flows from the start, at some times.
+fn fields(law: &J2, X: [f64; 2], times: &[f64]) -> Result<Vec<Vec<f64>>, HistoryError> {
+    let motion = block(X, law.stretch_to_yield());
+    let found = Trajectory::new(law, &motion, &start(law), times, 1e-14)?;
+    let of = |(&t, z): (&f64, &Vec<Dual<f64, 2>>)| {
+        let ([x, y], _) = divergence(law, &motion(t), z);
+        [x, y, z[6].value]
+    };
+    let rows: Vec<[f64; 3]> = times.iter().zip(&found.states).map(of).collect();
+    Ok((0..3).map(|quantity| rows.iter().map(|row| row[quantity]).collect()).collect())
+}
+
+#[test]
+fn a_table_has_the_fields_of_trajectories_at_all_positions_and_times() {
+    let law = law(500.0, 1.0);
+    let (table, told) =
+        Table::fine([[0.0, 1.0]; 2], 1.0, 3e-13, |X, times| fields(&law, X, times)).unwrap();
+    println!("told {told:e}, tails {:?}", table.tails());
+    assert!(told < 1e-11, "{told:e}");
+    for k in 0..12 {
+        let X = [(0.17 + 0.618 * f64::from(k)).fract(), (0.53 + 0.755 * f64::from(k)).fract()];
+        let at = table.at(&X);
+        let times = [0.1, 0.45, 0.77, 1.0];
+        let exact = fields(&law, X, &times).unwrap();
+        for (quantity, exact) in exact.iter().enumerate() {
+            for (t, exact) in times.into_iter().zip(exact) {
+                let off = (at.value(quantity, t) - exact).abs() / table.largest(quantity);
+                assert!(off < 1e-11, "{X:?} {t} {quantity}: {off:e}");
+            }
+        }
     }
 }
