@@ -129,44 +129,45 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Particle<'_, L, M, K> {
         Ok(unpacked(&numbers))
     }
 
-    /// The time up to `end` at which the branch ends, if it does; between looks at the margin in steps of `end - time` over a number.
-    fn end_of_branch(&self, end: f64) -> Result<Option<f64>, HistoryError> {
-        let at = |time: f64| -> Result<f64, HistoryError> {
-            Ok(self.margin(time, &self.on_branch(time)?).value)
-        };
-        let (mut low, mut high) = (self.time, end);
-        if at(high)? > 0.0 {
-            return Ok(None);
+    /// The time up to `end` to which the branch lasts, the variables then, and whether the branch ends there.
+    fn to_end_of_branch(&self, end: f64) -> Result<(f64, Vec<Dual<f64, K>>, bool), HistoryError> {
+        let at_end = self.on_branch(end)?;
+        if self.margin(end, &at_end).value > 0.0 {
+            return Ok((end, at_end, false));
         }
+        let (mut low, mut high, mut found) = (self.time, end, at_end);
         // By halves: the margin may have a kink where a particle has flown.
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if middle <= low || middle >= high {
                 break;
             }
-            if at(middle)? > 0.0 { low = middle } else { high = middle }
+            let at_middle = self.on_branch(middle)?;
+            if self.margin(middle, &at_middle).value > 0.0 {
+                low = middle;
+            } else {
+                (high, found) = (middle, at_middle);
+            }
         }
-        Ok(Some(high))
+        Ok((high, found, true))
     }
 
     /// Goes on to a time; tells the changes of the branch on the way.
     fn advance(&mut self, end: f64, changes: &mut Vec<Change>) -> Result<(), HistoryError> {
         while self.time < end {
-            let Some(time) = self.end_of_branch(end)? else {
-                self.z = self.on_branch(end)?;
-                self.time = end;
+            let is_changed;
+            (self.time, self.z, is_changed) = self.to_end_of_branch(end)?;
+            if !is_changed {
                 return Ok(());
-            };
-            self.z = self.on_branch(time)?;
-            self.time = time;
-            if self.branch == Branch::Elastic {
-                self.onset();
             }
             self.branch = match self.branch {
-                Branch::Elastic => Branch::Flowing,
+                Branch::Elastic => {
+                    self.onset();
+                    Branch::Flowing
+                }
                 Branch::Flowing => Branch::Elastic,
             };
-            changes.push(Change { time, branch: self.branch });
+            changes.push(Change { time: self.time, branch: self.branch });
         }
         Ok(())
     }
