@@ -7,6 +7,9 @@
 /// Columns of the extrapolation at most: the order is twice as many.
 const COLUMNS: usize = 8;
 
+/// `rate(t, y, y')` writes the rates of the values `y`.
+pub(crate) type Rate<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
+
 /// An integration that did not come to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stop {
@@ -19,7 +22,7 @@ pub(crate) enum Stop {
 /// Integrates `y' = rate(t, y)` from `start` to `end`, to a relative tolerance of each value with regard to the largest one. `step` is the
 /// first step to try, and then the one to go on with; zero where none is known.
 pub(crate) fn integrate(
-    rate: &dyn Fn(f64, &[f64], &mut [f64]),
+    rate: Rate<'_>,
     (start, end): (f64, f64),
     y: &mut [f64],
     tolerance: f64,
@@ -77,7 +80,7 @@ struct Work {
 
 /// The changes by a step, in the first row of the table, and how many columns they took; none where these are not enough.
 fn extrapolated(
-    rate: &dyn Fn(f64, &[f64], &mut [f64]),
+    rate: Rate<'_>,
     time: f64,
     y: &[f64],
     step: f64,
@@ -116,7 +119,7 @@ fn extrapolated(
 
 /// The modified midpoint rule with an even number of parts, without a smoothing step.
 fn midpoint(
-    rate: &dyn Fn(f64, &[f64], &mut [f64]),
+    rate: Rate<'_>,
     time: f64,
     y: &[f64],
     step: f64,

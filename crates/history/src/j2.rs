@@ -18,38 +18,43 @@ use crate::tensor::{
     symmetric, tensor, trace, transpose,
 };
 
-/// The yield stress as a function of the equivalent plastic strain: `yield_stress + modulus alpha^exponent`.
+/// The yield stress as a function of the equivalent plastic strain: `yield_stress + modulus w`, `w = alpha^exponent`. The variable is `w`
+/// where flow does not depend on the rate: its rate is finite where a particle begins to flow, that of `alpha` tells nothing there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardening {
     /// The yield stress of the virgin material.
     pub yield_stress: f64,
     /// The modulus of the hardening, a stress.
     pub modulus: f64,
-    /// The exponent: 1 for linear hardening.
+    /// The exponent, above zero and at most 1: linear hardening.
     pub exponent: f64,
 }
 
 impl Hardening {
     /// The yield stress at a plastic strain.
-    pub fn stress<N: Number>(&self, alpha: N) -> N {
-        N::constant(self.yield_stress) + self.power(alpha, self.exponent).times(self.modulus)
+    #[must_use]
+    pub fn stress(&self, alpha: f64) -> f64 {
+        self.yield_stress + self.modulus * alpha.powf(self.exponent)
     }
 
-    /// Its derivative.
-    fn slope<N: Number>(&self, alpha: N) -> N {
-        self.power(alpha, self.exponent - 1.0).times(self.modulus * self.exponent)
+    /// The plastic strain for the variable `w`.
+    fn alpha<N: Number>(&self, w: N) -> N {
+        power(w, 1.0 / self.exponent)
     }
 
-    fn power<N: Number>(&self, alpha: N, exponent: f64) -> N {
-        match exponent {
-            0.0 => N::constant(1.0),
-            1.0 => alpha,
-            // The slope of a root at zero is infinite; a particle that has not flown hardens by nothing yet.
-            _ if alpha.value() <= 0.0 => {
-                N::constant(if exponent > 0.0 { 0.0 } else { f64::INFINITY })
-            }
-            exponent => alpha.powf(exponent),
-        }
+    /// `d alpha / dw`, zero at zero.
+    fn alpha_slope<N: Number>(&self, w: N) -> N {
+        power(w, 1.0 / self.exponent - 1.0).times(1.0 / self.exponent)
+    }
+}
+
+/// A power of a number that is not negative; zero has no slopes.
+fn power<N: Number>(x: N, exponent: f64) -> N {
+    match exponent {
+        0.0 => N::constant(1.0),
+        1.0 => x,
+        _ if x.value() <= 0.0 => N::constant(0.0),
+        exponent => x.powf(exponent),
     }
 }
 
@@ -71,7 +76,7 @@ pub struct J2 {
     pub lambda: f64,
     /// The shear modulus.
     pub mu: f64,
-    /// The yield stress.
+    /// The yield stress as a function of the plastic strain.
     pub hardening: Hardening,
     /// By Perzyna; none where the flow does not depend on the rate.
     pub overstress: Option<Overstress>,
@@ -110,9 +115,17 @@ impl J2 {
     }
 
     /// `f` over the yield stress of the virgin material.
-    fn overstress<N: Number>(&self, size: N, alpha: N) -> N {
-        (size - self.hardening.stress(alpha).times((2.0_f64 / 3.0).sqrt()))
-            .times(1.0 / self.hardening.yield_stress)
+    fn overstress<N: Number>(&self, size: N, w: N) -> N {
+        let Hardening { yield_stress, modulus, exponent } = self.hardening;
+        let w = if self.overstress.is_some() { power(w, exponent) } else { w };
+        let allowed = N::constant(yield_stress) + w.times(modulus);
+        (size - allowed.times((2.0_f64 / 3.0).sqrt())).times(1.0 / self.hardening.yield_stress)
+    }
+
+    /// The equivalent plastic strain.
+    #[must_use]
+    pub fn plastic_strain<N: Number>(&self, z: &[N]) -> N {
+        if self.overstress.is_some() { z[6] } else { self.hardening.alpha(z[6]) }
     }
 
     /// The start value of `G` by which a body at rest is on the yield surface: an elastic stretch along axis 0 and a shortening along
@@ -128,7 +141,7 @@ impl LawWithHistory for J2 {
             name: format!("G{}{}", i + 1, j + 1),
             initial: if i == j { 1.0 } else { 0.0 },
         });
-        of_G.chain([Variable { name: "alpha".into(), initial: 0.0 }]).collect()
+        of_G.chain([Variable { name: "w".into(), initial: 0.0 }]).collect()
     }
 
     fn rate<N: Number>(&self, at: &Kinematics<N>, z: &[N], branch: Branch, rates: &mut [N]) {
@@ -139,21 +152,22 @@ impl LawWithHistory for J2 {
         }
         let State { be, size, n, .. } = self.state(&at.F, z);
         let to_reference = inverse(&at.F);
-        let alpha = z[6];
-        let gamma = match self.overstress {
+        let w = z[6];
+        // `gamma' = slope along`, `alpha' = sqrt(2/3) gamma'` and `alpha' = alpha_slope w'`.
+        let alpha_slope = self.hardening.alpha_slope(w);
+        let (gamma, rate_of_w) = match self.overstress {
             Some(Overstress { drag, exponent, time }) => {
-                let over = self.overstress(size, alpha).times(self.hardening.yield_stress / drag);
-                if over.value() <= 0.0 { zero } else { over.powf(exponent).times(1.0 / time) }
+                let over = self.overstress(size, w).times(self.hardening.yield_stress / drag);
+                let gamma = power(over, exponent).times(1.0 / time);
+                (gamma, gamma)
             }
             None => {
                 let d = symmetric(&product(&at.rate, &to_reference));
-                let slope = self.hardening.slope(alpha);
                 let along = contraction(&n, &d);
-                if slope.value().is_infinite() {
-                    zero
-                } else {
-                    along / (N::constant(1.0) + slope.times(1.0 / (3.0 * self.mu)))
-                }
+                // (n : d) / (1 + k'(alpha)/(3 mu)) with k' = modulus / alpha_slope.
+                let stiffness = N::constant(self.hardening.modulus / (3.0 * self.mu));
+                let rate_of_w = along / (alpha_slope + stiffness);
+                (rate_of_w * alpha_slope, rate_of_w)
             }
         };
         let flow = product(&n, &be);
@@ -161,7 +175,7 @@ impl LawWithHistory for J2 {
         for (rate, &(i, j)) in rates.iter_mut().zip(&ENTRIES) {
             *rate = (pulled[i][j] + pulled[j][i]).times(-1.0) * gamma;
         }
-        rates[6] = gamma.times((2.0_f64 / 3.0).sqrt());
+        rates[6] = rate_of_w.times((2.0_f64 / 3.0).sqrt());
     }
 
     fn first_piola_kirchhoff<N: Number>(&self, at: &Kinematics<N>, z: &[N]) -> Tensor<N> {

@@ -95,6 +95,8 @@ impl<N: Number, const K: usize> Sub for Dual<N, K> {
     }
 }
 
+// Slopes of products are sums.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<N: Number, const K: usize> Mul for Dual<N, K> {
     type Output = Self;
 
@@ -104,6 +106,7 @@ impl<N: Number, const K: usize> Mul for Dual<N, K> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<N: Number, const K: usize> Div for Dual<N, K> {
     type Output = Self;
 

@@ -6,6 +6,7 @@ use mmsmith_history::{
     Branch, Dual, Hardening, HistoryError, J2, Kinematics, LawWithHistory, Maxwell, Table, Tensor,
     Trajectory, Viscoelastic, divergence,
 };
+use mmsmith_laws::{BLOCK, Increment, LawWithMemory, Plastic, ReturnMap};
 use nalgebra::{Matrix3, SymmetricEigen};
 
 const MU: f64 = 3846.0;
@@ -139,13 +140,13 @@ fn residuals(law: &J2, at: &Kinematics<Dual<f64, 2>>, z: &[Dual<f64, 2>]) -> [f6
     let eigen = SymmetricEigen::new(be);
     let logs = eigen.eigenvalues.map(|value| value.ln());
     let s = logs.add_scalar(-logs.mean()) * law.mu;
-    let allowed = (2.0_f64 / 3.0).sqrt() * law.hardening.stress(z[6].value);
+    let allowed = (2.0_f64 / 3.0).sqrt() * law.hardening.stress(law.plastic_strain(z).value);
     [(s.norm() - allowed).abs() / YIELD, (G.determinant() - 1.0).abs()]
 }
 
 #[test]
 fn flow_keeps_the_yield_condition_and_the_volume() {
-    for law in [law(500.0, 1.0), law(0.0, 1.0)] {
+    for law in [law(500.0, 1.0), law(0.0, 1.0), law(80.0, 1.0 / 3.0)] {
         let motion = block([0.37, 0.61], law.stretch_to_yield());
         let found = Trajectory::new(&law, &motion, &start(&law), &times(20), 2e-15).unwrap();
         assert!(found.changes.is_empty(), "{:?}", found.changes);
@@ -251,12 +252,12 @@ fn stresses_of_maxwell_elements_relax() {
         (Matrix3::identity() + along * r, along * rate)
     });
     let found = Trajectory::new(&law, &motion, &start(&law), &[0.5, 0.8, 1.0], 1e-13).unwrap();
-    for (element, time) in [0.2, 0.7].into_iter().enumerate() {
+    for (element, time) in [0.2_f64, 0.7].into_iter().enumerate() {
         for entry in 6 * element..6 * element + 6 {
             let [first, second, third] = [0, 1, 2].map(|k| found.states[k][entry].value);
             let size = first.abs().max(1.0);
-            assert!((second - first * (-0.3 / time as f64).exp()).abs() < 1e-11 * size);
-            assert!((third - first * (-0.5 / time as f64).exp()).abs() < 1e-11 * size);
+            assert!((second - first * (-0.3 / time).exp()).abs() < 1e-11 * size);
+            assert!((third - first * (-0.5 / time).exp()).abs() < 1e-11 * size);
         }
     }
     // Fast deformations have the instantaneous modulus.
@@ -298,6 +299,51 @@ fn a_table_has_the_fields_of_trajectories_at_all_positions_and_times() {
             for (t, exact) in times.into_iter().zip(exact) {
                 let off = (at.value(quantity, t) - exact).abs() / table.largest(quantity);
                 assert!(off < 1e-11, "{X:?} {t} {quantity}: {off:e}");
+            }
+        }
+    }
+}
+
+/// The solver's law at the end of a block's motion in so many steps: `G` and the plastic strain.
+fn by_return_maps(law: &J2, map: ReturnMap, X: [f64; 2], steps: usize) -> [f64; 7] {
+    let J2 { lambda, mu, hardening: Hardening { yield_stress, modulus, exponent }, .. } = *law;
+    let law_of_solver = Plastic { lambda, mu, yield_stress, modulus, exponent, map };
+    let motion = block(X, law.stretch_to_yield());
+    let F = |t: f64| {
+        let at = motion(t);
+        [0, 1].map(|i| [0, 1].map(|j| [at.F[i][j].value; BLOCK]))
+    };
+    let mut q: Vec<[f64; BLOCK]> = LawWithMemory::<f64, 2>::variables(&law_of_solver)
+        .iter()
+        .map(|q| [q.at_rest; BLOCK])
+        .collect();
+    for step in 0..steps {
+        let [start, end] = [step, step + 1].map(|k| F(k as f64 / steps as f64));
+        let increment = Increment { start: &start, end: &end, time: 1.0 / steps as f64 };
+        law_of_solver.evolve(&increment, &mut q);
+    }
+    std::array::from_fn(|k| q[k][0])
+}
+
+/// Return maps share no formula with the rate equations.
+#[test]
+fn return_maps_of_the_solver_have_their_orders() {
+    for law in [law(500.0, 1.0), law(80.0, 1.0 / 3.0)] {
+        let X = [0.37, 0.61];
+        let motion = block(X, law.stretch_to_yield());
+        let exact = Trajectory::new(&law, &motion, &start(&law), &[1.0], 1e-14).unwrap();
+        let mut exact: Vec<f64> = exact.states[0].iter().map(|z| z.value).collect();
+        exact[6] = law.plastic_strain(&exact);
+        assert!(exact[6] > 0.05, "{exact:?}");
+        for (map, order) in [(ReturnMap::Exponential, 1.0), (ReturnMap::Midpoint, 2.0)] {
+            let error = |steps: usize| {
+                let found = by_return_maps(&law, map, X, steps);
+                found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            };
+            let errors = [200, 400, 800].map(error);
+            for pair in errors.windows(2) {
+                let found = (pair[0] / pair[1]).log2();
+                assert!((found - order).abs() < 0.15, "{law:?} {map:?}: {errors:?} {found}");
             }
         }
     }

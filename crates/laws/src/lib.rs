@@ -20,6 +20,7 @@ mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
 mod orthotropic;
+mod plastic;
 #[cfg(test)]
 mod printed_energies;
 mod st_venant_kirchhoff;
@@ -40,6 +41,7 @@ pub use memory::{Increment, InternalVariable, LawWithMemory};
 pub use mmsmith_vocabulary::{Material, Volumetric};
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
+pub use plastic::{Plastic, ReturnMap};
 
 use crate::fault::Planted;
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
