@@ -1,0 +1,79 @@
+//! `mms diagnose` as a user meets it: a solver in C, with mistakes that a script plants.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::command::{mms, read_json, refuses};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+
+/// Writes the script that builds and runs the solver with a change of its text, a command of sed.
+fn script(place: &Path, change: &str) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c/bar.c");
+    let text = format!(
+        "set -e\ncd \"$MMS_FIELDS\"\nmkdir -p mmsmith\ncp *.h mmsmith\nsed '{change}' {} > own.c\n\
+         ${{CC:-cc}} -O1 -I . own.c -o own -lm\n./own \"$MMS_CELLS\" > \"$MMS_OUT/bar.csv\"\n",
+        source.display()
+    );
+    let path = place.join("run.sh");
+    fs::write(&path, text).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+const LINE: &str = "diagnose axis-aligned-1d --target c --jobs 2 --json found.json --run";
+
+fn diagnosed(place: &Path, change: &str) -> (i32, String) {
+    script(place, change);
+    // Without arguments: the command is one word, and the environment has the places.
+    let called = mms(place, &format!("{LINE} {}/run.sh", place.display()));
+    (called.status, called.stdout + &called.stderr)
+}
+
+#[test]
+fn a_right_solver_is_told_that_nothing_is_wrong_and_a_wrong_one_what_is() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let (status, said) = diagnosed(place, "");
+    assert_eq!(status, 0, "{said}");
+    assert!(said.contains("nothing is wrong"), "{said}");
+    for (change, name) in [
+        ("s/ + b);/ - b);/", "force-sign"),
+        ("s/ + b);/ + axis_aligned_1d_density(\\&bar)*b);/", "force-per-volume"),
+        ("s/step \\* dt, &b)/0.0, \\&b)/", "force-frozen"),
+    ] {
+        let (status, said) = diagnosed(place, change);
+        assert_eq!(status, 1, "{said}");
+        let found = read_json(&place.join("found.json"));
+        assert_eq!(found["causes"][0]["name"], name, "{said}");
+        assert!(said.contains(found["causes"][0]["look"].as_str().unwrap()), "{said}");
+        assert_eq!(found["passed"], false);
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let line = "diagnose bar --target c --run true";
+    refuses(place, &format!("{line} --cells 8"), &["--cells", "--cells 8,16"]);
+    refuses(place, &format!("{line} --dt 0.1"), &["--dt has 1 value(s) for 2 grids"]);
+    refuses(place, line, &["no run left a result"]);
+    refuses(
+        place,
+        "diagnose bar --target c --run false",
+        &["no run left a result", "exit status: 1"],
+    );
+    refuses(place, "diagnose bar --target c", &["--run"]);
+    refuses(place, &format!("{line} --build false"), &["--build failed"]);
+}
+
+#[test]
+fn the_mistakes_are_listed() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "diagnose --list --json causes.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let causes = read_json(&place.path().join("causes.json"));
+    for cause in causes["causes"].as_array().unwrap() {
+        assert!(called.stdout.contains(cause["name"].as_str().unwrap()));
+    }
+}

@@ -1,0 +1,22 @@
+//! The command as users call it, a file for each subject. One program, so that what they share is compiled once.
+
+mod checkpoint;
+mod command;
+mod conventions;
+mod diagnose;
+mod fields;
+mod free_faces;
+mod generate;
+mod layouts;
+mod library;
+mod remedy;
+mod scheme;
+mod score;
+mod score_readings;
+mod shards;
+mod simulate;
+mod stability;
+#[cfg(unix)]
+mod terminal;
+mod tradeoff;
+mod warnings;

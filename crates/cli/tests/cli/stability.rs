@@ -1,0 +1,225 @@
+//! `mms stability`, and studies that are kept, as a user meets them.
+
+use crate::command::{UnderWay, keys, mms, names, read_json, refuses};
+use serde_json::Value;
+use std::path::Path;
+
+#[test]
+fn a_limit_is_bracketed_and_its_failure_told() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let called = mms(place, "stability axis-aligned --cells 8 --json limit.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    assert!(
+        called.stdout.contains("A run is unstable if\n  a particle has J <= 0"),
+        "{}",
+        called.stdout
+    );
+    let found = read_json(&place.join("limit.json"));
+    assert_eq!(keys(&found), "over rows schema search settings");
+    assert_eq!(found["schema"], "mmsmith.stability/1");
+    let row = &found["rows"][0];
+    assert_eq!(
+        keys(row),
+        "at_limit bracket cfl_max failure p_wave_cfl p_wave_limit reference runs unstable_below"
+    );
+    assert_eq!(keys(&row["failure"]), "kind limit particle step time value");
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let limit = number(&row["cfl_max"]);
+    assert_eq!(limit, number(&row["bracket"][0]));
+    assert!(number(&row["bracket"][1]) - limit <= 0.01, "{row}");
+    assert!((0.6..1.0).contains(&limit), "{row}");
+    assert!((number(&row["p_wave_cfl"]) * number(&row["p_wave_limit"]) - limit).abs() < 1e-12);
+
+    let stable = format!("stability axis-aligned --cells 8 --at {limit}");
+    assert_eq!(mms(place, &stable).status, 0);
+    let unstable = format!("stability axis-aligned --cells 8 --at {}", row["bracket"][1]);
+    let called = mms(place, &unstable);
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    assert!(called.stdout.contains("UNSTABLE") && called.stdout.contains("step"));
+}
+
+const MAP: &str = "stability axis-aligned --cells 4 --over amplitude=1e-8,0.1 --over nu=0,0.4";
+
+#[test]
+fn a_map_is_the_same_for_any_number_of_threads_and_is_drawn() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let rows = ["1", "2"].map(|threads| {
+        let call = format!("{MAP} --threads {threads} --json m.json --plot m.svg --csv m.csv");
+        assert_eq!(mms(place, &call).status, 0);
+        read_json(&place.join("m.json"))["rows"].clone()
+    });
+    assert_eq!(rows[0], rows[1]);
+    let rows = rows[0].as_array().expect("rows");
+    let pairs: Vec<_> = rows.iter().map(|row| (&row["amplitude"], &row["nu"])).collect();
+    assert_eq!(pairs.len(), 4);
+    assert_eq!((pairs[1].0.as_f64(), pairs[1].1.as_f64()), (Some(1e-8), Some(0.4)));
+    let svg = std::fs::read_to_string(place.join("m.svg")).expect("a picture");
+    assert_eq!(svg.matches("class=\"cell\"").count(), 4);
+    let csv = std::fs::read_to_string(place.join("m.csv")).expect("a table");
+    let widths: Vec<_> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert_eq!(widths.len(), 5);
+    assert!(widths.iter().all(|width| *width == widths[0]), "{csv}");
+}
+
+#[test]
+fn settings_words_and_units_can_be_varied() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let call = "stability axis-aligned --cells 4 --width 0.05 --over shape=ugimp,gimp \
+                --over integrator=cd,usl --json m.json";
+    let called = mms(place, call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let rows = read_json(&place.join("m.json"))["rows"].clone();
+    assert_eq!((&rows[1]["shape"], &rows[1]["integrator"]), (&"ugimp".into(), &"usl".into()));
+    // Units that differ by powers of two change no bit of a limit.
+    let call =
+        "stability bar --cells 6 --width 0.05 --over units=-7,0,20 --plot l.svg --json m.json";
+    let called = mms(place, call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let rows = read_json(&place.join("m.json"))["rows"].clone();
+    assert!(rows[0]["cfl_max"].is_number(), "{rows}");
+    assert_eq!(rows[0]["bracket"], rows[1]["bracket"]);
+    assert_eq!(rows[2]["bracket"], rows[1]["bracket"]);
+    let svg = std::fs::read_to_string(place.join("l.svg")).expect("a picture");
+    assert!(svg.contains("class=\"analytic\"") && svg.contains("class=\"measured\""));
+}
+
+#[test]
+fn every_failure_of_a_random_search_can_be_repeated() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let search = "stability axis-aligned-1d --search random --samples 12 --seed 3";
+    let called = mms(place, &format!("{search} --cfl 2.5 --json s.json"));
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    let failures = read_json(&place.join("s.json"))["failures"].clone();
+    let failures = failures.as_array().expect("failures");
+    assert!(!failures.is_empty());
+    for failure in &failures[..failures.len().min(3)] {
+        let command = failure["command"].as_str().expect("a command");
+        assert!(called.stdout.contains(command));
+        let arguments = command.strip_prefix("mms ").expect("the program's name");
+        let again = mms(place, &format!("{arguments} --json again.json"));
+        assert_eq!(again.status, 1, "{command}: {}{}", again.stdout, again.stderr);
+        let again = read_json(&place.join("again.json"));
+        assert_eq!(again["result"]["failure"], failure["failure"], "{command}");
+    }
+    assert_eq!(mms(place, &format!("{search} --cfl 0.4")).status, 0);
+}
+
+#[test]
+fn bad_settings_are_named() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let call = |options: &str| format!("stability axis-aligned --cells 4 {options}");
+    refuses(place, &call("--over"), &["--over"]);
+    refuses(place, &call("--over nu"), &["--over", "NAME=VALUE"]);
+    refuses(place, &call("--over nu=0,x"), &["--over nu=x", "finite number"]);
+    refuses(place, &call("--over nu=0.7"), &["nu=0.7", "must be"]);
+    refuses(place, &call("--over shape=cubic"), &["cubic", "gimp"]);
+    refuses(place, &call("--over mu=1"), &["no parameter 'mu'"]);
+    refuses(place, &call("--over ppc=0"), &["ppc=0", "at least 1"]);
+    refuses(place, &call("--over offset=0.7"), &["offset", "-0.5 to 0.5"]);
+    refuses(place, &call("--over nu=0 --over nu=0.1"), &["given twice"]);
+    refuses(place, &call("--over nu=0 --over ppc=2 --over cells=4"), &["two make a map", "3"]);
+    refuses(place, &call("--lower 0.9 --upper 0.5"), &["--lower", "--upper"]);
+    refuses(place, &call("--width 0"), &["--width", "positive"]);
+    refuses(place, &call("--width 1e-16"), &["width = 1e-16", "at least 1e-15"]);
+    refuses(place, &call("--width 1e-9 --precision f32"), &["width = 1e-9", "at least 1e-6"]);
+    refuses(place, &call("--plot p.svg"), &["--over"]);
+    refuses(place, &call("--samples 3"), &["--search"]);
+    refuses(place, &call("--over units=x"), &["whole number"]);
+    refuses(place, "run axis-aligned --offset 0.7", &["offset", "-0.5 to 0.5"]);
+    std::fs::write(place.join("file"), "mine").expect("a file");
+    refuses(place, &call("--out file"), &["--out", "file"]);
+}
+
+/// The study that is killed; long enough to be met at every stage.
+const STUDY: &str = "stability axis-aligned --cells 4 --width 0.002 --over nu=-0.2,0,0.1,0.2,0.3,0.4 \
+                     --over ppc=2,3 --out study --json table.json";
+
+fn kept(place: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(place.join("study/cases.jsonl")).unwrap_or_default();
+    text.lines().filter(|line| line.ends_with('}')).map(str::to_owned).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_study_goes_on_where_it_stopped_and_ends_with_the_same_table() {
+    let [place, whole] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let (place, whole) = (place.path(), whole.path());
+    let reference = mms(whole, STUDY);
+    assert_eq!(reference.status, 0, "{}", reference.stderr);
+
+    // The table goes to a pipe that nobody reads, so that the study cannot end before it is killed.
+    crate::command::pipe(&place.join("table.json"));
+    let mut before = 0;
+    for finished in [0, 1, 1, 4, 6, 7, 12] {
+        let mut study = UnderWay::start(place, STUDY);
+        let claims = place.join("study/claims");
+        study.wait_for(|| claims.exists() && kept(place).len() >= finished);
+        study.kill();
+        let lines = kept(place);
+        assert!(lines.len() >= before, "a finished case is lost");
+        before = lines.len();
+    }
+    std::fs::remove_file(place.join("table.json")).expect("the pipe");
+    let ended = mms(place, STUDY);
+    assert_eq!(ended.stdout, reference.stdout);
+    let rows = |place: &Path| read_json(&place.join("table.json"))["rows"].clone();
+    assert_eq!(rows(place), rows(whole));
+    let mut lines = kept(place);
+    assert_eq!(lines.len(), 12, "each case once");
+    lines.sort();
+    let mut expected = kept(whole);
+    expected.sort();
+    assert_eq!(lines, expected);
+
+    // A damaged line is named, set aside and computed anew.
+    let file = place.join("study/cases.jsonl");
+    let text = std::fs::read_to_string(&file).expect("cases");
+    std::fs::write(&file, text.replacen("\"cfl_max\":0", "\"cfl_max\":1", 1)).expect("damage");
+    let mended = mms(place, STUDY);
+    assert_eq!(mended.stdout, reference.stdout);
+    let said = &mended.stderr;
+    assert!(said.contains("cases.jsonl, line ") && said.contains("checksum"), "{said}");
+    assert_eq!(kept(place).len(), 12);
+    assert_eq!(names(&place.join("study")), ["cases.jsonl", "claims", "damaged.jsonl", "lock"]);
+    let again = mms(place, STUDY);
+    assert_eq!((again.stdout, again.stderr.as_str()), (reference.stdout, ""));
+}
+
+#[test]
+fn two_processes_share_a_study_and_agree() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let other = STUDY.replace("table.json", "other.json");
+    let studies = [UnderWay::start(place, STUDY), UnderWay::start(place, &other)];
+    for study in studies {
+        assert_eq!(study.end(), 0);
+    }
+    assert_eq!(kept(place).len(), 12, "no case twice");
+    let rows = |name: &str| read_json(&place.join(name))["rows"].clone();
+    assert_eq!(rows("table.json"), rows("other.json"));
+}
+
+#[test]
+fn a_study_of_convergence_is_kept_to_the_bit() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    // The last case is unstable: its row has a status to be kept, too, and the study fails.
+    let call = "converge axis-aligned --cells 8 --cfls 0.2,0.4,2.0 --out study --json table.json";
+    let first = mms(place, call);
+    assert_eq!(first.status, 1, "{}", first.stderr);
+    let table = read_json(&place.join("table.json"));
+    assert_eq!(kept(place).len(), 4, "three rows, and the differences");
+    let second = mms(place, call);
+    assert_eq!(second.stdout, first.stdout);
+    // Times included: nothing was computed again.
+    assert_eq!(read_json(&place.join("table.json")), table);
+    assert!(table["rows"][0].get("timed_alone").is_none());
+    // Another parameter is another study.
+    assert_eq!(mms(place, &format!("{call} --set A=0.05")).status, 1);
+    assert_eq!(kept(place).len(), 8);
+}
