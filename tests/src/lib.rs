@@ -1,6 +1,6 @@
 //! Helpers of the tests in this package: the commands as users run them, and their output as data.
 //!
-//! The tests themselves are in `tests/`, one file a subject: golden values, orders of accuracy, the claims of the
+//! The tests themselves are in `tests/`, one file a subject: orders of accuracy, the claims of the
 //! original study, generation, bad input, particle files.
 
 use serde_json::Value;

@@ -4,7 +4,6 @@ mod automatic_differentiation;
 mod c_headers;
 mod check;
 mod claims;
-mod golden;
 mod high_order;
 mod hostile_text;
 mod kept_runs;
