@@ -24,7 +24,11 @@ fn check_passes_every_solution_of_the_library() {
     let check = read_json(&place.path().join("check.json"));
     assert_eq!(check["schema"], "mmsmith.check/1");
     assert_eq!(check["passed"], true);
-    for result in check["results"].as_array().unwrap() {
+    let results = check["results"].as_array().unwrap();
+    let specifications = concat!(env!("CARGO_MANIFEST_DIR"), "/../../mms-specs");
+    assert_eq!(results.len(), fs::read_dir(specifications).unwrap().count());
+    assert_eq!(called.stdout.matches(": passed at").count(), results.len(), "{}", called.stdout);
+    for result in results {
         let findings = result["findings"].as_array().unwrap();
         for field in ["v", "a", "H", "F", "J", "P", "b"] {
             let finding = findings.iter().find(|finding| finding["what"] == field).unwrap();
