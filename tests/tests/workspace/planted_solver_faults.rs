@@ -12,8 +12,8 @@ use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_tests::workspace;
 use mmsmith_verify::{
     Arithmetic, Case, CflSpeed, Composition, Coordinates, Discretized, Layout, ORDER_TOLERANCE,
-    OrderVerdict, PerField, PerNorm, Placement, Scheme, Status, Study, Sweep,
-    Total, Updated, converge, expected_in_space, expected_in_time, verdicts,
+    OrderVerdict, PerField, PerNorm, Placement, Scheme, Status, Study, Sweep, Total, Updated,
+    converge, expected_in_space, expected_in_time, verdicts,
 };
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -10,6 +10,7 @@ mod generate;
 mod layouts;
 mod library;
 mod remedy;
+mod schemas;
 mod scheme;
 mod score;
 mod score_readings;

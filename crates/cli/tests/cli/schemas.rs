@@ -1,10 +1,8 @@
 //! Schemas of the JSON of commands: the committed ones are the program's, and what the program writes keeps to them.
 
-mod command;
-
 use std::path::{Path, PathBuf};
 
-use command::{mms, read_json};
+use crate::command::{self, mms, read_json};
 use serde_json::Value;
 
 /// The problems of a value, each with its place, by the part of JSON Schema that these schemas use.
