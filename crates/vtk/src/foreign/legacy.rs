@@ -19,16 +19,32 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
         other => return Err(format!("its third line is {other:?}, neither ASCII nor BINARY")),
     };
 
-    let mut fields = vec![];
-    let mut points: Option<(usize, Entry)> = None;
-    let mut arrays = vec![];
-    let mut cells = vec![];
-    let mut cell_arrays = vec![];
-    // The number of tuples of the arrays that come next, and whether they belong to points.
-    let mut section: Option<(usize, bool)> = None;
+    let mut found = Found { major, ..Found::default() };
     while let Some(keyword) = scan.keyword()? {
-        let keyword = keyword.to_ascii_uppercase();
-        match (keyword.as_str(), section) {
+        found.take(&keyword.to_ascii_uppercase(), &mut scan)?;
+    }
+    found.contents()
+}
+
+/// The arrays of a file, as far as it is read.
+#[derive(Default)]
+struct Found {
+    /// The file's major version.
+    major: u32,
+    fields: Vec<Entry>,
+    /// The number of points, and their positions.
+    points: Option<(usize, Entry)>,
+    arrays: Vec<Entry>,
+    cells: Vec<Cells>,
+    cell_arrays: Vec<Entry>,
+    /// The number of tuples of the arrays that come next, and whether they belong to points.
+    section: Option<(usize, bool)>,
+}
+
+impl Found {
+    /// Reads the lines that belong to a keyword.
+    fn take(&mut self, keyword: &str, scan: &mut Scan<'_>) -> Result<(), String> {
+        match (keyword, self.section) {
             ("DATASET", _) => match scan.word()?.to_ascii_uppercase().as_str() {
                 "UNSTRUCTURED_GRID" | "POLYDATA" | "STRUCTURED_GRID" => (),
                 other => {
@@ -40,7 +56,7 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
             ("POINTS", _) => {
                 let count = scan.count("POINTS")?;
                 let kind = scan.kind("POINTS")?;
-                points = Some((count, scan.array("", kind, 3, count)?));
+                self.points = Some((count, scan.array("", kind, 3, count)?));
             }
             ("DIMENSIONS", _) => {
                 for _ in 0..3 {
@@ -48,37 +64,23 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 }
             }
             ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", _) => {
-                cells.push(scan.cells(&keyword, major)?);
+                self.cells.push(scan.cells(keyword, self.major)?);
             }
             ("CELL_TYPES", _) => {
                 let count = scan.count("CELL_TYPES")?;
                 let kinds = scan.array("CELL_TYPES", Kind::I32, 1, count)?;
-                if let Some(cells) =
-                    cells.last_mut().filter(|cells: &&mut Cells| cells.count == count)
-                {
+                if let Some(cells) = self.cells.last_mut().filter(|cells| cells.count == count) {
                     cells.kinds = Kinds::Given(kinds);
                 }
             }
             ("METADATA", _) => scan.skip_paragraph(),
-            ("POINT_DATA", _) => section = Some((scan.count("POINT_DATA")?, true)),
-            ("CELL_DATA", _) => section = Some((scan.count("CELL_DATA")?, false)),
+            ("POINT_DATA", _) => self.section = Some((scan.count("POINT_DATA")?, true)),
+            ("CELL_DATA", _) => self.section = Some((scan.count("CELL_DATA")?, false)),
             ("FIELD", _) => {
                 scan.word()?;
                 for _ in 0..scan.count("FIELD")? {
-                    let Some(entry) = scan.field()? else { continue };
-                    match section {
-                        None => fields.push(entry),
-                        // VTK writes fields of the whole file among the arrays of points where it has no other place.
-                        Some((tuples, true)) if entry.tuples == tuples => arrays.push(entry),
-                        Some((_, true)) if entry.tuples == 1 => fields.push(entry),
-                        Some((tuples, true)) => {
-                            return Err(format!(
-                                "array `{}` has {} entries for {tuples} points",
-                                entry.name, entry.tuples
-                            ));
-                        }
-                        Some((tuples, false)) if entry.tuples == tuples => cell_arrays.push(entry),
-                        Some((_, false)) => (),
+                    if let Some(entry) = scan.field()? {
+                        self.field(entry)?;
                     }
                 }
             }
@@ -89,23 +91,45 @@ pub(super) fn contents(bytes: &[u8]) -> Result<Contents, String> {
                 scan.array("LOOKUP_TABLE", kind, 4, colours)?;
             }
             (_, Some((tuples, of_points))) => {
-                let entry = scan.attribute(&keyword, tuples)?;
-                if of_points { &mut arrays } else { &mut cell_arrays }.push(entry);
+                let entry = scan.attribute(keyword, tuples)?;
+                if of_points { &mut self.arrays } else { &mut self.cell_arrays }.push(entry);
             }
             (other, None) => return Err(format!("{other:?} at byte {} is unknown", scan.at)),
         }
+        Ok(())
     }
-    let (particles, points) = points.ok_or("it has no POINTS")?;
-    if let Some(entry) = arrays.iter().find(|entry| entry.tuples != particles) {
-        let Entry { name, tuples, .. } = entry;
-        return Err(format!("array `{name}` has {tuples} entries for {particles} points"));
+
+    /// Puts an array of a field where it belongs.
+    fn field(&mut self, entry: Entry) -> Result<(), String> {
+        match self.section {
+            None => self.fields.push(entry),
+            // VTK writes fields of the whole file among the arrays of points where it has no other place.
+            Some((tuples, true)) if entry.tuples == tuples => self.arrays.push(entry),
+            Some((_, true)) if entry.tuples == 1 => self.fields.push(entry),
+            Some((tuples, true)) => {
+                let Entry { name, tuples: found, .. } = entry;
+                return Err(format!("array `{name}` has {found} entries for {tuples} points"));
+            }
+            Some((tuples, false)) if entry.tuples == tuples => self.cell_arrays.push(entry),
+            Some((_, false)) => (),
+        }
+        Ok(())
     }
-    Ok(Contents {
-        packing: Packing::plain(ByteOrder::Big),
-        appended: None,
-        fields,
-        pieces: vec![Piece { particles, points, arrays, cells, cell_arrays }],
-    })
+
+    fn contents(self) -> Result<Contents, String> {
+        let Self { fields, points, arrays, cells, cell_arrays, .. } = self;
+        let (particles, points) = points.ok_or("it has no POINTS")?;
+        if let Some(entry) = arrays.iter().find(|entry| entry.tuples != particles) {
+            let Entry { name, tuples, .. } = entry;
+            return Err(format!("array `{name}` has {tuples} entries for {particles} points"));
+        }
+        Ok(Contents {
+            packing: Packing::plain(ByteOrder::Big),
+            appended: None,
+            fields,
+            pieces: vec![Piece { particles, points, arrays, cells, cell_arrays }],
+        })
+    }
 }
 
 /// Reads the file from front to back.
