@@ -9,6 +9,7 @@ use mmsmith_verify::{
     Composition, Coordinates, Integrator, Layout, Shape, Transfer, Verdict, check,
 };
 use nalgebra::{Const, DimMin, SMatrix, SVector};
+use std::sync::LazyLock;
 
 use super::{solution, with};
 use crate::reference::Reference;
@@ -20,8 +21,22 @@ fn noise(seed: usize) -> f64 {
 
 const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
 
-/// The solver and the plain implementation, which share no loop, on a distorted body between walls.
-pub(super) fn agreement_of_two_solvers(fault: Option<Fault>) -> Vec<String> {
+fn force(X: &[SVector<f64, 2>], t: f64, b: &mut [SVector<f64, 2>]) {
+    b.iter_mut().zip(X).for_each(|(b, X)| *b = X.map(|x| (3.0 * x + 5.0 * t).sin()));
+}
+
+/// Steps after which the two solvers are compared.
+const STEPS: usize = 10;
+
+/// A distorted body between walls, and the plain implementation after those steps, in each scheme.
+struct Plain {
+    grid: Grid<f64, 2>,
+    body: Body<f64, 2>,
+    schemes: Vec<(Settings<f64>, Reference<2>)>,
+}
+
+/// Without a fault, and thus once for all faults.
+static PLAIN: LazyLock<Plain> = LazyLock::new(|| {
     let grid = Grid {
         lower: SVector::zeros(),
         spacing: 0.25,
@@ -30,9 +45,6 @@ pub(super) fn agreement_of_two_solvers(fault: Option<Fault>) -> Vec<String> {
     };
     let mut body = Body::lattice(&grid, 2, 2.0, |X: &SVector<f64, 2>| X[1] < 0.7);
     disturb(&mut body.particles, grid.spacing);
-    let force = |X: &[SVector<f64, 2>], t: f64, b: &mut [SVector<f64, 2>]| {
-        b.iter_mut().zip(X).for_each(|(b, X)| *b = X.map(|x| (3.0 * x + 5.0 * t).sin()));
-    };
     let integrators =
         [Integrator::Usf, Integrator::Usl, Integrator::Musl, Integrator::Usavg, Integrator::Cd];
     let by_flip = [Shape::Linear, Shape::Gimp, Shape::Cpdi, Shape::Cpdi2]
@@ -40,8 +52,7 @@ pub(super) fn agreement_of_two_solvers(fault: Option<Fault>) -> Vec<String> {
         .flat_map(|shape| integrators.map(|integrator| (shape, integrator, Transfer::Flip)));
     let others = [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)]
         .map(|transfer| (Shape::Gimp, Integrator::Usl, transfer));
-    let mut problems = Vec::new();
-    for (shape, integrator, transfer) in by_flip.chain(others) {
+    let schemes = by_flip.chain(others).map(|(shape, integrator, transfer)| {
         let settings = Settings {
             shape,
             integrator,
@@ -49,15 +60,24 @@ pub(super) fn agreement_of_two_solvers(fault: Option<Fault>) -> Vec<String> {
             time_step: 2e-3,
             halve_first_acceleration: integrator == Integrator::Cd,
         };
-        let mut sound = Reference::new(grid.clone(), body.clone(), SOFT, settings);
+        let mut plain = Reference::new(grid.clone(), body.clone(), SOFT, settings);
+        (0..STEPS).for_each(|_| plain.step(&force).unwrap());
+        (settings, plain)
+    });
+    let schemes = schemes.collect();
+    Plain { grid, body, schemes }
+});
+
+/// The solver and the plain implementation, which share no loop, on a distorted body between walls.
+pub(super) fn agreement_of_two_solvers(fault: Option<Fault>) -> Vec<String> {
+    let Plain { grid, body, schemes } = &*PLAIN;
+    let mut problems = Vec::new();
+    for (settings, sound) in schemes {
         let mut solver =
-            with(fault, || Simulation::new(grid.clone(), body.clone(), SOFT, settings)).unwrap();
+            with(fault, || Simulation::new(grid.clone(), body.clone(), SOFT, *settings)).unwrap();
+        let Settings { shape, integrator, transfer, .. } = settings;
         let name = format!("{shape:?} {integrator:?} {transfer}");
-        let stopped = (0..10).find_map(|_| {
-            sound.step(&force).unwrap();
-            solver.step(&force).err()
-        });
-        if let Some(error) = stopped {
+        if let Some(error) = (0..STEPS).find_map(|_| solver.step(&force).err()) {
             problems.push(format!("{name}: {error}"));
             continue;
         }
