@@ -6,7 +6,7 @@ use mmsmith_runtime::{AnySolution, Real, Solution};
 use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
-use crate::named::Named;
+use crate::named::{Named, named};
 use crate::precision::Precision;
 use crate::scheme::{Placement, Scheme, Start, Updated};
 use crate::stated_law;
@@ -53,6 +53,20 @@ pub enum CflSpeed {
     Bar,
     /// P-waves in the undeformed solid, `sqrt((lambda + 2 mu)/rho0)`.
     PWave,
+}
+
+named! {
+    CflSpeed {
+        Bar = "bar":
+            "Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed";
+        PWave = "p-wave":
+            "Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)";
+    }
+    Extent {
+        Quarter = "quarter":
+            "The part between the planes of symmetry: a quarter of a ring, an eighth of a shell";
+        Full = "full": "All of it";
+    }
 }
 
 impl CflSpeed {

@@ -3,44 +3,17 @@
 use std::time::Instant;
 
 use mmsmith_measure::norms::PerField;
-use mmsmith_runtime::{AnySolution, Solution};
+use mmsmith_runtime::AnySolution;
 
-use crate::case::{Arithmetic, Case, CflSpeed, Extent, law};
-use crate::cost::{self, Timing};
+use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
-use crate::error::{CaseError, MOST_STEPS};
+use crate::error::{CaseError, StudyError};
+use crate::observe::{self, Limits, Observed, Scales};
+use crate::on_grid::{OnGrid, Plan};
 use crate::precision::Precision;
 use crate::run::{self, Outputs, Progress, Row};
-use crate::scene::Scene;
-use crate::scheme::Scheme;
-use crate::stability::{self, Bench, Limits, Observed, Scales};
-use crate::study::StudyError;
 use crate::temporal::{self, Temporal};
-use crate::updated;
-
-/// Steps, particles and memory of a case, known without a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
-    /// Number of steps.
-    pub steps: u64,
-    /// Particles; in the updated frame estimated.
-    pub particles: f64,
-    /// Memory in bytes, estimated.
-    pub bytes: f64,
-    /// How much of an annulus is modelled; `None` for other shapes.
-    pub extent: Option<Extent>,
-    /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size,
-    /// or of its largest coordinate, at each step, added up as a random walk.
-    pub round_off: f64,
-}
-
-impl Plan {
-    /// Particles times steps, which are the same on every machine.
-    #[must_use]
-    pub fn work(&self) -> f64 {
-        self.steps as f64 * self.particles
-    }
-}
+use crate::timing::{self, Timing};
 
 /// A case that can be run, on its grid.
 pub struct Discretized<'a> {
@@ -76,7 +49,7 @@ impl<'a> Discretized<'a> {
         Ok(Self { exact, arithmetic, case: *case, plan, floors, on_grid })
     }
 
-    /// The same solution in another case.
+    /// Another case of its solution.
     ///
     /// # Errors
     ///
@@ -153,14 +126,38 @@ impl<'a> Discretized<'a> {
         self.on_grid.differences(cfls, progress)
     }
 
-    /// The bench on which runs at other CFL numbers are held against limits.
-    pub(crate) fn bench(&self) -> Result<Bench<'_>, CaseError> {
-        Bench::new(&*self.on_grid)
+    /// The scales of runs at other CFL numbers.
+    pub(crate) fn scales(&self) -> Result<Scales, CaseError> {
+        self.on_grid.scales()
+    }
+
+    /// One run at another CFL number until `end`, held against limits where there are some.
+    pub(crate) fn observe(
+        &self,
+        cfl: f64,
+        end: f64,
+        limits: Option<&Limits>,
+    ) -> Result<Observed, CaseError> {
+        self.on_grid.observe(cfl, end, limits)
     }
 }
 
+/// Puts a case on its grid and [runs](Discretized::run) it.
+///
+/// # Errors
+///
+/// [`CaseError`] for settings that cannot be run, and for files that cannot be written.
+pub fn run(
+    exact: &AnySolution<f64>,
+    arithmetic: Arithmetic<'_>,
+    case: &Case,
+    outputs: &mut Outputs<'_>,
+) -> Result<Row, CaseError> {
+    Discretized::new(exact, arithmetic, case)?.run(outputs)
+}
+
 /// Runs on a grid, whatever its dimension and the precision of the solver.
-pub(crate) trait Simulate: Send + Sync {
+trait Simulate: Send + Sync {
     /// As [`Discretized::run`].
     fn run(&self, outputs: &mut Outputs<'_>) -> Result<Row, CaseError>;
     /// As [`Discretized::time_steps`].
@@ -177,82 +174,6 @@ pub(crate) trait Simulate: Send + Sync {
     fn scales(&self) -> Result<Scales, CaseError>;
 }
 
-/// A case on its grid, in its dimension and the precision of its solver.
-pub(crate) struct OnGrid<'a, T: Precision<D>, const D: usize> {
-    pub(crate) exact: &'a dyn Solution<f64, D>,
-    /// The solution that drives the solver.
-    pub(crate) model: &'a dyn Solution<T, D>,
-    pub(crate) case: Case,
-    pub(crate) scene: Scene<D>,
-    /// The waves that CFL numbers refer to.
-    pub(crate) waves: Waves,
-    /// The end time.
-    pub(crate) end: f64,
-    pub(crate) steps: Steps,
-}
-
-impl<'a, T: Precision<D>, const D: usize> OnGrid<'a, T, D>
-where
-    f64: Precision<D>,
-{
-    /// Judges a case, and puts it on its grid.
-    fn prepare(
-        exact: &'a dyn Solution<f64, D>,
-        model: &'a dyn Solution<T, D>,
-        case: &Case,
-    ) -> Result<Self, CaseError> {
-        case.validate()?;
-        let end = case.periods * exact.period();
-        // First, since no other scheme would mend it.
-        law::<f64, D>(exact.law())?;
-        let scene = Scene::new(exact, case, end)?;
-        let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
-        let steps = Steps::new(case.cfl, end, waves)?;
-        if let Scheme::Updated(updated) = &case.scheme {
-            updated::admit(&scene, updated)?;
-        }
-        Ok(Self { exact, model, case: *case, scene, waves, end, steps })
-    }
-
-    fn plan(&self) -> Result<Plan, CaseError> {
-        let Self { scene, steps, case, .. } = self;
-        let per_cell = case.per_cell;
-        let kept = Scene::bytes_of_exact(self.exact, size_of::<T>());
-        let (particles, bytes) = match &case.scheme {
-            Scheme::Updated(updated) => {
-                let bytes = updated::bytes_expected(scene, updated, per_cell, size_of::<T>(), kept);
-                (scene.particles_expected(per_cell), bytes)
-            }
-            Scheme::Total(total) => {
-                let grid = total.grid(scene, per_cell)?;
-                let particles =
-                    grid.axes.iter().map(|axis| axis.cells as f64 * per_cell as f64).product();
-                (particles, scene.bytes_expected(per_cell, size_of::<T>(), kept))
-            }
-        };
-        let round_off = self.rounding() * (steps.count as f64).sqrt();
-        Ok(Plan { steps: steps.count, particles, bytes, extent: scene.extent(), round_off })
-    }
-
-    /// The rounding error of a position, a length: half a unit in the last place.
-    pub(crate) fn rounding(&self) -> f64 {
-        T::default_epsilon().to_f64() / 2.0 * self.scene.reach()
-    }
-
-    fn floors(&self, u: f64) -> Result<PerField<f64>, CaseError> {
-        let speed = CflSpeed::PWave.of(self.exact)?;
-        let strain = u / self.scene.spacing;
-        let stress = self.exact.density() * speed * speed * strain;
-        Ok(PerField { u, v: speed * strain, F: strain, P: stress })
-    }
-
-    /// The steps of the case at another CFL number.
-    pub(crate) fn steps_at(&self, cfl: f64) -> Result<Steps, CaseError> {
-        Case { cfl, ..self.case }.validate()?;
-        Steps::new(cfl, self.end, self.waves)
-    }
-}
-
 impl<T: Precision<D>, const D: usize> Simulate for OnGrid<'_, T, D>
 where
     f64: Precision<D>,
@@ -262,7 +183,7 @@ where
     }
 
     fn time_steps(&self, most: u64, until: Option<Instant>) -> Result<Timing, CaseError> {
-        cost::time_steps(self, most, until)
+        timing::time_steps(self, most, until)
     }
 
     fn differences(
@@ -274,64 +195,18 @@ where
     }
 
     fn observe(&self, cfl: f64, end: f64, limits: Option<&Limits>) -> Result<Observed, CaseError> {
-        stability::observe(self, cfl, end, limits)
+        observe::observe(self, cfl, end, limits)
     }
 
     fn scales(&self) -> Result<Scales, CaseError> {
-        stability::scales(self)
+        observe::scales(self)
     }
-}
-
-/// Waves that cross the cells of a grid: what time steps and CFL numbers have to do with each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Waves {
-    pub(crate) speed: f64,
-    pub(crate) spacing: f64,
-}
-
-impl Waves {
-    /// The time step of a CFL number.
-    pub(crate) fn time_step(self, cfl: f64) -> f64 {
-        cfl * self.spacing / self.speed
-    }
-
-    /// The CFL number of a time step.
-    pub(crate) fn cfl(self, time_step: f64) -> f64 {
-        time_step * self.speed / self.spacing
-    }
-}
-
-/// The steps of a run: `count` of equal length `dt` that end exactly at the end time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Steps {
-    pub(crate) count: u64,
-    pub(crate) dt: f64,
-    pub(crate) cfl: f64,
-}
-
-impl Steps {
-    fn new(cfl: f64, end: f64, waves: Waves) -> Result<Self, CaseError> {
-        let longest = waves.time_step(cfl);
-        let count = steps_to(end, longest)?;
-        let dt = end / count as f64;
-        let is_whole = (end / longest - count as f64).abs() <= 1e-9;
-        Ok(Self { count, dt, cfl: if is_whole { cfl } else { waves.cfl(dt) } })
-    }
-}
-
-/// How many steps of at most `dt` lead to the end time.
-pub(crate) fn steps_to(end: f64, dt: f64) -> Result<u64, CaseError> {
-    // Slightly more than a whole number is rounding, not another step.
-    let steps = (end / dt - 1e-9).ceil().max(1.0);
-    if steps.is_nan() || steps > MOST_STEPS {
-        return Err(CaseError::TooManySteps { end, dt, steps });
-    }
-    Ok(steps as u64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
 
     /// Values kept of each particle count: four numbers for the body force and as many for the state.
     #[test]
@@ -343,24 +218,5 @@ mod tests {
         let AnySolution::Two(exact) = exact else { panic!("it is plane") };
         assert_eq!(Scene::bytes_of_exact(exact.as_ref(), size_of::<f64>()), 64);
         assert_eq!(Scene::bytes_of_exact(exact.as_ref(), size_of::<f32>()), 48);
-    }
-
-    #[test]
-    fn whole_steps_keep_the_cfl_number_and_others_shorten_the_step() {
-        let waves = Waves { speed: 100.0, spacing: 1.0 / 16.0 };
-        let steps = Steps::new(0.4, 0.02, waves).unwrap();
-        assert_eq!((steps.count, steps.cfl), (80, 0.4));
-        assert_eq!(steps.dt, 0.02 / 80.0);
-        let steps = Steps::new(0.3, 0.02, waves).unwrap();
-        assert_eq!(steps.count, 107);
-        assert!((steps.cfl - 32.0 / 107.0).abs() < 1e-15 && steps.cfl < 0.3);
-    }
-
-    #[test]
-    fn a_step_longer_than_the_end_time_becomes_one_step() {
-        let waves = Waves { speed: 100.0, spacing: 0.1 };
-        assert_eq!(Steps::new(1e9, 0.02, waves).unwrap().count, 1);
-        let found = Steps::new(1e-300, 0.02, waves);
-        assert!(matches!(found, Err(CaseError::TooManySteps { .. })));
     }
 }

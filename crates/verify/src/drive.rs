@@ -12,9 +12,9 @@ use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
-use crate::discretized::OnGrid;
 use crate::error::CaseError;
 use crate::interrupt::StepLoop;
+use crate::on_grid::OnGrid;
 use crate::precision::Precision;
 use crate::scheme::Scheme;
 use crate::{total, updated};

@@ -158,3 +158,14 @@ fn suggestion(fitting: &[usize]) -> String {
     let counts: Vec<_> = fitting.iter().map(usize::to_string).collect();
     format!("cell counts that do: {}", counts.join(", "))
 }
+
+/// A case of a study could not be run.
+// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
+#[derive(Debug, Error)]
+#[error("case {}: {cause}", index + 1)]
+pub struct StudyError {
+    /// The case's number in the sweep, from 0.
+    pub index: usize,
+    /// Why.
+    pub cause: CaseError,
+}

@@ -38,6 +38,8 @@ mod inverse;
 mod inversion;
 mod measurement;
 mod named;
+mod observe;
+mod on_grid;
 mod order;
 mod points;
 mod precision;
@@ -51,6 +53,7 @@ mod stability;
 mod stated_law;
 mod study;
 mod temporal;
+mod timing;
 mod total;
 mod tradeoff;
 mod updated;
@@ -65,11 +68,11 @@ pub use check::{
     body_of, check, has_body,
 };
 pub use checkpoint::{CheckpointError, CheckpointFolder, Checkpoints};
-pub use cost::{Cost, CostModel, Timing};
+pub use cost::{Cost, CostModel};
 pub use coverage::{Part, Share, coverage, smallest_set};
-pub use discretized::{Discretized, Plan};
+pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
-pub use error::{CaseError, SceneError};
+pub use error::{CaseError, SceneError, StudyError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use frames::{FrameOutput, Snapshot};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
@@ -82,10 +85,12 @@ pub use mmsmith_mpm::{Integrator, Shape, Transfer};
 pub use mmsmith_ranks::{Ranks, Sent, gather};
 pub use mmsmith_vtk::Provenance;
 pub use named::{Named, names};
-pub use order::Order;
+pub use observe::{Failure, FailureKind, Observed};
+pub use on_grid::Plan;
+pub use order::{Order, orders_above};
 pub use record::{Record, TemporalRecord};
 pub use remedy::{Attempt, Remedy, remedy};
-pub use run::{Outputs, Progress, Row, RunTraffic, Status, run};
+pub use run::{Outputs, Progress, Row, RunTraffic, Status};
 pub use scene::{loaded_instead, needs_total_frame};
 pub use scheme::{Choice, Formulation, GridPose, Placement, Scheme, Start, Total, Updated};
 pub use score::{
@@ -95,11 +100,11 @@ pub use score::{
     compare_recordings, score,
 };
 pub use stability::{
-    Criteria, Failure, FailureKind, Observed, Search, SearchProgress, StabilityRow, is_stable,
-    p_wave_limit, stability,
+    Criteria, Search, SearchProgress, StabilityRow, is_stable, p_wave_limit, stability,
 };
-pub use study::{Study, StudyError, Sweep, converge, orders_above};
+pub use study::{Study, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow};
+pub use timing::Timing;
 pub use total::POLAR_ANGLES;
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,

@@ -1,13 +1,7 @@
 //! Names of choices: one list for options, captions and JSON.
 
-use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
 use mmsmith_measure::norms::Norm;
 use mmsmith_mpm::{Integrator, Shape};
-
-use crate::case::{CflSpeed, Extent};
-use crate::scheme::{Formulation, Start};
-use crate::score::Points;
-use crate::tradeoff::Against;
 
 /// A choice among few, each with its name.
 pub trait Named: Copy + Send + Sync + Sized + 'static {
@@ -42,7 +36,7 @@ pub fn names<N: Named>() -> String {
 
 macro_rules! named {
     ($($Enum:ident { $($Value:ident = $name:literal $(, $alias:literal)*: $about:literal;)+ })+) => {$(
-        impl Named for $Enum {
+        impl $crate::named::Named for $Enum {
             const ALL: &'static [Self] = &[$(Self::$Value),+];
 
             fn name(self) -> &'static str {
@@ -60,63 +54,13 @@ macro_rules! named {
     )+};
 }
 
+pub(crate) use named;
+
 named! {
-    Formulation {
-        Updated = "updated-lagrangian", "updated", "ul":
-            "Updated Lagrangian: weights anew in each step, from the current configuration";
-        Total = "total-lagrangian", "total", "tl":
-            "Total Lagrangian: weights once, from the reference configuration";
-    }
-    Composition {
-        Order2 = "2": "Leapfrog";
-        Order4 = "4": "Five stages";
-        Order6 = "6": "Nine stages";
-    }
-    Start {
-        Exact = "exact": "The exact velocity half a step before time zero";
-        Data = "data": "Velocity and acceleration at time zero";
-        Halved = "halved": "Velocity at time zero, first acceleration halved";
-    }
-    MassMatrix {
-        Lumped = "lumped": "Row sums on the diagonal";
-        Consistent = "consistent": "Integrated over the particles";
-    }
-    Coordinates {
-        Cartesian = "cartesian": "Cartesian";
-        Polar = "polar": "Radius and angle";
-        Spherical = "spherical":
-            "Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis";
-    }
-    Layout {
-        Lattice = "lattice": "Centres of equal parts of a cell";
-        Gauss = "gauss": "Gauss-Legendre points";
-    }
-    CflSpeed {
-        Bar = "bar":
-            "Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed";
-        PWave = "p-wave":
-            "Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)";
-    }
-    Extent {
-        Quarter = "quarter":
-            "The part between the planes of symmetry: a quarter of a ring, an eighth of a shell";
-        Full = "full": "All of it";
-    }
     Norm {
         Linf = "linf": "Largest over particles";
         L2 = "l2": "Root of the mean square";
         L1 = "l1": "Mean";
-    }
-    Against {
-        Wall = "wall": "Wall-clock time of the steps";
-        Cpu = "cpu": "Processor time of the steps";
-        Steps = "steps": "Number of steps";
-        Memory = "memory": "Memory, estimated";
-    }
-    Points {
-        Auto = "auto": "Reference positions if they stay while displacements change, else current ones";
-        Current = "current": "Current positions";
-        Reference = "reference": "Reference positions";
     }
 }
 
@@ -147,6 +91,7 @@ impl Named for Integrator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scheme::{Formulation, Start};
 
     #[test]
     fn old_names_and_capitals_are_read() {
@@ -154,7 +99,7 @@ mod tests {
             assert_eq!(Formulation::named(name), Some(Formulation::Updated), "{name}");
         }
         assert_eq!(Start::named("halve"), None);
-        assert_eq!(names::<MassMatrix>(), "lumped, consistent");
+        assert_eq!(names::<Norm>(), "linf, l2, l1");
         assert_eq!(Shape::named("GIMP"), Some(Shape::Gimp));
     }
 }

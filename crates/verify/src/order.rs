@@ -1,5 +1,6 @@
 //! Orders of accuracy from errors and step sizes.
 
+use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 use serde::Serialize;
 
 /// The observed order of one error norm over a series of cases.
@@ -45,6 +46,55 @@ fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let xy: f64 = points.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
     // Equal steps whose mean rounds leave a tiny xx; a step ratio worth fitting is far above it.
     (xx > 1e-18).then(|| xy / xx)
+}
+
+/// The orders of errors over steps, those left out that rounding may have caused: at or below `floors`, row by row.
+#[must_use]
+pub fn orders_above(
+    steps: &[f64],
+    values: &[Option<&PerField<PerNorm<f64>>>],
+    floors: &[PerField<f64>],
+) -> PerField<PerNorm<Order>> {
+    each_norm(values, |field, norm, errors| {
+        let floor =
+            |row: usize| floors.get(row).map_or(0.0, |floor| floor[field] * above_mean(norm));
+        let above =
+            |(row, error): (usize, &Option<f64>)| error.filter(|error| *error >= floor(row));
+        let errors: Vec<_> = errors.iter().enumerate().map(above).collect();
+        Order::of(steps, &errors)
+    })
+}
+
+/// The largest error that rounding may cause, in units of its root mean square: the floors are of the latter, and the largest of
+/// some thousand particles and steps lies beyond.
+pub(crate) fn above_mean(norm: Norm) -> f64 {
+    match norm {
+        Norm::Linf => 8.0,
+        Norm::L2 | Norm::L1 => 1.0,
+    }
+}
+
+/// The orders of errors, `None` where a case failed, with respect to the steps beside them.
+pub(crate) fn orders_of(
+    rows: &[(f64, Option<&PerField<PerNorm<f64>>>)],
+) -> PerField<PerNorm<Order>> {
+    let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
+    let values: Vec<_> = rows.iter().map(|(_, errors)| *errors).collect();
+    each_norm(&values, |_, _, errors| Order::of(&steps, errors))
+}
+
+/// Results of `judge` for the series of values of every field and norm.
+pub(crate) fn each_norm<R>(
+    values: &[Option<&PerField<PerNorm<f64>>>],
+    judge: impl Fn(Field, Norm, &[Option<f64>]) -> R,
+) -> PerField<PerNorm<R>> {
+    PerField::from_fn(|field| {
+        PerNorm::from_fn(|norm| {
+            let pick = |value: &PerField<PerNorm<f64>>| value[field][norm];
+            let series: Vec<_> = values.iter().map(|value| value.map(pick)).collect();
+            judge(field, norm, &series)
+        })
+    })
 }
 
 #[cfg(test)]

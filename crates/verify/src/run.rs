@@ -8,17 +8,17 @@ use std::time::Instant;
 use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
 use mmsmith_mpm::{Solver, StepError};
 use mmsmith_ranks::{Ranks, Sent, Traffic, counted};
-use mmsmith_runtime::{AnySolution, Solution};
+use mmsmith_runtime::Solution;
 use serde::{Serialize, Serializer};
 
-use crate::case::{Arithmetic, Case, law};
+use crate::case::law;
 use crate::checkpoint::{Checkpoints, Reached, TakenUp};
-use crate::discretized::{Discretized, OnGrid};
 use crate::drive::{Driven, Outcome, Seen, Stepped};
 use crate::error::CaseError;
 use crate::frames::{FrameOutput, FrameWriter, Snapshot};
 use crate::history::{Moment, Recorder};
 use crate::measurement::Measurement;
+use crate::on_grid::OnGrid;
 use crate::points;
 use crate::precision::Precision;
 
@@ -247,20 +247,6 @@ pub struct Row {
 
 fn is_true(value: &bool) -> bool {
     *value
-}
-
-/// Puts a case on its grid and [runs](Discretized::run) it.
-///
-/// # Errors
-///
-/// [`CaseError`] for settings that cannot be run, and for files that cannot be written.
-pub fn run(
-    exact: &AnySolution<f64>,
-    arithmetic: Arithmetic<'_>,
-    case: &Case,
-    outputs: &mut Outputs<'_>,
-) -> Result<Row, CaseError> {
-    Discretized::new(exact, arithmetic, case)?.run(outputs)
 }
 
 /// Steps a case to its end, and measures, writes and records on the way.

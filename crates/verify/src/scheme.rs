@@ -6,7 +6,7 @@ use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
 use mmsmith_mpm::{Integrator, Shape, Transfer};
 use serde::{Serialize, Serializer};
 
-use crate::named::Named;
+use crate::named::{Named, named};
 
 /// How particles and grid exchange, and how a run goes on in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +102,39 @@ pub enum Formulation {
     Updated,
     /// Total Lagrangian.
     Total,
+}
+
+named! {
+    Formulation {
+        Updated = "updated-lagrangian", "updated", "ul":
+            "Updated Lagrangian: weights anew in each step, from the current configuration";
+        Total = "total-lagrangian", "total", "tl":
+            "Total Lagrangian: weights once, from the reference configuration";
+    }
+    Composition {
+        Order2 = "2": "Leapfrog";
+        Order4 = "4": "Five stages";
+        Order6 = "6": "Nine stages";
+    }
+    Start {
+        Exact = "exact": "The exact velocity half a step before time zero";
+        Data = "data": "Velocity and acceleration at time zero";
+        Halved = "halved": "Velocity at time zero, first acceleration halved";
+    }
+    MassMatrix {
+        Lumped = "lumped": "Row sums on the diagonal";
+        Consistent = "consistent": "Integrated over the particles";
+    }
+    Coordinates {
+        Cartesian = "cartesian": "Cartesian";
+        Polar = "polar": "Radius and angle";
+        Spherical = "spherical":
+            "Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis";
+    }
+    Layout {
+        Lattice = "lattice": "Centres of equal parts of a cell";
+        Gauss = "gauss": "Gauss-Legendre points";
+    }
 }
 
 /// The value of a choice.
@@ -281,7 +314,7 @@ mod tests {
         written.as_object().unwrap().keys().cloned().collect()
     }
 
-    /// What a formulation has no choice of is not written.
+    /// Choices of the other formulation are not written.
     #[test]
     fn a_scheme_is_written_with_its_own_choices() {
         let usual = Updated::default();

@@ -1,14 +1,13 @@
 //! Convergence studies: the same case on several grids or with several time steps.
 
-use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
+use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_runtime::AnySolution;
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::case::{Arithmetic, Case};
 use crate::discretized::Discretized;
-use crate::error::CaseError;
-use crate::order::Order;
+use crate::error::StudyError;
+use crate::order::{Order, orders_of};
 use crate::run::{Outputs, Progress, Row, Status};
 
 /// The setting that changes from row to row.
@@ -79,17 +78,6 @@ impl Study {
     }
 }
 
-/// A case of a study could not be run.
-// The message has the cause, which is therefore no `source`: whoever prints both would print it twice.
-#[derive(Debug, Error)]
-#[error("case {}: {cause}", index + 1)]
-pub struct StudyError {
-    /// The case's number in the sweep, from 0.
-    pub index: usize,
-    /// Why.
-    pub cause: CaseError,
-}
-
 /// Puts every case of `sweep` on its grid, before the first run, and [measures](Study::measure) them.
 ///
 /// # Errors
@@ -119,53 +107,4 @@ fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
     let rows =
         rows.iter().map(|row| (step(row), (row.status == Status::Ok).then_some(&row.errors)));
     orders_of(&rows.collect::<Vec<_>>())
-}
-
-/// The orders of errors over steps, those left out that rounding may have caused: at or below `floors`, row by row.
-#[must_use]
-pub fn orders_above(
-    steps: &[f64],
-    values: &[Option<&PerField<PerNorm<f64>>>],
-    floors: &[PerField<f64>],
-) -> PerField<PerNorm<Order>> {
-    each_norm(values, |field, norm, errors| {
-        let floor =
-            |row: usize| floors.get(row).map_or(0.0, |floor| floor[field] * above_mean(norm));
-        let above =
-            |(row, error): (usize, &Option<f64>)| error.filter(|error| *error >= floor(row));
-        let errors: Vec<_> = errors.iter().enumerate().map(above).collect();
-        Order::of(steps, &errors)
-    })
-}
-
-/// The largest error that rounding may cause, in units of its root mean square: the floors are of the latter, and the largest of
-/// some thousand particles and steps lies beyond.
-pub(crate) fn above_mean(norm: Norm) -> f64 {
-    match norm {
-        Norm::Linf => 8.0,
-        Norm::L2 | Norm::L1 => 1.0,
-    }
-}
-
-/// The orders of errors, `None` where a case failed, with respect to the steps beside them.
-pub(crate) fn orders_of(
-    rows: &[(f64, Option<&PerField<PerNorm<f64>>>)],
-) -> PerField<PerNorm<Order>> {
-    let steps: Vec<f64> = rows.iter().map(|(step, _)| *step).collect();
-    let values: Vec<_> = rows.iter().map(|(_, errors)| *errors).collect();
-    each_norm(&values, |_, _, errors| Order::of(&steps, errors))
-}
-
-/// Results of `judge` for the series of values of every field and norm.
-pub(crate) fn each_norm<R>(
-    values: &[Option<&PerField<PerNorm<f64>>>],
-    judge: impl Fn(Field, Norm, &[Option<f64>]) -> R,
-) -> PerField<PerNorm<R>> {
-    PerField::from_fn(|field| {
-        PerNorm::from_fn(|norm| {
-            let pick = |value: &PerField<PerNorm<f64>>| value[field][norm];
-            let series: Vec<_> = values.iter().map(|value| value.map(pick)).collect();
-            judge(field, norm, &series)
-        })
-    })
 }

@@ -15,13 +15,12 @@ use mmsmith_runtime::Real;
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
-use crate::discretized::OnGrid;
 use crate::drive::{Driven, Outcome, Stepped};
-use crate::error::{CaseError, MOST_STEPS};
-use crate::order::Order;
+use crate::error::{CaseError, MOST_STEPS, StudyError};
+use crate::on_grid::OnGrid;
+use crate::order::{Order, orders_of};
 use crate::precision::Precision;
 use crate::run::{Progress, Status};
-use crate::study::{StudyError, orders_of};
 
 /// The runs are compared at this many times, evenly spread, the last one the end.
 ///

@@ -20,7 +20,8 @@ mod sweep;
 use std::collections::BTreeMap;
 
 use crate::case::Case;
-use crate::discretized::Plan;
+use crate::named::named;
+use crate::on_grid::Plan;
 use crate::run::Row;
 use sweep::{Cases, Sweep};
 
@@ -74,6 +75,15 @@ pub enum Against {
     Steps,
     /// Memory.
     Memory,
+}
+
+named! {
+    Against {
+        Wall = "wall": "Wall-clock time of the steps";
+        Cpu = "cpu": "Processor time of the steps";
+        Steps = "steps": "Number of steps";
+        Memory = "memory": "Memory, estimated";
+    }
 }
 
 /// Why something was not run.

@@ -212,12 +212,12 @@ pub fn verdicts_above(
     expected: &Expected,
     tolerance: f64,
 ) -> PerField<PerNorm<Verdict>> {
-    crate::study::each_norm(values.errors, |field, norm, errors| {
+    crate::order::each_norm(values.errors, |field, norm, errors| {
         let expected = expected[field][norm];
         let floors: Vec<f64> = values
             .floors
             .iter()
-            .map(|floor| floor[field] * crate::study::above_mean(norm))
+            .map(|floor| floor[field] * crate::order::above_mean(norm))
             .collect();
         Verdict::above(values.steps, errors, &floors, expected, tolerance)
     })

@@ -11,7 +11,8 @@ use mmsmith_verify::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::problem::{Problem, announce, extent};
+use super::predict::announce;
+use super::problem::{Problem, extent};
 use super::remedy::Given;
 use super::study::{Request, Show, Study, conduct};
 use crate::arguments::{ConvergeOptions, SchemeOptions};

@@ -5,6 +5,7 @@ use std::time::Duration;
 use mmsmith_verify::{Case, CaseError, Cost, CostModel, Discretized, Plan};
 
 use super::problem::Model;
+use crate::{processes, terminal};
 
 /// Cell counts that `mms explain` tells of.
 pub(super) const GRIDS: [usize; 4] = [32, 64, 128, 256];
@@ -27,6 +28,24 @@ pub(super) fn seconds(cases: &[Discretized<'_>]) -> Option<Vec<f64>> {
     let effort = Duration::from_secs_f64((EFFORT * all).clamp(EFFORTS.0, EFFORTS.1));
     let learnt = CostModel::calibrate(largest, effort).ok()?;
     cases.iter().map(|case| Some(learnt.predict(case.plan())?.total_s)).collect()
+}
+
+/// Says on standard error what cases of more than a minute will take, and gives the seconds of each.
+pub(super) fn announce(cases: &[Discretized<'_>]) -> Option<Vec<f64>> {
+    // Each process would calibrate with the whole body.
+    if processes::ranks().is_some() {
+        return None;
+    }
+    const LONG_S: f64 = 60.0;
+    let seconds = seconds(cases)?;
+    let total: f64 = seconds.iter().sum();
+    if total < LONG_S {
+        return None;
+    }
+    let bytes = cases.iter().map(|case| case.plan().bytes).fold(0.0, f64::max);
+    let (time, memory) = (duration(total), amount(bytes));
+    terminal::note(format_args!("predicted: about {time}, with {memory} of memory"));
+    Some(seconds)
 }
 
 /// Cost model from a few steps of a case's scheme, on grids up to its own.

@@ -8,7 +8,6 @@ use mmsmith_verify::{
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::predict;
 use super::scheme::{self, Settled};
 use crate::arguments::{Precision, SchemeOptions, word};
 use crate::library::Selection;
@@ -138,22 +137,4 @@ impl Problem {
 /// The extent that cases have, as the last of them has it.
 pub(super) fn extent(cases: &[Discretized<'_>]) -> Option<Extent> {
     cases.last().and_then(|case| case.plan().extent)
-}
-
-/// Says on standard error what cases of more than a minute will take, and gives the seconds of each.
-pub(super) fn announce(cases: &[Discretized<'_>]) -> Option<Vec<f64>> {
-    // Each process would calibrate with the whole body.
-    if processes::ranks().is_some() {
-        return None;
-    }
-    const LONG_S: f64 = 60.0;
-    let seconds = predict::seconds(cases)?;
-    let total: f64 = seconds.iter().sum();
-    if total < LONG_S {
-        return None;
-    }
-    let bytes = cases.iter().map(|case| case.plan().bytes).fold(0.0, f64::max);
-    let (time, memory) = (predict::duration(total), predict::amount(bytes));
-    terminal::note(format_args!("predicted: about {time}, with {memory} of memory"));
-    Some(seconds)
 }

@@ -11,7 +11,8 @@ use mmsmith_verify::{
 use serde_json::{Map, Value, json};
 
 use super::picture::Picture;
-use super::problem::{Model, Problem, announce};
+use super::predict::announce;
+use super::problem::{Model, Problem};
 use super::remedy::{Advice, Given};
 use super::{checkpoint_folder, inversion};
 use crate::arguments::RunOptions;

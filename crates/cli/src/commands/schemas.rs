@@ -76,7 +76,7 @@ pub(super) fn lines(value: &Value, margin: usize) -> String {
     format!("{}{between}{parts}\n{:margin$}{}", marks[0], "", marks[1])
 }
 
-/// What is left to be read, and the types that it may name.
+/// A reader of the notation: the rest of the text, and the types that it may name.
 struct Reader<'a> {
     rest: &'a str,
     known: &'a BTreeMap<String, Value>,

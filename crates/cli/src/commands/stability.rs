@@ -145,7 +145,7 @@ impl Study for Survey<'_> {
         self.points.iter().zip(&self.cases).map(key).collect()
     }
 
-    /// That of a run of each point at one CFL number; searches take about as many runs.
+    /// Work of a run of each point at one CFL number; searches take about as many runs.
     fn work(&self) -> Vec<f64> {
         self.cases.iter().map(|case| case.plan().work()).collect()
     }

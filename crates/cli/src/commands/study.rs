@@ -16,7 +16,7 @@ use crate::progress::Bar;
 use crate::report::{Asked, Report};
 use crate::terminal;
 
-/// A study: what it measures, case by case, and what the results say.
+/// A study: its cases, each with a result, and the report on all results.
 pub(super) trait Study: Sync {
     /// The result of a case, which a folder may keep.
     type Found: Serialize + DeserializeOwned + Send;
@@ -93,7 +93,7 @@ impl Shares {
     }
 }
 
-/// What is asked of a study.
+/// A request for a study.
 pub(super) struct Request<'a> {
     /// The solution, as the command line names it.
     pub(super) solution: &'a str,

@@ -8,6 +8,7 @@ use mmsmith_vtk::Provenance;
 
 use super::arrays::Role;
 use super::quantity::Quantity;
+use crate::named::named;
 use crate::verdict::ORDER_TOLERANCE;
 
 /// Meaning of the points of the files.
@@ -20,6 +21,14 @@ pub enum Points {
     Current,
     /// Reference positions `X`, as many finite element codes write them.
     Reference,
+}
+
+named! {
+    Points {
+        Auto = "auto": "Reference positions if they stay while displacements change, else current ones";
+        Current = "current": "Current positions";
+        Reference = "reference": "Reference positions";
+    }
 }
 
 /// The times of the frames of a recording.

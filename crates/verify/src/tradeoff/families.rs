@@ -5,7 +5,7 @@ use mmsmith_mpm::{Integrator, Shape, Transfer};
 
 use super::{LADDER, Setting};
 use crate::case::Case;
-use crate::discretized::Plan;
+use crate::on_grid::Plan;
 use crate::scheme::{Placement, Scheme, Total, Updated};
 
 /// The families that may fit a solution, in the order in which they are tried; those that do not fit it are left out.

@@ -2,7 +2,7 @@
 
 use super::{Against, LADDER, MARGIN, Setting, Skip};
 use crate::cost::{Cost, CostModel};
-use crate::discretized::Plan;
+use crate::on_grid::Plan;
 use crate::scheme::{Scheme, Total, Updated};
 
 /// Shares of the budget at which the sweep, the comparisons of single settings, the proofs on neighbouring grids and the repeats

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::case::Case;
 use crate::cost::{Cost, CostModel};
-use crate::discretized::Plan;
+use crate::on_grid::Plan;
 use crate::run::Status;
 use crate::scheme::{Placement, Scheme};
 

@@ -14,7 +14,7 @@ pub(in crate::commands) type Verdicts = PerField<PerNorm<OrderVerdict>>;
 pub(super) struct Judged {
     pub(super) study: Study,
     pub(super) verdicts: Verdicts,
-    /// Of a study in time.
+    /// Differences between time steps and their verdicts, in a study in time.
     pub(super) differences: Option<(Temporal, Verdicts)>,
 }
 

@@ -9,7 +9,7 @@ use mmsmith_verify::{Field, Row, Sweep};
 use sha2::{Digest, Sha256};
 
 use super::claims::{Claim, difference_orders, told_orders};
-use super::section::Section;
+use super::section::{Section, captioned};
 use super::{
     CELLS, DENSITY, DIFFERENCES, Differences, GENTLE, GENTLE_GRID, GRID, PROBLEMS, Results,
     SMALL_STEP, SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables,
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::svg::escape;
 use crate::table::{self, Table};
-use crate::{html, machine, number};
+use crate::{machine, number};
 
 const STYLE: &str = include_str!("report.css");
 
@@ -87,14 +87,14 @@ fn sum_section(results: &[Results], gentle: &[Differences]) -> String {
     let in_time = told_orders(&difference_orders(&square.differences, "gimp+usl"));
     let cd = told_orders(&difference_orders(gentle, "gimp+cd"));
     let cd_usual = told_orders(&difference_orders(&square.differences, "gimp+cd"));
-    let figure = figure(
+    let figure = captioned(
         &difference_plot(&format!("Difference in time, A = {GENTLE}"), gentle),
         &format!(
             "A run against the run with half its time step, on one grid of {GENTLE_GRID} cells, at the amplitude \
              {GENTLE}. Dashed grey: slopes 1 and 2."
         ),
     );
-    let usual = self::figure(
+    let usual = captioned(
         &difference_plot("Difference in time, A = 0.1", &square.differences),
         &format!("The same at the study's amplitude on {GRID} cells."),
     );
@@ -154,14 +154,14 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     text += &parameters.html(&format!("{problem}: parameters"));
 
     text += "<h3>Convergence</h3>\n<div class=\"figures\">\n";
-    text += &figure(
+    text += &captioned(
         &space_plot(results),
         &format!(
             "Largest error of u over all particles and steps, on {} cells, at CFL 0.4. Dashed grey: slopes 1 and 2.",
             CELLS.map(|cells| cells.to_string()).join(", ")
         ),
     );
-    text += &figure(
+    text += &captioned(
         &time_plot(results),
         &format!(
             "The same on {GRID} cells over the time step: mostly the spatial error, up to the limit of stability."
@@ -169,7 +169,7 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     );
     // That of the first problem stands with the question that it answers.
     if problem != PROBLEMS[0] {
-        text += &figure(
+        text += &captioned(
             &difference_plot(&format!("{problem}: difference in time"), &results.differences),
             &format!(
                 "A run against the run with half its time step, on {GRID} cells: what the time step alone does."
@@ -178,7 +178,7 @@ fn problem_section(out: &Path, results: &Results) -> Result<String> {
     }
     text += "</div>\n<h3>Stress</h3>\n<div class=\"figures\">\n";
     for picture in pictures::all(problem, out)? {
-        text += &figure(&picture.svg, &picture.caption);
+        text += &captioned(&picture.svg, &picture.caption);
     }
     text += "</div>\n<h3>Tables</h3>\n";
     let cells = |row: &Row| row.cells.to_string();
@@ -225,10 +225,6 @@ fn does_not_converge(results: &Results) -> bool {
         (Some(first), Some(last)) => last.errors.F.linf >= first.errors.F.linf,
         _ => false,
     }
-}
-
-pub(super) fn figure(svg: &str, caption: &str) -> String {
-    format!("<figure>\n{svg}<figcaption>{}</figcaption>\n</figure>\n", html::text(caption))
 }
 
 /// Links to the data of a problem, relative to the page.

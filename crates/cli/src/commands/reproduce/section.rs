@@ -45,7 +45,7 @@ impl Section {
     pub(super) fn figures(&mut self, figures: &[(String, String, String)]) {
         self.html += "<div class=\"figures\">\n";
         for (svg, path, caption) in figures {
-            self.html += &super::report::figure(svg, caption);
+            self.html += &captioned(svg, caption);
             let _ = write!(self.markdown, "\n![{caption}]({path})\n");
         }
         self.html += "</div>\n";
@@ -106,6 +106,11 @@ impl Section {
             .collect();
         let _ = writeln!(self.html, "<p>Files: {}</p>", links.join(", "));
     }
+}
+
+/// A picture with its caption.
+pub(super) fn captioned(svg: &str, caption: &str) -> String {
+    format!("<figure>\n{svg}<figcaption>{}</figcaption>\n</figure>\n", html::text(caption))
 }
 
 /// Sentence as HTML, with the parts between backquotes as code.
