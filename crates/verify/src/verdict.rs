@@ -190,7 +190,7 @@ pub struct Values<'a> {
     pub steps: &'a [f64],
     /// The errors; `None` where a case failed, not numbers where it has none to judge.
     pub errors: &'a [Option<&'a PerField<PerNorm<f64>>>],
-    /// Errors that rounding alone may cause, row by row ([`round_off`](crate::round_off)); empty where rounding does not count.
+    /// Errors that rounding alone may cause, row by row ([`floors`](crate::Discretized::floors)); empty where rounding does not count.
     pub floors: &'a [PerField<f64>],
 }
 
@@ -268,7 +268,7 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
     PerField { u, ..Expected::default() }
 }
 
-/// The orders in `dt` of the differences on one grid ([`temporal`](crate::temporal())) that theory promises for the
+/// The orders in `dt` of the differences on one grid ([`differences`](crate::Discretized::differences)) that theory promises for the
 /// displacement: 1 for the integrators that move particles with the velocity of one end of the step.
 ///
 /// Nothing is promised for centred differences. They are formally of second order, but the measured order falls towards
