@@ -69,7 +69,7 @@ impl Move {
         (moved, ids)
     }
 
-    /// Those of the elements that are here afterwards, in their order. Collective.
+    /// The elements that are here afterwards, in their order. Collective.
     pub fn all<E: Pod>(&self, elements: &[E]) -> Vec<E> {
         self.all_shares(1, elements)
     }
