@@ -23,7 +23,7 @@ pub trait Named: Copy + Send + Sync + Sized + 'static {
     #[must_use]
     fn named(name: &str) -> Option<Self> {
         let is_it = |known: &&str| known.eq_ignore_ascii_case(name);
-        let has_it = |one: &Self| is_it(&one.name()) || one.aliases().iter().any(|own| is_it(own));
+        let has_it = |one: &Self| is_it(&one.name()) || one.aliases().iter().any(&is_it);
         Self::ALL.iter().copied().find(has_it)
     }
 }
