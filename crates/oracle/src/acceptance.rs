@@ -13,6 +13,12 @@ use num_traits::{Signed, Zero};
 /// double, rounds to.
 #[must_use]
 pub fn worst_factor(result: f64, exact: &Rational, sens: &Rational) -> f64 {
+    units(result, exact, &(sens + exact.abs()))
+}
+
+/// The error of `result` in units of `2^-53` of `size`, which is taken as no smaller than `2^-1022`; as exact as [`worst_factor`].
+#[must_use]
+pub fn units(result: f64, exact: &Rational, size: &Rational) -> f64 {
     let Some(result) = crate::exact(result) else {
         return if result == nearest_f64(exact) { 0.0 } else { f64::INFINITY };
     };
@@ -21,7 +27,7 @@ pub fn worst_factor(result: f64, exact: &Rational, sens: &Rational) -> f64 {
         return 0.0;
     }
     let power = |n: u32| Rational::new(1.into(), BigInt::from(1) << n);
-    let bound = ((sens + exact.abs()) * power(53)).max(power(1075));
+    let bound = (size * power(53)).max(power(1075));
     nearest_f64(&(error / bound))
 }
 

@@ -2,19 +2,26 @@
 
 use crate::double_double::QuickTruth;
 use crate::{
-    Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, worst_factor,
+    Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, units,
+    worst_factor,
 };
 use mmsmith_expr::{Expr, Function, Node, Program, Rational, Slot};
 use mmsmith_spec::{Fields, Spec};
 use mmsmith_stage::{FieldName, Staged};
+use num_traits::Signed;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
-/// The factor `K` that every field of every solution keeps.
+/// The factor `K` that every entry of every field keeps at points that are drawn.
 pub const LARGEST_FACTOR: f64 = 8.0;
+/// The error that every field keeps at every point of the body, in units of `2^-53` of its size there.
+///
+/// The size of a field is its largest entry, and the largest answer of an entry to its inputs. Where the factor of 8 is kept so are these
+/// units; they also hold where an entry almost vanishes with its slopes.
+pub const LARGEST_UNITS: f64 = 16.0;
 
 /// Digits that the truth has at a place that is reported or doubtful.
 const DIGITS: usize = 40;
@@ -78,6 +85,8 @@ pub struct Worst {
     pub entry: usize,
     /// The factor `K`; infinite where the result is not finite.
     pub factor: f64,
+    /// The error in units of `2^-53` of the field's size at the point, see [`LARGEST_UNITS`].
+    pub units: f64,
     /// The inputs: position, time, parameters.
     pub inputs: Vec<f64>,
     /// How the point was found.
@@ -516,10 +525,13 @@ impl<'a> Accuracy<'a> {
             return Ok(Worst { field, entry: finding.entry, ..same.clone() });
         }
         let (factor, truth, sens) = self.settled(inputs, finding.field, finding.entry, result)?;
+        let size = self.size(inputs, finding.field)?;
+        let units = units(result, &truth, &size.max(&sens + truth.abs()));
         Ok(Worst {
             field,
             entry: finding.entry,
             factor,
+            units,
             inputs: inputs.to_vec(),
             found,
             outside: self.sampler.is_outside(inputs),
@@ -527,6 +539,20 @@ impl<'a> Accuracy<'a> {
             exact: scientific(&truth, 20),
             sensitivity: scientific(&sens, 4),
         })
+    }
+
+    /// The size of a field at a point: its largest entry, and the largest answer of an entry to the inputs.
+    fn size(&self, inputs: &[f64], field: usize) -> Result<Rational, AccuracyError> {
+        let before: usize = self.expressions[..field].iter().map(|(_, e)| e.len()).sum();
+        let entries = before..before + self.expressions[field].1.len();
+        let values = self.exact_inputs(inputs);
+        let truth = Oracle::new(QUICK_BITS)
+            .and_then(|mut oracle| oracle.evaluate(&self.point(&values), &self.flat[entries.clone()]))
+            .map_err(|error| self.no_value(inputs, error))?;
+        let largest = truth.iter().map(Signed::abs).max().unwrap_or_default();
+        let answers = &self.quick_sensitivities(inputs)[entries];
+        let answer = answers.iter().filter_map(|&answer| exact(answer)).max();
+        Ok(largest + answer.unwrap_or_default())
     }
 
     /// Results of the code under test, in the order of the fields and of the size that they have.

@@ -36,9 +36,9 @@ mod scientific;
 mod search;
 mod sensitivity;
 
-pub use acceptance::worst_factor;
+pub use acceptance::{units, worst_factor};
 pub use accuracy::{
-    Accuracy, AccuracyError, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR, Worst,
+    Accuracy, AccuracyError, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR, LARGEST_UNITS, Worst,
 };
 pub use convert::exact;
 pub use evaluate::{Oracle, OracleError, Point};

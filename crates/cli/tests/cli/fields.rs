@@ -82,7 +82,7 @@ fn the_search_for_rounding_errors_goes_on_from_its_state() {
     assert!(called.stdout.contains("searched"), "{}", called.stdout);
     let worst: Vec<&str> =
         called.stdout.lines().skip_while(|line| *line != "The worst of all:").collect();
-    // Four lines, each with every input, the meaning of K, and the file.
+    // Four lines, each with every input, what is allowed, and the file.
     assert_eq!(worst.len(), 7, "{}", called.stdout);
     assert!(worst[1..5].iter().all(|line| line.contains("found by ") && line.contains(" rho0 = ")));
     let read = |name: &str| read_json(&place.join(name));
