@@ -34,8 +34,8 @@ def check(
         solutions: What `load` gave, names, or paths of specifications.
         points: Number of sample points in the body and on each surface; with thorough of points drawn in each class of inputs before the
             search. Default: 300; 30 with seconds.
-        thorough: Search for the largest rounding error of every field, by comparison with arbitrary precision: among ordinary inputs, tiny
-            amplitudes, late times, at the boundary, near inversion, near and far from the origin.
+        thorough: Compare every field with arbitrary precision at points that are drawn, which decide, and search for the largest rounding
+            errors, which are told: among ordinary inputs, tiny amplitudes, late times, at the boundary, near inversion and near the origin.
         seconds: Time of the search in each solution. Default: 128 evaluations for each point drawn.
         state: Keep the state of each search in this folder, and continue from the state there.
         set: Value of a parameter, in place of its default.

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use blocks::Workplace;
 use links::{BOOK, Pages};
 use markdown::Page;
+pub(crate) use sections::stamp;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

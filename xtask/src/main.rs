@@ -8,6 +8,7 @@ use mmsmith_codegen::{HOSTS, Host};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+mod ablation;
 mod docs;
 mod generate;
 
@@ -38,6 +39,12 @@ enum Task {
         /// Specification files, or names of files in mms-specs; all of mms-specs where none is given.
         #[arg(value_name = "SPEC")]
         specs: Vec<PathBuf>,
+    },
+    /// Switch each rule of the derivation off, and write what is lost into the book; fail where that is not as the rule's row says.
+    Ablation {
+        /// Leave the book as it is.
+        #[arg(long)]
+        check: bool,
     },
     /// Run the examples of README and book, follow their links, and write the measurements of their pages.
     #[command(group = clap::ArgGroup::new("what").required(true))]
@@ -75,6 +82,7 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             let outcome = generate::run(&repository(), &specs, &hosts, out.as_deref(), options)?;
             (outcome.lines, outcome.stale)
         }
+        Task::Ablation { check } => ablation::run(&repository(), check)?,
         Task::Docs { write: true, mms, pages, .. } => {
             docs::write(&repository(), &mms, &pages, say)?;
             (Vec::new(), false)

@@ -25,7 +25,8 @@ pub struct Origin {
 
 impl Origin {
     /// A solution of the library.
-    fn library(spec: &Spec) -> Self {
+    #[must_use]
+    pub fn library(spec: &Spec) -> Self {
         Origin { command: "cargo xtask gen".into(), file: format!("mms-specs/{}.toml", spec.name) }
     }
 }

@@ -16,6 +16,7 @@ pub use parse::{Ast, AstKind, ParseError};
 pub use rational::{Rational, nearest_f64};
 pub use replacement::Replacement;
 
+use crate::RangeOfInputs;
 use num_traits::{One, Zero};
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::collections::BTreeSet;
@@ -83,6 +84,8 @@ pub struct Graph {
     pub(crate) work: usize,
     /// The values of the first nodes at one place, each with the magnitude of what it was summed up from.
     samples: Vec<(f64, f64)>,
+    /// The inputs for which functions of sums keep their digits.
+    pub range_of_inputs: RangeOfInputs,
     /// Results of [`Graph::open`].
     pub(crate) open: NumberMap<Expr, Expr>,
     /// Results of [`Graph::residue`].
@@ -119,6 +122,7 @@ impl Graph {
             has_exponentials: false,
             work: 0,
             samples: Vec::new(),
+            range_of_inputs: RangeOfInputs::default(),
             open: FxHashMap::default(),
             residues: FxHashMap::default(),
         };
@@ -247,14 +251,6 @@ impl Graph {
         match self.node(expr) {
             Node::Sum { .. } => self.intern(Node::Whole(expr)),
             _ => expr,
-        }
-    }
-
-    /// `expr` in one piece whatever it is but a number, so that algebra takes no factor out of it either.
-    pub(crate) fn opaque(&mut self, expr: Expr) -> Expr {
-        match self.node(expr) {
-            Node::Number(_) | Node::Whole(_) => expr,
-            _ => self.intern(Node::Whole(expr)),
         }
     }
 
@@ -429,10 +425,9 @@ mod tests {
             assert!(near(found.1, magnitude(x, y)), "{text}: {found:?}, not {}", magnitude(x, y));
             assert!(graph.differs_from_zero(expr), "{text}");
             // What has a value is the same in one piece.
-            let whole = graph.opaque(expr);
+            let whole = graph.whole(expr);
             assert_eq!(graph.sampled(whole), found, "{text}");
-            assert_eq!(graph.opaque(whole), whole);
-            assert_eq!(graph.as_number(expr).is_some(), whole == expr, "{text}");
+            assert_eq!(graph.whole(whole), whole);
         }
     }
 

@@ -6,10 +6,9 @@
 //! 2. [`Graph::build`] turns the tree into an [`Expr`] of a hash-consed [`Graph`]: equal expressions are one
 //!    node, numbers are exact rationals, and sums and products have a canonical form.
 //! 3. [`Derivatives::of`] differentiates.
-//! 4. [`reuse`] computes products within products once.
-//! 5. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
+//! 4. [`Program::lower`] turns expressions into a list of floating-point operations in which every common
 //!    subexpression is computed once. [`Program::evaluate`] runs it; code generators translate it.
-//! 6. [`Program::with_gathered_factors`] leaves less of it to do for each point at each time, and
+//! 5. [`Program::with_gathered_factors`] leaves less of it to do for each point at each time, and
 //!    [`Program::with_separated_coordinates`] for each point of a lattice, where asked to.
 //!
 //! The canonical form never expands a product of sums, since that loses digits: it collects like terms,
@@ -34,13 +33,15 @@
 mod graph;
 mod program;
 mod rewrite;
+pub mod rules;
 
 pub use graph::{
     Ast, AstKind, BuildError, Derivatives, Expr, Function, Graph, Node, ParseError, Rational,
     Replacement, RustCall, nearest_f64,
 };
 pub use program::{
-    Dependence, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program, Scalar,
-    Section, Slot,
+    Dependence, MOST_KEPT_OF_STATES, Operation, OperationCount, OperationsByStage, Program,
+    RangeOfInputs, Scalar, Section, Slot,
 };
-pub use rewrite::{CosineAndSine, Term, reuse};
+pub use rewrite::{CosineAndSine, Term};
+pub use rules::Rule;

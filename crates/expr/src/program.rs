@@ -17,6 +17,7 @@ mod separate;
 #[cfg(test)]
 mod tests;
 
+pub use argument::RangeOfInputs;
 pub(crate) use builder::{Builder, power};
 pub(crate) use error_bounds::SIDE;
 pub use keep::MOST_KEPT_OF_STATES;
@@ -24,7 +25,7 @@ pub use scalar::Scalar;
 pub use section::Section;
 
 use crate::graph::NumberMap;
-use crate::{Expr, Function, Graph, Node, Rational, nearest_f64};
+use crate::{Expr, Function, Graph, Node, Rational, Rule, nearest_f64};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
 /// The place of a value in a program: the index of the operation that computes it.
@@ -171,7 +172,8 @@ impl OperationCount {
     }
 
     /// A rough cost, in additions.
-    pub(crate) fn cost(&self) -> usize {
+    #[must_use]
+    pub fn cost(&self) -> usize {
         self.additions
             + self.multiplications
             + 8 * (self.divisions + self.square_roots)
@@ -326,12 +328,6 @@ impl Program {
             stage.count(&self.operations[index]);
         }
         stages
-    }
-
-    /// A rough cost of one evaluation of the outputs at given parameters, in additions.
-    pub(crate) fn cost(&self) -> usize {
-        let stages = self.operations_by_stage(&self.outputs);
-        stages.time.cost() + stages.point.cost() + stages.both.cost()
     }
 
     /// The outputs at the given input values, in double precision: the bits of generated code.
@@ -490,6 +486,7 @@ impl Lowering<'_> {
     fn call(&mut self, function: Function, argument: Expr) -> Slot {
         if let (Function::Ln1p, Node::Call(Function::Exp, arguments)) =
             (function, self.graph.node(argument))
+            && !Rule::LogOfExponential.is_off()
         {
             return self.log_of_one_and_exponential(arguments[0]);
         }
@@ -537,6 +534,9 @@ impl Lowering<'_> {
 
     /// The `x` of `1 + x`, which may be written as a multiple of a sum.
     fn beside_one(&mut self, expr: Expr) -> Option<Expr> {
+        if Rule::LogBesideOne.is_off() {
+            return None;
+        }
         let (sum, scale) = match self.graph.node(expr) {
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => {
                 (terms[0].0, terms[0].1.clone())
@@ -620,6 +620,9 @@ impl Lowering<'_> {
     /// First what depends on parameters only, coefficients included, where the rests are of one rate. Then, among what
     /// is left, the factor that most terms have, again and again.
     fn with_common_factors(&mut self, terms: &[(Expr, Rational)]) -> Vec<Part> {
+        if Rule::CommonFactors.is_off() {
+            return terms.iter().map(|(term, c)| Part::Term(*term, c.clone())).collect();
+        }
         let mut groups: Vec<Group> = Vec::new();
         for (term, coefficient) in terms {
             let (factor, rest, rate) = self.split_off_fixed(*term, &coefficient.abs());

@@ -9,9 +9,7 @@ mod near_zero;
 mod polynomial;
 mod pythagoras;
 mod residue;
-mod reuse;
 mod vanishing;
 
 pub use cancel::Term;
 pub use multiples::CosineAndSine;
-pub use reuse::reuse;

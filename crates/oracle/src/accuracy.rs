@@ -2,10 +2,9 @@
 
 use crate::double_double::QuickTruth;
 use crate::{
-    Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, units,
-    worst_factor,
+    Class, Oracle, OracleError, Point, Sampler, Sensitivity, exact, scientific, units, worst_factor,
 };
-use mmsmith_expr::{Expr, Function, Node, Program, Rational, Slot};
+use mmsmith_expr::{Expr, Function, Node, Program, Rational, Slot, nearest_f64};
 use mmsmith_spec::{Fields, Spec};
 use mmsmith_stage::{FieldName, Staged};
 use num_traits::Signed;
@@ -193,9 +192,31 @@ impl<'a> Accuracy<'a> {
     /// The programs of which generated code is made, in the form that [`Accuracy::measure`] judges.
     #[must_use]
     pub fn programs(&self) -> Vec<(&'static str, Program)> {
-        let staged = Staged::of(self.spec, self.fields.clone());
-        let part = |judged: &JudgedField| staged.program().part(judged.slots(&staged));
-        JUDGED.iter().map(|judged| (judged.letter, part(judged))).collect()
+        programs(&Staged::of(self.spec, self.fields.clone()))
+    }
+
+    /// Exact values of every entry of every field, field after field.
+    pub(crate) fn truth(
+        &self,
+        oracle: &mut Oracle,
+        inputs: &[f64],
+    ) -> Result<Vec<Rational>, AccuracyError> {
+        let values = self.exact_inputs(inputs);
+        let truth = oracle.evaluate(&self.point(&values), &self.flat);
+        truth.map_err(|error| self.no_value(inputs, error))
+    }
+
+    /// The answer of one entry to the inputs, in arbitrary precision.
+    pub(crate) fn answer(&self, inputs: &[f64], place: usize) -> Option<f64> {
+        let mut oracle = Oracle::new(128).ok()?;
+        let values = self.exact_inputs(inputs);
+        let answer = self.sensitivity.evaluate_one(&mut oracle, &values, place).ok()?;
+        Some(nearest_f64(&answer))
+    }
+
+    /// The letters of the fields that are judged.
+    pub(crate) fn letters(&self) -> impl Iterator<Item = &'static str> {
+        self.expressions.iter().map(|(letter, _)| *letter)
     }
 
     /// Judges `points` points of `class`; `judged` gives the fields at inputs, and `step` is called after each point.
@@ -547,7 +568,9 @@ impl<'a> Accuracy<'a> {
         let entries = before..before + self.expressions[field].1.len();
         let values = self.exact_inputs(inputs);
         let truth = Oracle::new(QUICK_BITS)
-            .and_then(|mut oracle| oracle.evaluate(&self.point(&values), &self.flat[entries.clone()]))
+            .and_then(|mut oracle| {
+                oracle.evaluate(&self.point(&values), &self.flat[entries.clone()])
+            })
             .map_err(|error| self.no_value(inputs, error))?;
         let largest = truth.iter().map(Signed::abs).max().unwrap_or_default();
         let answers = &self.quick_sensitivities(inputs)[entries];
@@ -679,6 +702,13 @@ impl JudgedField {
             (Way::Single | Way::Staged, name) => staged.field(name),
         }
     }
+}
+
+/// The programs of the fields that are judged, each with its letter.
+#[must_use]
+pub fn programs(staged: &Staged) -> Vec<(&'static str, Program)> {
+    let part = |judged: &JudgedField| staged.program().part(judged.slots(staged));
+    JUDGED.iter().map(|judged| (judged.letter, part(judged))).collect()
 }
 
 fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {

@@ -26,6 +26,7 @@
 //! assert!(worst_factor((std::f64::consts::PI * 0.1).sin(), &truth, &truth) < 2.0);
 //! ```
 
+mod ablation;
 mod acceptance;
 mod accuracy;
 mod convert;
@@ -36,9 +37,11 @@ mod scientific;
 mod search;
 mod sensitivity;
 
+pub use ablation::{Effect, Exam, Lines, Loss, Mark, ablated};
 pub use acceptance::{units, worst_factor};
 pub use accuracy::{
-    Accuracy, AccuracyError, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR, LARGEST_UNITS, Worst,
+    Accuracy, AccuracyError, ClassAccuracy, Found, Judged, JudgedCode, LARGEST_FACTOR,
+    LARGEST_UNITS, Worst, programs,
 };
 pub use convert::exact;
 pub use evaluate::{Oracle, OracleError, Point};

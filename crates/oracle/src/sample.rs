@@ -1,6 +1,6 @@
 //! Points at which accuracy is measured, by class of inputs.
 
-use mmsmith_expr::{Expr, Graph, Program};
+use mmsmith_expr::{Expr, Graph, Program, RangeOfInputs};
 use mmsmith_spec::{Bound, Coordinates, Domain, Fields, Parameter, Relation, Spec};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -177,6 +177,9 @@ impl<'a> Sampler<'a> {
             (Class::TinyAmplitude | Class::NearInversion, _) if self.amplitude.is_none() => {
                 Some("there is no amplitude A")
             }
+            (Class::Far, _) if self.spec.range_of_inputs == RangeOfInputs::Body => Some(
+                "digits are kept in the body: range-of-inputs = 'wide' in the specification asks for more",
+            ),
             (Class::NearInversion, _) if self.isochoric => Some("J = 1 for every amplitude"),
             _ => None,
         }

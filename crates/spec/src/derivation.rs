@@ -23,10 +23,7 @@ impl Derivation {
         let geometry = Geometry::new(&mut graph, spec.coordinates, spec.dimension);
         let time = graph.symbol("t");
         let variables = geometry.coordinates.iter().copied().chain([time]).collect();
-        let mut derivatives = Derivatives::limited();
-        for known in spec.solved.iter().flat_map(|solved| &solved.slopes) {
-            derivatives.define(known.component, known.coordinate, known.slope);
-        }
+        let derivatives = Derivatives::limited();
         Derivation { graph, geometry, derivatives, variables, time }
     }
 

@@ -14,7 +14,7 @@ use crate::derivation::{Derivation, is_joined};
 use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
 use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Dependence, Expr, Graph, Program};
+use mmsmith_expr::{Dependence, Expr, Graph, Program, Rule};
 use thiserror::Error;
 
 /// Every field of a solution, in Cartesian components, as expressions of the graph.
@@ -168,7 +168,12 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
         let bracket = graph.sub(a[i], force);
         let bracket = graph.cancel(bracket, variables);
         let (bracket, rest) = match &stress.whole {
-            Some(whole) if !is_joined(graph, bracket, [a[i], force], variables) => (a[i], whole[i]),
+            Some(whole)
+                if !Rule::WholeDivergence.is_off()
+                    && !is_joined(graph, bracket, [a[i], force], variables) =>
+            {
+                (a[i], whole[i])
+            }
             _ => (bracket, stress.remainder[i]),
         };
         let bracket = graph.whole(bracket);
@@ -183,20 +188,9 @@ fn body_force(derivation: &mut Derivation, a: &Vector, stress: &Stress, density:
 /// Physical components to Cartesian ones: `A_ij = sum_ab Q_ia A_ab Q_jb`.
 fn turn_matrix(graph: &mut Graph, geometry: &Geometry, matrix: &Matrix) -> Matrix {
     let n = geometry.dimension();
-    // Entries that are equal at every point leave nothing to their difference, in which turned components are.
-    let mut matrix = matrix.clone();
-    if !geometry.is_cartesian() {
-        for i in 0..n {
-            for j in 0..i {
-                let difference = graph.sub(matrix[i][i], matrix[j][j]);
-                if graph.vanishes(difference) {
-                    matrix[i][i] = matrix[j][j];
-                }
-            }
-        }
-    }
     // With equal diagonal entries for both angles these need not be told apart, which nobody can on the axis.
-    let isotropic = geometry.transverse.is_some() && matrix[1][1] == matrix[2][2];
+    let isotropic =
+        !Rule::Transverse.is_off() && geometry.transverse.is_some() && matrix[1][1] == matrix[2][2];
     let mut turned = identity(n);
     for i in 0..n {
         for j in 0..n {

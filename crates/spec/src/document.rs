@@ -21,6 +21,7 @@ pub(crate) struct Document {
     pub(crate) reference: Spanned<String>,
     pub(crate) coordinates: Spanned<String>,
     pub(crate) dimension: Spanned<Dimension>,
+    pub(crate) range_of_inputs: Option<Spanned<String>>,
     #[serde(default)]
     pub(crate) parameters: Entries<ParameterEntry>,
     #[serde(default, rename = "let")]

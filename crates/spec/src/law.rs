@@ -16,7 +16,7 @@ use crate::tensor::{
 use crate::{DeriveError, Law};
 use energy::ComponentLaw;
 use kinematics::{doubled_strain, with_transpose};
-use mmsmith_expr::{Expr, Function, Graph, Node};
+use mmsmith_expr::{Expr, Function, Graph, Node, Rule};
 use mmsmith_vocabulary::{Derivation as Formulas, Material, Volumetric};
 use std::collections::BTreeSet;
 use turn::Turn;
@@ -127,7 +127,8 @@ impl Deformation {
         };
         let volume_change = zero_if_vanishing(graph, volume_change);
         // Where J = 1, tr H is what is left of J - 1, of second order; by its terms of first order it would have no digits.
-        let dilation = if volume_change == Graph::ZERO && turn.is_none() && !dilation.is_empty() {
+        let is_of_second_order = volume_change == Graph::ZERO && !Rule::SecondOrder.is_off();
+        let dilation = if is_of_second_order && turn.is_none() && !dilation.is_empty() {
             let minors = minors_beyond_trace(graph, &H);
             let minors = graph.sum_of(minors);
             let trace = graph.neg(minors);
@@ -146,7 +147,9 @@ impl Deformation {
         }
         // A product of stretches has digits next to zero that the sum J - 1 lacks.
         let log_J = match graph.node(J) {
-            Node::Product(_) => graph.call(Function::LnOfBoth, &[volume_change, J]),
+            Node::Product(_) if !Rule::LogOfBoth.is_off() => {
+                graph.call(Function::LnOfBoth, &[volume_change, J])
+            }
             _ => graph.call(Function::Ln1p, &[volume_change]),
         };
         // Jacobi's formula, d ln J = F^-T : dH.
@@ -200,6 +203,9 @@ impl Deformation {
 
     /// `Div H` where `H` is symmetric and `J = 1`: there it is the gradient of `tr H`, which is of second order, and so is `Div H^T`.
     fn divergence_of_second_order(&self, derivation: &mut Derivation) -> Option<Vector> {
+        if Rule::SecondOrder.is_off() {
+            return None;
+        }
         let n = self.H.len();
         let is_symmetric = (0..n).all(|i| {
             (0..i).all(|j| {
@@ -215,29 +221,14 @@ impl Deformation {
 
     /// The slope of `tr H` along a unit vector.
     fn trace_along(&self, derivation: &mut Derivation, k: usize) -> Expr {
-        self.trace_difference_along(derivation, k).unwrap_or_else(|| {
-            let trace = self.trace(&mut derivation.graph);
-            derivation.along(trace, k)
-        })
-    }
-
-    /// [`trace_along`](Self::trace_along) in products where it is a difference of waves: it vanishes where they are equal, and `lambda`
-    /// multiplies it, which next to incompressibility is large.
-    fn trace_difference_along(&self, derivation: &mut Derivation, k: usize) -> Option<Expr> {
         let trace = self.trace(&mut derivation.graph);
-        let along = derivation.along(trace, k);
-        let places = derivation.geometry.places();
-        let differences = derivation.graph.in_differences(along, &places);
-        (differences != along).then(|| derivation.graph.whole(differences))
+        derivation.along(trace, k)
     }
 
-    /// The slope of `ln J` along a unit vector, where `of_M` is `M : dH` with `M = H^T F^-T`: that of `tr H` less `of_M` where the first has
-    /// a form of its own.
+    /// The slope of `ln J` along a unit vector, where `of_M` is `M : dH` with `M = H^T F^-T`: less that where `tr H` is zero.
     fn log_J_along(&self, derivation: &mut Derivation, of_M: Expr, k: usize) -> Expr {
         let along = if self.is_free_of_divergence() {
             derivation.graph.neg(of_M)
-        } else if let Some(of_trace) = self.trace_difference_along(derivation, k) {
-            derivation.graph.sub(of_trace, of_M)
         } else {
             derivation.along(self.log_J, k)
         };
@@ -264,7 +255,8 @@ impl Deformation {
     }
 }
 
-/// The terms of `tr H`, none where it is zero in symbols.
+/// The terms of `tr H`, none where it is zero in symbols. The sum of two waves of one size is a product: it vanishes where they are equal, and
+/// `lambda` multiplies it, which next to incompressibility is large.
 fn dilation(
     graph: &mut Graph,
     open: &Matrix,
@@ -278,11 +270,11 @@ fn dilation(
     if graph.vanishes(cancelled) {
         return Vec::new();
     }
-    let differences = graph.in_differences(trace, places);
-    if differences == trace {
+    let product = graph.in_differences(trace, places);
+    if product == trace {
         return (0..n).map(|i| H[i][i]).collect();
     }
-    vec![graph.whole(differences)]
+    vec![graph.whole(product)]
 }
 
 /// The stress of a law at a deformation.
@@ -317,6 +309,9 @@ pub(crate) fn stress(
                     return Ok(linear_elastic(derivation, deformation, lambda, mu));
                 }
                 Formulas::Energy { W } => (W.to_owned(), material.row().is_isotropic),
+                Formulas::Isochoric { W, others } if Rule::Isochoric.is_off() => {
+                    (in_invariants(W, others), material.row().is_isotropic)
+                }
                 Formulas::Isochoric { W, others } => {
                     let constants = law.constants();
                     let graph = &mut derivation.graph;
@@ -347,7 +342,8 @@ pub(crate) fn stress(
                     return Ok(stress.plus(&mut derivation.graph, others));
                 }
                 Formulas::PrincipalStretches(parts)
-                    if principal_stretches::is_coupled_in_plane(deformation) =>
+                    if !Rule::PrincipalStretches.is_off()
+                        && principal_stretches::is_coupled_in_plane(deformation) =>
                 {
                     let text = principal_stretches::energy_in_plane(&parts);
                     let W = with_volume(&mut derivation.graph, text);
@@ -364,7 +360,8 @@ pub(crate) fn stress(
     let graph = &mut derivation.graph;
     let n = deformation.H.len();
     // Where principal directions are those of the coordinates the components are the shorter form.
-    if !deformation.is_diagonal()
+    if !Rule::Invariants.is_off()
+        && !deformation.is_diagonal()
         && energy::uses_invariants_only(graph, W, n)
         && let Some(W) = invariants::in_two_invariants(graph, W, n)
     {
@@ -374,13 +371,16 @@ pub(crate) fn stress(
         .stress(derivation, deformation))
 }
 
+/// The energy of an isochoric law without its volumetric part, in `J` and `I1`.
+fn in_invariants(W: &str, others: &str) -> String {
+    format!("{} + {others}", W.replace(energy::EXCESS, "(J^(-2/3)*I1 - 3)"))
+}
+
 /// The energy of a law with directions in `J`, `I1`, components and its constants, as a specification would state it.
 pub(crate) fn energy_text(material: &Material<Expr>) -> String {
     let text = match material.derivation() {
         Formulas::Energy { W } => W.to_owned(),
-        Formulas::Isochoric { W, others } => {
-            format!("{} + {others}", W.replace(energy::EXCESS, "(J^(-2/3)*I1 - 3)"))
-        }
+        Formulas::Isochoric { W, others } => in_invariants(W, others),
         // These laws are isotropic.
         Formulas::NeoHookean { .. }
         | Formulas::StVenantKirchhoff { .. }
@@ -457,7 +457,7 @@ fn linear_divergence(
 
 /// The expression, or zero where it is zero at every point without looking so. Rounding would leave something there.
 pub(crate) fn zero_if_vanishing(graph: &mut Graph, expr: Expr) -> Expr {
-    if graph.vanishes(expr) { Graph::ZERO } else { expr }
+    if !Rule::Vanishing.is_off() && graph.vanishes(expr) { Graph::ZERO } else { expr }
 }
 
 /// A modulus at rest with its constants as they are written, so that identities among them cancel in symbols, here and against the

@@ -18,9 +18,7 @@ use crate::document::{SolveTable, Text};
 use crate::law::{self, Deformation};
 use crate::scope::Scope;
 use crate::{Diagnostic, Spec};
-use mmsmith_expr::{
-    Ast, AstKind, Derivatives, Expr, Function, Graph, Node, Program, Rational, Term,
-};
+use mmsmith_expr::{Ast, AstKind, Expr, Function, Graph, Node, Program, Rational, Rule, Term};
 use num_traits::{Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -38,19 +36,6 @@ pub struct Solved {
     pub unknowns: Vec<(String, Expr)>,
     /// The result of each condition.
     pub conditions: Vec<SolvedCondition>,
-    /// Derivatives of components of the displacement in forms that keep more digits than those by the rules.
-    pub(crate) slopes: Vec<Slope>,
-}
-
-/// The derivative of a component of the displacement along the coordinate on which conditions hold at places.
-///
-/// `P_RR(Ri) = 0` makes it zero at `Ri`. In its factored form it is so by a factor `R - Ri`; by the rules it is a sum there whose terms
-/// cancel.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Slope {
-    pub(crate) component: Expr,
-    pub(crate) coordinate: Expr,
-    pub(crate) slope: Expr,
 }
 
 /// Result of a condition.
@@ -141,25 +126,17 @@ impl Spec {
             found.push((name.clone(), value));
         }
         self.check_defaults(&found, scope, table)?;
-        let mut slopes = Vec::new();
         for component in &mut self.displacement {
             let Some(factored) = solver.factored(*component, &solution) else {
                 *component = self.graph.replace(*component, &replacement);
                 continue;
             };
-            let slope = solver.slope(*component, &solution);
-            let mut moved = |expr| transfer(&solver.graph, &mut self.graph, expr);
-            *component = moved(factored);
-            slopes.extend(slope.map(|Slope { coordinate, slope, .. }| Slope {
-                component: *component,
-                coordinate: moved(coordinate),
-                slope: moved(slope),
-            }));
+            *component = transfer(&solver.graph, &mut self.graph, factored);
         }
         for meaning in self.cross_checks.iter_mut().flat_map(|check| check.names.values_mut()) {
             *meaning = self.graph.replace(*meaning, &replacement);
         }
-        self.solved = Some(Solved { unknowns: found, conditions, slopes });
+        self.solved = Some(Solved { unknowns: found, conditions });
         Ok(())
     }
 
@@ -599,18 +576,13 @@ impl<'a> Solver<'a> {
     /// A component of the displacement with its unknowns put in, where the conditions hold at places along one coordinate and
     /// digits are to be kept between them.
     fn factored(&mut self, component: Expr, solution: &Solution) -> Option<Expr> {
+        if Rule::Factored.is_off() {
+            return None;
+        }
         self.joined(component, solution)?.formed()
     }
 
-    /// The derivative of a component along that coordinate, in such a form.
-    fn slope(&mut self, component: Expr, solution: &Solution) -> Option<Slope> {
-        let coordinate = along(&self.places, &self.variables)?.coordinate;
-        let slope = Derivatives::limited().of(&mut self.graph, component, coordinate);
-        let slope = self.joined(slope, solution)?.product_of_distances()?;
-        Some(Slope { component, coordinate, slope })
-    }
-
-    /// A component or a slope with its unknowns put in, over one denominator.
+    /// A component with its unknowns put in, over one denominator.
     fn joined(&mut self, expr: Expr, solution: &Solution) -> Option<Joined<'_>> {
         let unknowns: Vec<Expr> = self.unknowns.iter().map(|(_, symbol)| *symbol).collect();
         let along = along(&self.places, &self.variables)?;

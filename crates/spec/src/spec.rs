@@ -12,7 +12,7 @@ use crate::read::LONGEST_FILE;
 use crate::scope::Scope;
 use crate::source::Source;
 use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
-use mmsmith_expr::{Expr, Function, Graph, Node, Program, Rational};
+use mmsmith_expr::{Expr, Function, Graph, Node, Program, RangeOfInputs, Rational};
 use mmsmith_vocabulary::{
     Components, Constant, Material, Moduli, Response, Row, Stated, Term, UnknownLaw, Volumetric,
 };
@@ -33,6 +33,8 @@ pub struct Spec {
     pub coordinates: Coordinates,
     /// The number of space dimensions, 1 to 3.
     pub dimension: usize,
+    /// The inputs for which digits are kept.
+    pub range_of_inputs: RangeOfInputs,
     /// The parameters in the order of the file.
     pub parameters: Vec<Parameter>,
     /// Conditions that the parameters must satisfy together.
@@ -570,6 +572,19 @@ impl<'a> Reader<'a> {
         Ok(Reader { scope, coordinates, dimension })
     }
 
+    fn range_of_inputs(&self, document: &Document) -> Result<RangeOfInputs, Diagnostic> {
+        let Some(given) = &document.range_of_inputs else { return Ok(RangeOfInputs::Body) };
+        match given.get_ref().as_str() {
+            "body" => Ok(RangeOfInputs::Body),
+            "wide" => Ok(RangeOfInputs::Wide),
+            other => {
+                let message = format!("'{other}' is no range of inputs");
+                let help = "range-of-inputs = 'body' for places in the body, 'wide' for places far outside of it as well";
+                Err(self.scope.source.error(message, given.span(), Some(help.into())))
+            }
+        }
+    }
+
     fn read(mut self, document: &Document) -> Result<Spec, Diagnostic> {
         let parameters = self.parameters(document)?;
         let solve = document.solve.as_ref();
@@ -617,6 +632,8 @@ impl<'a> Reader<'a> {
                 graph.div(way, wave_speed)
             }
         };
+        let range_of_inputs = self.range_of_inputs(document)?;
+        self.scope.graph.range_of_inputs = range_of_inputs;
         let mut spec = Spec {
             source: self.scope.source.text.to_owned(),
             name: document.name.get_ref().clone(),
@@ -624,6 +641,7 @@ impl<'a> Reader<'a> {
             reference: document.reference.get_ref().clone(),
             coordinates: self.coordinates,
             dimension: self.dimension,
+            range_of_inputs,
             parameters,
             requirements,
             graph: std::mem::take(&mut self.scope.graph),

@@ -8,7 +8,6 @@
 //!
 //! | pass | before | after | when | rounding |
 //! |---|---|---|---|---|
-//! | [`reuse`](mmsmith_expr::reuse) | `b` as derived | products within products are computed once | for single evaluations of `b`: it mixes rates of change | taken only where running error bounds at sample points admit it |
 //! | [`Program::lower`](mmsmith_expr::Program::lower) | expressions | operations, equal ones once | all outputs together, in one program | constants of sums last, powers as products, `sin(Pi x)` as one operation, sums of coordinates with what rounding takes from them |
 //! | [`with_gathered_factors`](mmsmith_expr::Program::with_gathered_factors) | operations | factors of one rate are multiplied first | the staged `b` | one rounding a factor, as before, in another order; taken only within error bounds |
 //! | [`with_separated_coordinates`](mmsmith_expr::Program::with_separated_coordinates) | the staged `b` | sums of products of values of one coordinate each | where points lie in a lattice and it halves the work | the same bound; not a number where a form does not hold, and then the staged form serves |

@@ -4,7 +4,7 @@ use crate::block::{Block, Stage, is_computed, needed, numbered};
 use crate::field::{Field, FieldName};
 use crate::outputs::{Group, Outputs, Single};
 use mmsmith_expr::{
-    Dependence, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot, reuse,
+    Dependence, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
 };
 use mmsmith_spec::{Domain, Fields, Spec, Surface};
 use mmsmith_vocabulary::Law;
@@ -119,6 +119,16 @@ pub struct BodyForceOperations {
     pub kept: usize,
 }
 
+impl BodyForceOperations {
+    /// A rough cost of a point at a time, in additions: alone, and in a lattice where there is a form for it.
+    #[must_use]
+    pub fn work(&self) -> usize {
+        let alone = self.stages.both.cost();
+        let in_lattice = self.lattice.map_or(alone, |[_, of_point]| of_point.cost());
+        alone + in_lattice + self.kept
+    }
+}
+
 /// The constants among the outputs.
 struct ConstantOutputs {
     cell_length: Single,
@@ -140,16 +150,10 @@ impl Staged {
     #[must_use]
     pub fn of(spec: &Spec, mut fields: Fields) -> Self {
         let dimension = spec.dimension;
-        // Solvers sample the body force at the same points in every step; a single call does all the work each time.
-        let (inputs, definitions, b) = (&fields.inputs, &fields.definitions, &fields.b);
-        let single = reuse(&mut fields.graph, inputs, definitions, b);
-
         let mut outputs = Outputs::default();
-        let parts = FieldName::ALL.map(|name| match name {
-            FieldName::BodyForce => (name, outputs.add(single.iter().copied())),
-            _ => (name, outputs.add(name.derived(&fields))),
-        });
-        let staged = outputs.add(b.iter().copied());
+        let parts = FieldName::ALL.map(|name| (name, outputs.add(name.derived(&fields))));
+        // Solvers sample the body force at the same points in every step; a single call does all the work each time.
+        let staged = outputs.add(fields.b.iter().copied());
         let constants = ConstantOutputs::new(spec, &mut outputs);
         let energy = fields.W.map(|energy| outputs.add_one(energy));
         let requirements: Vec<(Single, Single)> = spec

@@ -497,7 +497,7 @@ fn number(value: &Value, digits: usize) -> String {
 }
 
 /// When, from which commit and on which machine a section was written.
-fn stamp(repository: &Path) -> anyhow::Result<String> {
+pub(crate) fn stamp(repository: &Path) -> anyhow::Result<String> {
     let said = |command: &mut Command| -> anyhow::Result<String> {
         let output = command
             .current_dir(repository)

@@ -16,8 +16,8 @@ pub(crate) struct CheckOptions {
     /// before the search. Default: 300; 30 with --seconds
     #[arg(long, value_name = "N", value_parser = sample_count)]
     pub(crate) points: Option<usize>,
-    /// Search for the largest rounding error of every field, by comparison with arbitrary precision: among ordinary inputs, tiny
-    /// amplitudes, late times, at the boundary, near inversion, near and far from the origin
+    /// Compare every field with arbitrary precision at points that are drawn, which decide, and search for the largest rounding errors,
+    /// which are told: among ordinary inputs, tiny amplitudes, late times, at the boundary, near inversion and near the origin
     #[arg(long, conflicts_with = "set")]
     pub(crate) thorough: bool,
     /// Time of the search in each solution. Default: 128 evaluations for each point drawn

@@ -337,7 +337,10 @@ fn text(
         }
     }
     for (class, worst) in beyond {
-        text += &format!("  beyond K = {LARGEST_FACTOR}, {}\n", Shown::new(accuracy, *class, worst).text);
+        text += &format!(
+            "  beyond K = {LARGEST_FACTOR}, {}\n",
+            Shown::new(accuracy, *class, worst).text
+        );
     }
     let all = classes.iter().flat_map(|class| class.worst.iter().map(move |worst| (class, worst)));
     if let Some((class, worst)) = all.max_by(|a, b| a.1.factor.total_cmp(&b.1.factor)) {

@@ -168,8 +168,6 @@ impl<'a> Planting<'a> {
         let number = changed.graph.number(Rational::new(numerator.into(), denominator.into()));
         let larger = |u: &Expr| changed.graph.mul(number, *u);
         changed.displacement = self.spec.displacement.iter().map(larger).collect();
-        // Slopes that were solved for belong to the displacement before the change.
-        changed.solved = None;
         self.derive_from(changed);
     }
 

@@ -164,7 +164,7 @@ mod tests {
         let (product, sum) = (graph.mul(x, y), graph.add(x, y));
         let double = graph.sum([(Rational::from(2), x)]);
         for (part, text) in [(product, "x*y"), (sum, "(x + y)"), (double, "2*x")] {
-            let part = graph.opaque(part);
+            let part = graph.whole(part);
             let sum = graph.add(z, part);
             assert_eq!(graph.print(sum), format!("z + {text}"));
             let difference = graph.sub(z, part);

@@ -9,13 +9,26 @@
 //!
 //! The parts of a sum are numbers and products, such as `c t`, with constant coefficients, such as `3/Pi`. What rounding does
 //! to `c t` itself is left: every argument with this part has the same rounding in it, which an error of `t` might have caused.
+//!
+//! Sums without the time are as small as the body, and their rounding is that of the function. They are left as they are, unless the
+//! [range of inputs](RangeOfInputs) is wide.
 
 use super::{Dependence, Lowering, Operation, Slot};
 use crate::rewrite::constant::{CIRCLE_NUMBER, square_root};
-use crate::{Expr, Function, Node, Rational, nearest_f64};
+use crate::{Expr, Function, Node, Rational, Rule, nearest_f64};
 use num_bigint::BigInt;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::BTreeSet;
+
+/// The inputs for which functions of sums keep their digits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RangeOfInputs {
+    /// Places in the body, at any time: sums of coordinates alone are as large as the body.
+    #[default]
+    Body,
+    /// Places far outside of it as well.
+    Wide,
+}
 
 /// A term: whether it is taken away, and its value.
 type Term = (bool, Slot);
@@ -126,6 +139,11 @@ impl Lowering<'_> {
     ///
     /// `None` where `argument` is no such sum, and where nothing is rounded.
     fn with_lost_part(&mut self, argument: Expr) -> Option<(Slot, Slot)> {
+        let is_near =
+            self.graph.range_of_inputs == RangeOfInputs::Body && !self.rate_of(argument).time;
+        if is_near || Rule::SumsWithin.is_off() {
+            return None;
+        }
         let mut collected = Collected::default();
         self.collect(argument, &Rational::one(), &mut collected)?;
         let Collected { constant, mut products, .. } = collected;
@@ -381,9 +399,35 @@ mod tests {
     use mmsmith_scalar_functions::ScalarFunctions;
     use std::collections::BTreeMap;
 
+    /// A graph in which places are far away as well.
+    fn wide() -> Graph {
+        let mut graph = Graph::new();
+        graph.range_of_inputs = RangeOfInputs::Wide;
+        graph
+    }
+
+    /// In the body the time alone grows without bound.
+    #[test]
+    fn sums_with_the_time_are_corrected_for_every_range() {
+        for (text, is_corrected) in
+            [("sin(X + 3*Y)", false), ("sin(X + 3*t)", true), ("sin(3*t)", true)]
+        {
+            let mut graph = Graph::new();
+            let inputs = [("X", true), ("Y", true), ("t", false)].map(|(name, position)| {
+                (graph.symbol(name), Dependence { position, time: !position })
+            });
+            let ast = Ast::parse(text).unwrap();
+            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
+            let program = Program::lower(&mut graph, &inputs, &[], &[expr]);
+            let is_error =
+                |o: &Operation| matches!(o, Operation::SumError(..) | Operation::ProductError(..));
+            assert_eq!(program.operations().iter().any(is_error), is_corrected, "{text}");
+        }
+    }
+
     /// The operations for `text` of X, Y (place), t (time) and k (parameter), and its value at the place.
     fn lowered(text: &str, at: [f64; 4]) -> (Vec<Operation>, f64) {
-        let mut graph = Graph::new();
+        let mut graph = wide();
         let place = Dependence { position: true, time: false };
         let time = Dependence { position: false, time: true };
         let inputs: Vec<(Expr, Dependence)> = [("X", place), ("Y", place), ("t", time)]
@@ -469,7 +513,7 @@ mod tests {
     #[test]
     fn a_division_by_zero_is_left_to_the_program() {
         for text in ["sin(X/k + 7*X)", "cos(3*X/sqrt(k))", "exp((X - t)/k^2)"] {
-            let mut graph = Graph::new();
+            let mut graph = wide();
             let place = Dependence { position: true, time: false };
             let inputs = ["X", "t"].map(|name| (graph.symbol(name), place));
             let expr = graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name)));
@@ -518,7 +562,7 @@ mod tests {
     #[test]
     fn coefficients_of_one_input_are_added() {
         let place = Dependence { position: true, time: false };
-        let mut graph = Graph::new();
+        let mut graph = wide();
         let inputs = ["X", "Y"].map(|name| (graph.symbol(name), place));
         let build = |graph: &mut Graph, text: &str| {
             graph.build(&Ast::parse(text).unwrap(), &mut |g, name| Ok(g.symbol(name))).unwrap()
@@ -540,7 +584,7 @@ mod tests {
     #[test]
     fn sums_of_many_inputs() {
         for (count, expected) in [(MOST_VISITED - 1, true), (MOST_VISITED, false)] {
-            let mut graph = Graph::new();
+            let mut graph = wide();
             let place = Dependence { position: true, time: false };
             let inputs: Vec<(Expr, Dependence)> =
                 (0..count).map(|n| (graph.symbol(&format!("X{n}")), place)).collect();
@@ -556,7 +600,7 @@ mod tests {
     #[test]
     fn without_inputs_nothing_is_corrected() {
         for beside in ["X/10 - 3/7", "X/10 - 10^400", "X/10"] {
-            let mut graph = Graph::new();
+            let mut graph = wide();
             let place = Dependence { position: true, time: false };
             let inputs = ["X", "Y"].map(|name| (graph.symbol(name), place));
             let mut build = |text: &str| {

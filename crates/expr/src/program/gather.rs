@@ -13,11 +13,11 @@
 //! only where it costs less, keeps no more values of a point, and where the bound of its rounding errors, by running
 //! error analysis at sample points, is not clearly larger.
 
-use crate::Rational;
 use crate::graph::NumberMap;
 use crate::program::keep::KEPT_NUMBER;
 use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
 use crate::rewrite::accuracy::Samples;
+use crate::{Rational, Rule};
 use num_traits::One;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,6 +40,9 @@ impl Program {
     /// [`kept_at_points`](Program::kept_at_points) tells what is kept of each point.
     #[must_use]
     pub fn with_gathered_factors(&self, places: Range<usize>) -> Program {
+        if Rule::Gather.is_off() {
+            return self.clone();
+        }
         let Some(outputs) = self.outputs().get(places.clone()) else { return self.clone() };
         let kept = self.kept_at_points(outputs, usize::MAX);
         let Some(gathered) = Gathering::new(self).program(places.clone(), &kept) else {

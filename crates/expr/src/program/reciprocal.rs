@@ -9,7 +9,7 @@
 //! axes are: `1/a = b/(a b)`. That it neither overflows nor vanishes its logarithm asks for already.
 
 use crate::program::Builder;
-use crate::{Operation, Program, Rational, Slot};
+use crate::{Operation, Program, Rational, Rule, Slot};
 use num_integer::Integer;
 use num_traits::One;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,6 +29,9 @@ enum Unit {
 impl Program {
     /// The program with shared reciprocals, and without operations that no output needs.
     pub(crate) fn with_shared_reciprocals(&self) -> Program {
+        if Rule::Reciprocals.is_off() {
+            return self.compacted();
+        }
         self.with_reciprocals_of_powers().with_reciprocals_of_factors()
     }
 

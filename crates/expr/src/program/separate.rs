@@ -12,7 +12,7 @@
 use crate::program::keep::KEPT_NUMBER;
 use crate::program::{Builder, Operation, OperationCount, Program, Slot, power};
 use crate::rewrite::accuracy::Samples;
-use crate::{Dependence, Function, Rational};
+use crate::{Dependence, Function, Rational, Rule};
 use num_traits::One;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -37,6 +37,9 @@ impl Program {
         places: Range<usize>,
         dimension: usize,
     ) -> Option<Program> {
+        if Rule::Separate.is_off() {
+            return None;
+        }
         let outputs = self.outputs().get(places)?;
         if dimension < 2 {
             return None;

@@ -1,6 +1,6 @@
 //! Sines and cosines of multiples of one angle, by those of the angle.
 
-use crate::{Expr, Function, Graph, Node, Rational};
+use crate::{Expr, Function, Graph, Node, Rational, Rule};
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::collections::BTreeMap;
 
@@ -11,6 +11,9 @@ impl Graph {
     /// `expr` with the sines and cosines of whole multiples of an angle as polynomials of its own sine and cosine, where there are several
     /// of one angle: `sin(2 a)` beside `sin(a)` becomes `2 sin(a) cos(a)`.
     pub(crate) fn in_common_angles(&mut self, expr: Expr) -> Expr {
+        if Rule::CommonAngles.is_off() {
+            return expr;
+        }
         let mut families: BTreeMap<Expr, Vec<(Rational, Expr)>> = BTreeMap::new();
         for call in self.reachable(&[expr]) {
             if let Node::Call(Function::Sin | Function::Cos, arguments) = self.node(call) {

@@ -6,8 +6,8 @@
 //! values at zero then cancel in symbols, and what is computed has no large terms.
 
 use crate::graph::NumberMap;
-use crate::{Expr, Function, Graph, Node, Rational};
-use num_traits::{One, Signed, ToPrimitive, Zero};
+use crate::{Expr, Function, Graph, Node, Rational, Rule};
+use num_traits::{Signed, ToPrimitive};
 use std::collections::BTreeSet;
 
 impl Graph {
@@ -15,13 +15,16 @@ impl Graph {
     ///
     /// The two add up to `expr`. Where `expr` has no value at zero, as `ln(x)` at `x = 0`, all of it is the rest.
     pub fn split_at_zero(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> (Expr, Expr) {
-        Splitting { graph: self, small, known: NumberMap::default() }.split(expr)
+        if Rule::SplitAtZero.is_off() {
+            let value = self.replace(expr, &small.iter().map(|&s| (s, Graph::ZERO)).collect());
+            let has_value = !self.divides_by_zero(value);
+            return if has_value { (value, self.sub(expr, value)) } else { (Graph::ZERO, expr) };
+        }
+        self.split_in_parts(expr, small)
     }
 
-    /// An expression that is zero where all of `small` are, less its part of first order in them, as terms that are all of second order.
-    /// `None` where no such form is known.
-    pub fn beyond_linear(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> Option<Expr> {
-        Splitting { graph: self, small, known: NumberMap::default() }.beyond_linear(expr)
+    pub(crate) fn split_in_parts(&mut self, expr: Expr, small: &BTreeSet<Expr>) -> (Expr, Expr) {
+        Splitting { graph: self, small, known: NumberMap::default() }.split(expr)
     }
 }
 
@@ -168,54 +171,6 @@ impl Splitting<'_> {
         }
     }
 
-    fn beyond_linear(&mut self, expr: Expr) -> Option<Expr> {
-        if expr == Graph::ZERO || self.small.contains(&expr) {
-            return Some(Graph::ZERO);
-        }
-        match self.graph.node(expr).clone() {
-            Node::Sum { constant, terms } if constant.is_zero() => {
-                let mut parts = Vec::new();
-                for (term, coefficient) in terms {
-                    parts.push((coefficient, self.beyond_linear(term)?));
-                }
-                Some(self.graph.sum(parts))
-            }
-            Node::Product(factors) => {
-                let (mut small, mut others) = (Vec::new(), Vec::new());
-                for (base, exponent) in factors {
-                    let of =
-                        if self.split(base).0 == Graph::ZERO { &mut small } else { &mut others };
-                    of.push((base, exponent));
-                }
-                match &*small {
-                    // `r f = r k + r (f - k)`
-                    [(base, exponent)] if exponent.is_one() => {
-                        let others = self.graph.product(others);
-                        let (value, rest) = self.split(others);
-                        let beyond = self.beyond_linear(*base)?;
-                        let first = self.graph.mul(beyond, value);
-                        let second = self.graph.mul(*base, rest);
-                        Some(self.graph.add(first, second))
-                    }
-                    [] => None,
-                    _ => small
-                        .iter()
-                        .all(|(_, exponent)| *exponent >= Rational::one())
-                        .then_some(expr),
-                }
-            }
-            Node::Call(Function::Ln1p, arguments) if self.split(arguments[0]).0 == Graph::ZERO => {
-                let beyond = self.beyond_linear(arguments[0])?;
-                let of_logarithm = self.graph.call(Function::Ln1pMinusX, &[arguments[0]]);
-                Some(self.graph.add(of_logarithm, beyond))
-            }
-            Node::Call(Function::Ln1pMinusX, arguments) => {
-                (self.split(arguments[0]).0 == Graph::ZERO).then_some(expr)
-            }
-            _ => None,
-        }
-    }
-
     /// The rest as a plain difference, where no better form is known.
     fn plain(&mut self, expr: Expr, function: Function, values: &[Expr]) -> (Expr, Expr) {
         let value = self.graph.call(function, values);
@@ -241,41 +196,6 @@ mod tests {
         let at = program.evaluate(&[0.3, 1.7]);
         assert!((at[1] + at[2] - at[0]).abs() < 1e-14 * at[0].abs().max(1.0), "{text}: {at:?}");
         (graph.print(value), graph.print(rest), program.evaluate(&[1e-30, 1.7])[2])
-    }
-
-    #[test]
-    fn what_is_beyond_first_order_is_of_second() {
-        for (text, is_known) in [
-            ("mu*(h + k) - mu*k*(1 + h)", true),
-            ("mu*h + (1/(1 + h) - 1)*(k - h*mu)", true),
-            ("(h + h*k)*exp(k)*(mu + k^2)/(1 + h)", true),
-            ("h^2*mu - 3*k", true),
-            ("mu*log1p(h + k*h)*(1 + k) - h", true),
-            ("sin(h)", false),
-            ("h + mu", false),
-        ] {
-            let mut graph = Graph::new();
-            let ast = Ast::parse(text).unwrap();
-            let expr = graph.build(&ast, &mut |g, name| Ok(g.symbol(name))).unwrap();
-            let [h, k, mu] = ["h", "k", "mu"].map(|name| graph.symbol(name));
-            let beyond = graph.beyond_linear(expr, &BTreeSet::from([h, k]));
-            assert_eq!(beyond.is_some(), is_known, "{text}");
-            let Some(beyond) = beyond else { continue };
-            let inputs = [h, k, mu].map(|symbol| (symbol, Default::default()));
-            let program = Program::lower(&mut graph, &inputs, &[], &[expr, beyond]);
-            // The slopes at zero from differences, which are exact there but for rounding.
-            let slope = |h: f64, k: f64| program.evaluate(&[h, k, 1.7])[0] / (h + k);
-            let linear = 0.3 * slope(1e-200, 0.0) + 0.2 * slope(0.0, 1e-200);
-            let at = program.evaluate(&[0.3, 0.2, 1.7]);
-            assert!((at[0] - linear - at[1]).abs() < 1e-14, "{text}: {at:?} {linear}");
-            // Of second order: a hundredth of a hundredth, but for the third.
-            let small = program.evaluate(&[3e-8, 2e-8, 1.7])[1];
-            let smaller = program.evaluate(&[3e-10, 2e-10, 1.7])[1];
-            assert!(
-                (small * 1e-4 - smaller).abs() <= 1e-6 * smaller.abs(),
-                "{text}: {small} {smaller}"
-            );
-        }
     }
 
     #[test]

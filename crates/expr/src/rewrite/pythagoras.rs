@@ -6,7 +6,7 @@
 //! cancel and it is the shorter form.
 
 use super::polynomial::{Monomial, add_to, product};
-use crate::{Expr, Function, Graph, Node, Rational};
+use crate::{Expr, Function, Graph, Node, Rational, Rule};
 use num_traits::{One, Signed, ToPrimitive};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,6 +24,9 @@ impl Graph {
     ///
     /// Expressions that contain neither the sine nor the cosine of an angle that occurs with both are never multiplied out.
     pub fn shortened(&mut self, expr: Expr) -> Expr {
+        if Rule::Shortened.is_off() {
+            return expr;
+        }
         let (mut sines, mut cosines) = (BTreeSet::new(), BTreeSet::new());
         self.collect_angles(expr, &mut sines, &mut cosines, &mut BTreeSet::new());
         let angles: BTreeSet<Expr> = sines.intersection(&cosines).copied().collect();

@@ -4,7 +4,7 @@
 //! two parts, of which no digit is left. As `2 sin(Pi X)^2` it is a product. So it is with `1 - 1/(1 + X)`, `sqrt(1 + X) - 1` and
 //! `cos(a) - cos(b)`.
 
-use crate::{Expr, Function, Graph, Node, Rational};
+use crate::{Expr, Function, Graph, Node, Rational, Rule};
 use num_traits::{One, Signed, Zero};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,7 @@ impl Graph {
         term: Expr,
         coefficient: &Rational,
     ) -> Option<Expr> {
-        if constant.is_zero() {
+        if constant.is_zero() || Rule::ConstantAndTerm.is_off() {
             return None;
         }
         let square = self.square_of_half(constant, term, coefficient);
@@ -30,6 +30,9 @@ impl Graph {
         constant: &Rational,
         terms: &[(Expr, Rational)],
     ) -> Option<Expr> {
+        if Rule::ConstantAndTerm.is_off() {
+            return None;
+        }
         let (place, product) =
             terms.iter().enumerate().find_map(|(place, (term, coefficient))| {
                 let is_wave = matches!(self.node(*term), Node::Call(Function::Cos, _));
@@ -116,13 +119,15 @@ impl Graph {
             }
             _ => return None,
         };
-        Some(self.split_at_zero(term, &small))
+        Some(self.split_in_parts(term, &small))
     }
 
-    /// `expr` with sums of cosines, or of sines, of `places` in which the coefficients add up to zero as differences of them: such a sum
-    /// vanishes where all are equal, as the divergence of standing waves along several axes does. So does a sum of two with equal
-    /// coefficients where one is the negative of the other.
+    /// `expr` with each sum of two cosines, or of two sines, of `places` whose coefficients are equal but for the sign as a product: it
+    /// vanishes where both are equal, or where one is the negative of the other.
     pub fn in_differences(&mut self, expr: Expr, places: &BTreeSet<Expr>) -> Expr {
+        if Rule::WavesOfOneSize.is_off() {
+            return expr;
+        }
         let mut known = BTreeMap::new();
         for sum in self.reachable(&[expr]) {
             if let Some(differences) = self.differences(sum, places) {
@@ -134,7 +139,7 @@ impl Graph {
 
     fn differences(&mut self, sum: Expr, places: &BTreeSet<Expr>) -> Option<Expr> {
         let Node::Sum { constant, terms } = self.node(sum) else { return None };
-        if !constant.is_zero() || terms.len() < 2 {
+        if !constant.is_zero() || terms.len() != 2 {
             return None;
         }
         let mut waves = Vec::new();
@@ -158,79 +163,18 @@ impl Graph {
             let others = self.product(others);
             waves.push((function, argument, self.sum([(coefficient, others)])));
         }
-        if let [(function, first, of_first), (other, second, of_second)] = &*waves {
-            let (function, angles, coefficient) = (*function, [*first, *second], *of_first);
-            let (sum, difference) =
-                (self.add(coefficient, *of_second), self.sub(coefficient, *of_second));
-            let is_difference = self.vanishes(sum);
-            if *other != function || !(is_difference || self.vanishes(difference)) {
-                return None;
-            }
-            let product = self.two_waves(function, is_difference, angles, places);
-            return Some(self.mul(coefficient, product));
-        }
-        // All are compared with one whose coefficient is a sum, which is zero at no special time: where one of the others is, two waves
-        // are left, and compared with each other.
-        let is_sum = |(_, _, coefficient): &(Function, Expr, Expr)| {
-            let parts = self.reachable(&[*coefficient]);
-            parts
-                .iter()
-                .any(|&part| matches!(self.node(part), Node::Sum { terms, .. } if terms.len() > 1))
+        let [(function, first, of_first), (other, second, of_second)] = &*waves else {
+            return None;
         };
-        let reference = waves.iter().position(is_sum).unwrap_or(0);
-        waves.swap(0, reference);
-        let [(function, first, _), others @ ..] = &*waves else { return None };
-        let coefficients = self.sum_of(waves.iter().map(|(_, _, coefficient)| *coefficient));
-        if others.iter().any(|(other, ..)| other != function) || !self.vanishes(coefficients) {
+        let (function, angles, coefficient) = (*function, [*first, *second], *of_first);
+        let (sum, difference) =
+            (self.add(coefficient, *of_second), self.sub(coefficient, *of_second));
+        let is_difference = self.vanishes(sum);
+        if *other != function || !(is_difference || self.vanishes(difference)) {
             return None;
         }
-        let differences = others.iter().map(|(_, argument, coefficient)| {
-            let difference = self.two_waves(*function, true, [*argument, *first], places);
-            self.mul(*coefficient, difference)
-        });
-        let differences: Vec<Expr> = differences.collect();
-        Some(self.sum_of(differences))
-    }
-
-    /// `cos(a) -+ cos(b)` or `sin(a) -+ sin(b)`, as the product of functions of half the sum and half the difference. Where both
-    /// angles depend on the same places, these two are formed in symbols: their slopes may cancel. Else each is written in half the
-    /// angles: what belongs to one axis stays a factor of its own, as points of a lattice need it.
-    fn two_waves(
-        &mut self,
-        function: Function,
-        is_difference: bool,
-        [a, b]: [Expr; 2],
-        places: &BTreeSet<Expr>,
-    ) -> Expr {
-        if self.places_of(a, places) == self.places_of(b, places) {
-            return self.product_of_waves(function, is_difference, [a, b]);
-        }
-        let half = Rational::new(1.into(), 2.into());
-        let of_half = |graph: &mut Self, angle: Expr| {
-            let angle = graph.sum([(half.clone(), angle)]);
-            [Function::Sin, Function::Cos].map(|function| graph.call(function, &[angle]))
-        };
-        let ([sin_a, cos_a], [sin_b, cos_b]) = (of_half(self, a), of_half(self, b));
-        let sines = [self.mul(sin_a, cos_b), self.mul(cos_a, sin_b)];
-        let cosines = [self.mul(cos_a, cos_b), self.mul(sin_a, sin_b)];
-        let of_apart = |graph: &mut Self, function| match function {
-            Function::Sin => graph.sub(sines[0], sines[1]),
-            _ => graph.add(cosines[0], cosines[1]),
-        };
-        let of_mean = |graph: &mut Self, function| match function {
-            Function::Sin => graph.add(sines[0], sines[1]),
-            _ => graph.sub(cosines[0], cosines[1]),
-        };
-        let own = OfHalfAngles::new(function, is_difference);
-        let apart = of_apart(self, own.of_apart);
-        let mean = of_mean(self, own.of_mean);
-        let product = self.mul(mean, apart);
-        self.sum([(Rational::from(own.factor), product)])
-    }
-
-    /// The `places` on which `expr` depends.
-    fn places_of(&self, expr: Expr, places: &BTreeSet<Expr>) -> BTreeSet<Expr> {
-        self.reachable(&[expr]).into_iter().filter(|part| places.contains(part)).collect()
+        let product = self.product_of_waves(function, is_difference, angles);
+        Some(self.mul(coefficient, product))
     }
 
     /// `cos(a) -+ cos(b)` or `sin(a) -+ sin(b)` as a product, with the angles formed in symbols.
@@ -256,6 +200,9 @@ impl Graph {
         terms: [(Expr, &Rational); 2],
         are_alike: impl FnOnce(&mut Self, [Expr; 2]) -> bool,
     ) -> Option<Expr> {
+        if Rule::TwoTerms.is_off() {
+            return None;
+        }
         let [(first, of_first), (second, of_second)] = terms;
         if of_first.abs() != of_second.abs() {
             return None;
@@ -328,39 +275,18 @@ mod tests {
     }
 
     #[test]
-    fn waves_with_coefficients_that_add_up_to_zero_are_compared() {
+    fn two_waves_of_one_size_are_a_product() {
         let mut graph = Graph::new();
-        let mut built = |text: &str| {
-            let ast = Ast::parse(text).unwrap();
-            graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap()
-        };
-        let places = BTreeSet::from([built("X"), built("Y"), built("Z")]);
-        let divergence = built(
-            "A*Pi*cos(Pi*X)*sin(c*t) + A*Pi*cos(Pi*Y)*(sqrt(3)*cos(c*t) - sin(c*t))/2 - A*Pi*cos(Pi*Z)*(sqrt(3)*cos(c*t) + sin(c*t))/2",
-        );
-        let left = built("cos(Pi*X)*sin(c*t) - cos(Pi*Y)*cos(c*t)");
-        let compared = graph.in_differences(divergence, &places);
-        assert_eq!(
-            graph.print(compared),
-            "-A*Pi*(2*sin(c*t)*(sin(X*Pi/2)*cos(Y*Pi/2) - cos(X*Pi/2)*sin(Y*Pi/2))\
-             *(sin(X*Pi/2)*cos(Y*Pi/2) + cos(X*Pi/2)*sin(Y*Pi/2)) \
-             - (sin(c*t) + sqrt(3)*cos(c*t))*(cos(Y*Pi/2)*sin(Z*Pi/2) - sin(Y*Pi/2)*cos(Z*Pi/2))\
-             *(cos(Y*Pi/2)*sin(Z*Pi/2) + sin(Y*Pi/2)*cos(Z*Pi/2)))"
-        );
-        assert_eq!(graph.in_differences(left, &places), left);
+        let places = ["X", "Y"].map(|name| graph.symbol(name)).into();
         let mut compared = |text: &str| {
             let ast = Ast::parse(text).unwrap();
             let waves = graph.build(&ast, &mut |graph, name| Ok(graph.symbol(name))).unwrap();
             let compared = graph.in_differences(waves, &places);
             graph.print(compared)
         };
-        // Angles of the same places are joined, those of others halved.
         assert_eq!(compared("A*cos(X + Y) - A*cos(X - Y)"), "-2*A*sin(X)*sin(Y)");
         assert_eq!(compared("A*sin(X + Y) + A*sin(Y - X)"), "2*A*sin(Y)*cos(X)");
-        assert_eq!(
-            compared("cos(X) + cos(Y)"),
-            "2*(cos(X/2)*cos(Y/2) + sin(X/2)*sin(Y/2))*(cos(X/2)*cos(Y/2) - sin(X/2)*sin(Y/2))"
-        );
         assert_eq!(compared("2*cos(X) + cos(Y)"), "2*cos(X) + cos(Y)");
+        assert_eq!(compared("sin(X) - cos(Y)"), "sin(X) - cos(Y)");
     }
 }

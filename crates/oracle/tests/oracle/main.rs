@@ -4,4 +4,5 @@ mod accuracy;
 mod evaluation;
 mod functions;
 mod golden;
+mod rules;
 mod second_library;

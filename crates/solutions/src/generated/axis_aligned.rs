@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for AxisAlignedParameters<T> {
 pub struct AxisAligned<T: crate::Real> {
     parameters: AxisAlignedParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 14],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned<T> {
@@ -130,23 +130,20 @@ impl<T: crate::Real> AxisAligned<T> {
         let t68 = parameters.E * parameters.nu;
         let t69 = t47 * t57;
         let t70 = t68 / t69;
-        let t83 = parameters.nu * parameters.nu;
-        let t84 = T::nearest(2.0) * parameters.E;
-        let t85 = t84 * t83;
+        let t81 = parameters.nu * parameters.nu;
+        let t82 = T::nearest(2.0) * parameters.A;
+        let t83 = t82 * t35;
+        let t84 = t83 * parameters.E;
+        let t85 = t84 * t81;
         let t86 = parameters.rho0 * t47;
         let t87 = t86 * t57;
         let t88 = t85 / t87;
-        let t93 = t70 + t50;
-        let t111 = T::one() / parameters.rho0;
-        let t130 = T::nearest(2.0) * parameters.A;
-        let t131 = t130 * t35;
-        let t132 = t131 * parameters.E;
-        let t133 = t132 * t83;
-        let t134 = t133 / t87;
-        let t139 = t12 * t93;
-        let t144 = T::nearest(2.0) / t6;
-        let t201 = t111 * t139;
-        let t208 = t70 * t111;
+        let t91 = t70 + t50;
+        let t97 = t12 * t91;
+        let t104 = T::one() / parameters.rho0;
+        let t124 = T::nearest(2.0) / t6;
+        let t182 = t97 * t104;
+        let t189 = t70 * t104;
         Ok(AxisAligned {
             parameters,
             fixed: [
@@ -159,12 +156,11 @@ impl<T: crate::Real> AxisAligned<T> {
                 t64,
                 t70,
                 t88,
-                t93,
-                t111,
-                t134,
-                t144,
-                t201,
-                t208,
+                t97,
+                t104,
+                t124,
+                t182,
+                t189,
             ],
         })
     }
@@ -357,52 +353,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t8 = t7.cos_pi();
         let t10 = t7.sin_pi();
         let t13 = X[0].cos_pi();
+        let t14 = self.fixed[1] * t8;
+        let t15 = t14 * t13;
         let t16 = X[1].cos_pi();
+        let t17 = self.fixed[1] * t10;
+        let t18 = t17 * t16;
+        let t20 = t15 + T::one();
+        let t21 = t18 + T::one();
+        let t22 = t20 * t21;
         let t23 = X[0].sin_pi();
         let t26 = X[1].sin_pi();
+        let t51 = T::one() / t22;
+        let t52 = t21 * t51;
+        let t53 = t20 * t51;
+        let t58 = t13 * t21;
+        let t59 = t8 * t58;
         let t60 = t10 * t16;
-        let t81 = self.fixed[3] * t8;
-        let t82 = t81 * t23;
-        let t89 = self.fixed[8] * t82;
-        let t90 = t8 * t13;
-        let t91 = self.fixed[1] * t90;
-        let t92 = t91 + T::one();
-        let t94 = T::one() / t92;
-        let t95 = t82 * t94;
-        let t96 = -t95;
-        let t97 = t82 + t95;
-        let t98 = t16 * t92;
-        let t99 = t10 * t98;
-        let t100 = t99 + t90;
-        let t101 = self.fixed[1] * t100;
-        let t102 = self.fixed[1] * t60;
-        let t103 = t102 + T::one();
-        let t104 = t92 * t103;
-        let t105 = t101.ln_of_both(t104);
-        let t106 = t91 * t97;
-        let t107 = self.fixed[9] * t106;
-        let t108 = t96 * t105;
-        let t109 = self.fixed[7] * t108;
-        let t110 = t107 - t109;
-        let t112 = t110 * t94;
-        let t113 = self.fixed[10] * t112;
-        let t114 = t89 - t113;
-        let t115 = self.fixed[3] * t10;
-        let t116 = t115 * t26;
-        let t117 = self.fixed[8] * t116;
-        let t118 = T::one() / t103;
-        let t119 = t116 * t118;
-        let t120 = -t119;
-        let t121 = t116 + t119;
-        let t122 = t102 * t121;
-        let t123 = self.fixed[9] * t122;
-        let t124 = t105 * t120;
-        let t125 = self.fixed[7] * t124;
-        let t126 = t123 - t125;
-        let t127 = t126 * t118;
-        let t128 = self.fixed[10] * t127;
-        let t129 = t117 - t128;
-        crate::nalgebra::SVector::<T, 2>::new(t114, t129)
+        let t61 = t59 + t60;
+        let t62 = self.fixed[1] * t61;
+        let t63 = t62.ln_of_both(t22);
+        let t89 = self.fixed[8] * t8;
+        let t90 = t89 * t23;
+        let t92 = self.fixed[3] * t8;
+        let t93 = t92 * t23;
+        let t94 = t93 * t52;
+        let t95 = -t94;
+        let t96 = t93 + t94;
+        let t98 = self.fixed[9] * t8;
+        let t99 = t98 * t13;
+        let t100 = t99 * t96;
+        let t101 = t63 * t95;
+        let t102 = self.fixed[7] * t101;
+        let t103 = t100 - t102;
+        let t105 = t103 * t52;
+        let t106 = self.fixed[10] * t105;
+        let t107 = t90 - t106;
+        let t108 = self.fixed[8] * t10;
+        let t109 = t108 * t26;
+        let t110 = self.fixed[3] * t10;
+        let t111 = t110 * t26;
+        let t112 = t111 * t53;
+        let t113 = -t112;
+        let t114 = t111 + t112;
+        let t115 = self.fixed[9] * t10;
+        let t116 = t115 * t16;
+        let t117 = t116 * t114;
+        let t118 = t63 * t113;
+        let t119 = self.fixed[7] * t118;
+        let t120 = t117 - t119;
+        let t121 = t120 * t53;
+        let t122 = self.fixed[10] * t121;
+        let t123 = t109 - t122;
+        crate::nalgebra::SVector::<T, 2>::new(t107, t123)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t7 = self.fixed[0] * t;
@@ -457,47 +459,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         let t78 = t63 * t53;
         let t79 = self.fixed[7] * t78;
         let t80 = t77 + t79;
-        let t81 = self.fixed[3] * t8;
-        let t82 = t81 * t23;
-        let t89 = self.fixed[8] * t82;
-        let t90 = t8 * t13;
-        let t91 = self.fixed[1] * t90;
-        let t92 = t91 + T::one();
-        let t94 = T::one() / t92;
-        let t95 = t82 * t94;
-        let t96 = -t95;
-        let t97 = t82 + t95;
-        let t98 = t16 * t92;
-        let t99 = t10 * t98;
-        let t100 = t99 + t90;
-        let t101 = self.fixed[1] * t100;
-        let t102 = self.fixed[1] * t60;
-        let t103 = t102 + T::one();
-        let t104 = t92 * t103;
-        let t105 = t101.ln_of_both(t104);
-        let t106 = t91 * t97;
-        let t107 = self.fixed[9] * t106;
-        let t108 = t96 * t105;
-        let t109 = self.fixed[7] * t108;
-        let t110 = t107 - t109;
-        let t112 = t110 * t94;
-        let t113 = self.fixed[10] * t112;
-        let t114 = t89 - t113;
-        let t115 = self.fixed[3] * t10;
-        let t116 = t115 * t26;
-        let t117 = self.fixed[8] * t116;
-        let t118 = T::one() / t103;
-        let t119 = t116 * t118;
-        let t120 = -t119;
-        let t121 = t116 + t119;
-        let t122 = t102 * t121;
-        let t123 = self.fixed[9] * t122;
-        let t124 = t105 * t120;
-        let t125 = self.fixed[7] * t124;
-        let t126 = t123 - t125;
-        let t127 = t126 * t118;
-        let t128 = self.fixed[10] * t127;
-        let t129 = t117 - t128;
+        let t89 = self.fixed[8] * t8;
+        let t90 = t89 * t23;
+        let t92 = self.fixed[3] * t8;
+        let t93 = t92 * t23;
+        let t94 = t93 * t52;
+        let t95 = -t94;
+        let t96 = t93 + t94;
+        let t98 = self.fixed[9] * t8;
+        let t99 = t98 * t13;
+        let t100 = t99 * t96;
+        let t101 = t63 * t95;
+        let t102 = self.fixed[7] * t101;
+        let t103 = t100 - t102;
+        let t105 = t103 * t52;
+        let t106 = self.fixed[10] * t105;
+        let t107 = t90 - t106;
+        let t108 = self.fixed[8] * t10;
+        let t109 = t108 * t26;
+        let t110 = self.fixed[3] * t10;
+        let t111 = t110 * t26;
+        let t112 = t111 * t53;
+        let t113 = -t112;
+        let t114 = t111 + t112;
+        let t115 = self.fixed[9] * t10;
+        let t116 = t115 * t16;
+        let t117 = t116 * t114;
+        let t118 = t63 * t113;
+        let t119 = self.fixed[7] * t118;
+        let t120 = t117 - t119;
+        let t121 = t120 * t53;
+        let t122 = self.fixed[10] * t121;
+        let t123 = t109 - t122;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t25, t28),
             v: crate::nalgebra::SVector::<T, 2>::new(t32, t34),
@@ -506,7 +499,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t20, T::zero(), T::zero(), t21),
             J: t22,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t73, T::zero(), T::zero(), t80),
-            b: crate::nalgebra::SVector::<T, 2>::new(t114, t129),
+            b: crate::nalgebra::SVector::<T, 2>::new(t107, t123),
         }
     }
     fn traction(
@@ -526,21 +519,21 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t145 = t14 + T::one();
-                let t146 = T::one() / t145;
-                let t147 = t146 + T::one();
-                let t148 = t8 * t21;
-                let t149 = t148 + t60;
-                let t150 = self.fixed[1] * t149;
-                let t151 = t145 * t21;
-                let t152 = t150.ln_of_both(t151);
-                let t153 = t8 * t147;
-                let t154 = self.fixed[6] * t153;
-                let t155 = self.fixed[7] * t146;
-                let t156 = t155 * t152;
-                let t157 = t154 + t156;
-                let t158 = -t157;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t158, T::zero()))
+                let t125 = t14 + T::one();
+                let t126 = T::one() / t125;
+                let t127 = t126 + T::one();
+                let t128 = t8 * t21;
+                let t129 = t128 + t60;
+                let t130 = self.fixed[1] * t129;
+                let t131 = t125 * t21;
+                let t132 = t130.ln_of_both(t131);
+                let t133 = t8 * t127;
+                let t134 = self.fixed[6] * t133;
+                let t135 = self.fixed[7] * t126;
+                let t136 = t135 * t132;
+                let t137 = t134 + t136;
+                let t138 = -t137;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t138, T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -552,22 +545,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t18 = t17 * t16;
                 let t21 = t18 + T::one();
                 let t60 = t10 * t16;
-                let t148 = t8 * t21;
-                let t159 = T::one() - t14;
-                let t160 = T::one() / t159;
-                let t161 = t160 + T::one();
-                let t162 = t148 - t60;
-                let t163 = self.fixed[1] * t162;
-                let t164 = -t163;
-                let t165 = t159 * t21;
-                let t166 = t164.ln_of_both(t165);
-                let t167 = t8 * t161;
-                let t168 = self.fixed[6] * t167;
-                let t169 = self.fixed[7] * t160;
-                let t170 = t169 * t166;
-                let t171 = t168 - t170;
-                let t172 = -t171;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t172, T::zero()))
+                let t128 = t8 * t21;
+                let t139 = T::one() - t14;
+                let t140 = T::one() / t139;
+                let t141 = t140 + T::one();
+                let t142 = t128 - t60;
+                let t143 = self.fixed[1] * t142;
+                let t144 = -t143;
+                let t145 = t139 * t21;
+                let t146 = t144.ln_of_both(t145);
+                let t147 = t8 * t141;
+                let t148 = self.fixed[6] * t147;
+                let t149 = self.fixed[7] * t140;
+                let t150 = t149 * t146;
+                let t151 = t148 - t150;
+                let t152 = -t151;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t152, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -578,22 +571,22 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t15 = t14 * t13;
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
-                let t90 = t8 * t13;
-                let t173 = t17 + T::one();
-                let t174 = T::one() / t173;
-                let t175 = t174 + T::one();
-                let t176 = t10 * t20;
-                let t177 = t176 + t90;
-                let t178 = self.fixed[1] * t177;
-                let t179 = t173 * t20;
-                let t180 = t178.ln_of_both(t179);
-                let t181 = t10 * t175;
-                let t182 = self.fixed[6] * t181;
-                let t183 = self.fixed[7] * t174;
-                let t184 = t183 * t180;
-                let t185 = t182 + t184;
-                let t186 = -t185;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t186))
+                let t153 = t17 + T::one();
+                let t154 = T::one() / t153;
+                let t155 = t154 + T::one();
+                let t156 = t10 * t20;
+                let t157 = t8 * t13;
+                let t158 = t156 + t157;
+                let t159 = self.fixed[1] * t158;
+                let t160 = t153 * t20;
+                let t161 = t159.ln_of_both(t160);
+                let t162 = t10 * t155;
+                let t163 = self.fixed[6] * t162;
+                let t164 = self.fixed[7] * t154;
+                let t165 = t164 * t161;
+                let t166 = t163 + t165;
+                let t167 = -t166;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t167))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -604,23 +597,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
                 let t15 = t14 * t13;
                 let t17 = self.fixed[1] * t10;
                 let t20 = t15 + T::one();
-                let t90 = t8 * t13;
-                let t176 = t10 * t20;
-                let t187 = T::one() - t17;
-                let t188 = T::one() / t187;
-                let t189 = t188 + T::one();
-                let t190 = t176 - t90;
-                let t191 = self.fixed[1] * t190;
-                let t192 = -t191;
-                let t193 = t187 * t20;
-                let t194 = t192.ln_of_both(t193);
-                let t195 = t10 * t189;
-                let t196 = self.fixed[6] * t195;
-                let t197 = self.fixed[7] * t188;
-                let t198 = t197 * t194;
-                let t199 = t196 - t198;
-                let t200 = -t199;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t200))
+                let t156 = t10 * t20;
+                let t157 = t8 * t13;
+                let t168 = T::one() - t17;
+                let t169 = T::one() / t168;
+                let t170 = t169 + T::one();
+                let t171 = t156 - t157;
+                let t172 = self.fixed[1] * t171;
+                let t173 = -t172;
+                let t174 = t168 * t20;
+                let t175 = t173.ln_of_both(t174);
+                let t176 = t10 * t170;
+                let t177 = self.fixed[6] * t176;
+                let t178 = self.fixed[7] * t169;
+                let t179 = t178 * t175;
+                let t180 = t177 - t179;
+                let t181 = -t180;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t181))
             }
             _ => None,
         }
@@ -667,7 +660,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for AxisAligned<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[12]
+        self.fixed[11]
     }
     fn has_form_on_lattice(&self) -> bool {
         true
@@ -700,13 +693,13 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for AxisAligned<T> {
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t81 = self.fixed[3] * t8;
-        let t115 = self.fixed[3] * t10;
-        let t135 = self.fixed[11] * t8;
-        let t140 = self.fixed[11] * t10;
-        let t202 = self.fixed[13] * t8;
-        let t214 = self.fixed[13] * t10;
-        [t14, t17, t81, t115, t135, t140, t202, t214]
+        let t89 = self.fixed[8] * t8;
+        let t92 = self.fixed[3] * t8;
+        let t108 = self.fixed[8] * t10;
+        let t110 = self.fixed[3] * t10;
+        let t183 = self.fixed[12] * t8;
+        let t195 = self.fixed[12] * t10;
+        [t14, t17, t89, t92, t108, t110, t183, t195]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 4] {
@@ -730,31 +723,31 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for AxisAligned<T> {
         let t51 = T::one() / t22;
         let t52 = t21 * t51;
         let t53 = t20 * t51;
-        let t82 = time[2] * point[2];
-        let t116 = time[3] * point[3];
-        let t136 = time[4] * point[2];
-        let t137 = t82 * t52;
-        let t138 = t82 + t137;
-        let t141 = time[5] * point[3];
-        let t142 = t116 * t53;
-        let t143 = t116 + t142;
-        let t203 = time[6] * point[0];
-        let t204 = t203 * t138;
-        let t205 = t15 * t21;
-        let t206 = t205 + t18;
-        let t207 = t206.ln_of_both_if::<NEAR>(t22);
-        let t209 = self.fixed[14] * t207;
-        let t210 = t209 * t137;
-        let t211 = t204 + t210;
-        let t212 = t52 * t211;
-        let t213 = t136 - t212;
-        let t215 = time[7] * point[1];
-        let t216 = t215 * t143;
-        let t217 = t209 * t142;
-        let t218 = t216 + t217;
-        let t219 = t53 * t218;
-        let t220 = t141 - t219;
-        crate::nalgebra::SVector::<T, 2>::new(t213, t220)
+        let t90 = time[2] * point[2];
+        let t93 = time[3] * point[2];
+        let t94 = t93 * t52;
+        let t96 = t93 + t94;
+        let t109 = time[4] * point[3];
+        let t111 = time[5] * point[3];
+        let t112 = t111 * t53;
+        let t114 = t111 + t112;
+        let t184 = time[6] * point[0];
+        let t185 = t184 * t96;
+        let t186 = t15 * t21;
+        let t187 = t186 + t18;
+        let t188 = t187.ln_of_both_if::<NEAR>(t22);
+        let t190 = self.fixed[13] * t188;
+        let t191 = t190 * t94;
+        let t192 = t185 + t191;
+        let t193 = t52 * t192;
+        let t194 = t90 - t193;
+        let t196 = time[7] * point[1];
+        let t197 = t196 * t114;
+        let t198 = t190 * t112;
+        let t199 = t197 + t198;
+        let t200 = t53 * t199;
+        let t201 = t109 - t200;
+        crate::nalgebra::SVector::<T, 2>::new(t194, t201)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -766,15 +759,15 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         let t10 = t7.sin_pi();
         let t14 = self.fixed[1] * t8;
         let t17 = self.fixed[1] * t10;
-        let t81 = self.fixed[3] * t8;
-        let t115 = self.fixed[3] * t10;
-        let t135 = self.fixed[11] * t8;
-        let t140 = self.fixed[11] * t10;
-        let t202 = self.fixed[13] * t8;
-        let t214 = self.fixed[13] * t10;
-        let t242 = self.fixed[14] * t81;
-        let t248 = self.fixed[14] * t115;
-        [t14, t17, t81, t115, t135, t140, t202, t214, t242, t248]
+        let t89 = self.fixed[8] * t8;
+        let t92 = self.fixed[3] * t8;
+        let t108 = self.fixed[8] * t10;
+        let t110 = self.fixed[3] * t10;
+        let t183 = self.fixed[12] * t8;
+        let t195 = self.fixed[12] * t10;
+        let t223 = self.fixed[13] * t92;
+        let t229 = self.fixed[13] * t110;
+        [t14, t17, t89, t92, t108, t110, t183, t195, t223, t229]
     }
     #[inline]
     fn lattice_coordinate(
@@ -802,42 +795,42 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
             0 => {
                 let t15 = time[0] * point[0];
                 let t20 = t15 + T::one();
-                let t203 = time[6] * point[0];
-                let t221 = T::one() / t20;
-                let t222 = T::one() + t221;
-                let t225 = t15.ln_of_both(t20);
-                let t227 = t203 * t222;
-                let t228 = self.fixed[14] * t225;
-                let t229 = t228 / t20;
-                let t230 = t227 + t229;
-                let t231 = time[2] * t230;
-                let t232 = t231 / t20;
-                let t233 = time[4] - t232;
-                let t241 = point[1] * t233;
-                let t243 = time[8] * point[1];
-                let t244 = t20 * t20;
-                let t245 = t243 / t244;
-                let t249 = time[9] * t225;
-                [t241, t245, t249]
+                let t184 = time[6] * point[0];
+                let t202 = T::one() / t20;
+                let t203 = T::one() + t202;
+                let t206 = t15.ln_of_both(t20);
+                let t208 = t184 * t203;
+                let t209 = self.fixed[13] * t206;
+                let t210 = t209 / t20;
+                let t211 = t208 + t210;
+                let t212 = time[3] * t211;
+                let t213 = t212 / t20;
+                let t214 = time[2] - t213;
+                let t222 = point[1] * t214;
+                let t224 = time[8] * point[1];
+                let t225 = t20 * t20;
+                let t226 = t224 / t225;
+                let t230 = time[9] * t206;
+                [t222, t226, t230]
             }
             1 => {
                 let t18 = time[1] * point[0];
                 let t21 = t18 + T::one();
-                let t215 = time[7] * point[0];
-                let t223 = T::one() / t21;
-                let t224 = T::one() + t223;
-                let t226 = t18.ln_of_both(t21);
-                let t234 = t215 * t224;
-                let t235 = self.fixed[14] * t226;
-                let t236 = t235 / t21;
-                let t237 = t234 + t236;
-                let t238 = time[3] * t237;
-                let t239 = t238 / t21;
-                let t240 = time[5] - t239;
-                let t250 = t21 * t21;
-                let t251 = point[1] / t250;
-                let t253 = point[1] * t240;
-                [t226, t251, t253]
+                let t196 = time[7] * point[0];
+                let t204 = T::one() / t21;
+                let t205 = T::one() + t204;
+                let t207 = t18.ln_of_both(t21);
+                let t215 = t196 * t205;
+                let t216 = self.fixed[13] * t207;
+                let t217 = t216 / t21;
+                let t218 = t215 + t217;
+                let t219 = time[5] * t218;
+                let t220 = t219 / t21;
+                let t221 = time[4] - t220;
+                let t231 = t21 * t21;
+                let t232 = point[1] / t231;
+                let t234 = point[1] * t221;
+                [t207, t232, t234]
             }
             _ => [T::zero(); 3],
         }
@@ -848,11 +841,11 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 2, 10, 2, 3> for AxisAligned<T
         time: &[T; 10],
         layers: [&[T; 3]; 2],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t246 = layers[0][1] * layers[1][0];
-        let t247 = layers[0][0] - t246;
-        let t252 = layers[0][2] * layers[1][1];
-        let t254 = layers[1][2] - t252;
-        crate::nalgebra::SVector::<T, 2>::new(t247, t254)
+        let t227 = layers[0][1] * layers[1][0];
+        let t228 = layers[0][0] - t227;
+        let t233 = layers[0][2] * layers[1][1];
+        let t235 = layers[1][2] - t233;
+        crate::nalgebra::SVector::<T, 2>::new(t228, t235)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

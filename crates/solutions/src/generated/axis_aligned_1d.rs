@@ -37,7 +37,7 @@ impl<T: crate::Real> Default for AxisAligned1dParameters<T> {
 pub struct AxisAligned1d<T: crate::Real> {
     parameters: AxisAligned1dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 15],
+    fixed: [T; 14],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned1d<T> {
@@ -129,23 +129,20 @@ impl<T: crate::Real> AxisAligned1d<T> {
         let t46 = parameters.E * parameters.nu;
         let t47 = t32 * t40;
         let t48 = t46 / t47;
-        let t54 = parameters.nu * parameters.nu;
-        let t55 = T::nearest(2.0) * parameters.E;
-        let t56 = t55 * t54;
+        let t52 = parameters.nu * parameters.nu;
+        let t53 = T::nearest(2.0) * parameters.A;
+        let t54 = t53 * t19;
+        let t55 = t54 * parameters.E;
+        let t56 = t55 * t52;
         let t57 = parameters.rho0 * t32;
         let t58 = t57 * t40;
         let t59 = t56 / t58;
-        let t61 = t48 + t35;
-        let t70 = T::one() / parameters.rho0;
-        let t74 = T::nearest(2.0) * parameters.A;
-        let t75 = t74 * t19;
-        let t76 = t75 * parameters.E;
-        let t77 = t76 * t54;
-        let t78 = t77 / t58;
-        let t81 = t14 * t61;
-        let t82 = T::nearest(2.0) / t7;
-        let t105 = t70 * t81;
-        let t109 = t48 * t70;
+        let t62 = t48 + t35;
+        let t68 = t14 * t62;
+        let t75 = T::one() / parameters.rho0;
+        let t79 = T::nearest(2.0) / t7;
+        let t102 = t68 * t75;
+        let t106 = t48 * t75;
         Ok(AxisAligned1d {
             parameters,
             fixed: [
@@ -158,12 +155,11 @@ impl<T: crate::Real> AxisAligned1d<T> {
                 t42,
                 t48,
                 t59,
-                t61,
-                t70,
-                t78,
-                t82,
-                t105,
-                t109,
+                t68,
+                t75,
+                t79,
+                t102,
+                t106,
             ],
         })
     }
@@ -313,21 +309,23 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t52 = self.fixed[3] * t9;
-        let t53 = t52 * t2;
-        let t60 = self.fixed[8] * t53;
-        let t62 = t53 * t36;
-        let t63 = -t62;
-        let t64 = t53 + t62;
-        let t65 = t28 * t64;
-        let t66 = self.fixed[9] * t65;
-        let t67 = t41 * t63;
-        let t68 = self.fixed[7] * t67;
-        let t69 = t66 - t68;
-        let t71 = t69 * t36;
-        let t72 = self.fixed[10] * t71;
-        let t73 = t60 - t72;
-        crate::nalgebra::SVector::<T, 1>::new(t73)
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = t64 * t36;
+        let t66 = -t65;
+        let t67 = t64 + t65;
+        let t69 = self.fixed[9] * t9;
+        let t70 = t69 * t26;
+        let t71 = t70 * t67;
+        let t72 = t41 * t66;
+        let t73 = self.fixed[7] * t72;
+        let t74 = t71 - t73;
+        let t76 = t74 * t36;
+        let t77 = self.fixed[10] * t76;
+        let t78 = t61 - t77;
+        crate::nalgebra::SVector::<T, 1>::new(t78)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 1>, t: T) -> crate::Fields<T, 1> {
         let t2 = X[0].sin_pi();
@@ -355,20 +353,22 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         let t49 = t41 * t36;
         let t50 = self.fixed[7] * t49;
         let t51 = t45 + t50;
-        let t52 = self.fixed[3] * t9;
-        let t53 = t52 * t2;
-        let t60 = self.fixed[8] * t53;
-        let t62 = t53 * t36;
-        let t63 = -t62;
-        let t64 = t53 + t62;
-        let t65 = t28 * t64;
-        let t66 = self.fixed[9] * t65;
-        let t67 = t41 * t63;
-        let t68 = self.fixed[7] * t67;
-        let t69 = t66 - t68;
-        let t71 = t69 * t36;
-        let t72 = self.fixed[10] * t71;
-        let t73 = t60 - t72;
+        let t60 = self.fixed[8] * t9;
+        let t61 = t60 * t2;
+        let t63 = self.fixed[3] * t9;
+        let t64 = t63 * t2;
+        let t65 = t64 * t36;
+        let t66 = -t65;
+        let t67 = t64 + t65;
+        let t69 = self.fixed[9] * t9;
+        let t70 = t69 * t26;
+        let t71 = t70 * t67;
+        let t72 = t41 * t66;
+        let t73 = self.fixed[7] * t72;
+        let t74 = t71 - t73;
+        let t76 = t74 * t36;
+        let t77 = self.fixed[10] * t76;
+        let t78 = t61 - t77;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 1>::new(t11),
             v: crate::nalgebra::SVector::<T, 1>::new(t18),
@@ -377,7 +377,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
             F: crate::nalgebra::SMatrix::<T, 1, 1>::new(t30),
             J: t30,
             P: crate::nalgebra::SMatrix::<T, 1, 1>::new(t51),
-            b: crate::nalgebra::SVector::<T, 1>::new(t73),
+            b: crate::nalgebra::SVector::<T, 1>::new(t78),
         }
     }
     fn traction(
@@ -391,34 +391,34 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t84 = t27 + T::one();
-                let t85 = T::one() / t84;
-                let t86 = t85 + T::one();
-                let t87 = t27.log_1p();
-                let t88 = t9 * t86;
-                let t89 = self.fixed[6] * t88;
-                let t90 = t87 * t85;
-                let t91 = self.fixed[7] * t90;
-                let t92 = t89 + t91;
-                let t93 = -t92;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t93))
+                let t81 = t27 + T::one();
+                let t82 = T::one() / t81;
+                let t83 = t82 + T::one();
+                let t84 = t27.log_1p();
+                let t85 = t9 * t83;
+                let t86 = self.fixed[6] * t85;
+                let t87 = t84 * t82;
+                let t88 = self.fixed[7] * t87;
+                let t89 = t86 + t88;
+                let t90 = -t89;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t90))
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.fixed[0] * t;
                 let t9 = t8.cos_pi();
                 let t27 = self.fixed[1] * t9;
-                let t94 = T::one() - t27;
-                let t95 = T::one() / t94;
-                let t96 = t95 + T::one();
-                let t97 = -t27;
-                let t98 = t97.log_1p();
-                let t99 = t9 * t96;
-                let t100 = self.fixed[6] * t99;
-                let t101 = t98 * t95;
-                let t102 = self.fixed[7] * t101;
-                let t103 = t100 - t102;
-                let t104 = -t103;
-                Some(crate::nalgebra::SVector::<T, 1>::new(t104))
+                let t91 = T::one() - t27;
+                let t92 = T::one() / t91;
+                let t93 = t92 + T::one();
+                let t94 = -t27;
+                let t95 = t94.log_1p();
+                let t96 = t9 * t93;
+                let t97 = self.fixed[6] * t96;
+                let t98 = t95 * t92;
+                let t99 = self.fixed[7] * t98;
+                let t100 = t97 - t99;
+                let t101 = -t100;
+                Some(crate::nalgebra::SVector::<T, 1>::new(t101))
             }
             _ => None,
         }
@@ -457,7 +457,7 @@ impl<T: crate::Real> crate::Solution<T, 1> for AxisAligned1d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[12]
+        self.fixed[11]
     }
     fn body_force_on(
         &self,
@@ -480,10 +480,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 4, 2> for AxisAligned1d<T> {
         let t8 = self.fixed[0] * t;
         let t9 = t8.cos_pi();
         let t27 = self.fixed[1] * t9;
-        let t52 = self.fixed[3] * t9;
-        let t79 = self.fixed[11] * t9;
-        let t106 = self.fixed[13] * t9;
-        [t27, t52, t79, t106]
+        let t60 = self.fixed[8] * t9;
+        let t63 = self.fixed[3] * t9;
+        let t103 = self.fixed[12] * t9;
+        [t27, t60, t63, t103]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 1>) -> [T; 2] {
@@ -501,18 +501,18 @@ impl<T: crate::Real> crate::BodyForceStages<T, 1, 4, 2> for AxisAligned1d<T> {
         let t30 = t28 + T::one();
         let t36 = T::one() / t30;
         let t41 = t28.log_1p();
-        let t53 = time[1] * point[0];
-        let t62 = t53 * t36;
-        let t64 = t53 + t62;
-        let t80 = time[2] * point[0];
-        let t107 = time[3] * point[1];
-        let t108 = t107 * t64;
-        let t110 = self.fixed[14] * t41;
-        let t111 = t110 * t62;
-        let t112 = t108 + t111;
-        let t113 = t36 * t112;
-        let t114 = t80 - t113;
-        crate::nalgebra::SVector::<T, 1>::new(t114)
+        let t61 = time[1] * point[0];
+        let t64 = time[2] * point[0];
+        let t65 = t64 * t36;
+        let t67 = t64 + t65;
+        let t104 = time[3] * point[1];
+        let t105 = t104 * t67;
+        let t107 = self.fixed[13] * t41;
+        let t108 = t107 * t65;
+        let t109 = t105 + t108;
+        let t110 = t36 * t109;
+        let t111 = t61 - t110;
+        crate::nalgebra::SVector::<T, 1>::new(t111)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -39,7 +39,7 @@ impl<T: crate::Real> Default for AxisAligned3dParameters<T> {
 pub struct AxisAligned3d<T: crate::Real> {
     parameters: AxisAligned3dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 24],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> AxisAligned3d<T> {
@@ -134,36 +134,30 @@ impl<T: crate::Real> AxisAligned3d<T> {
         let t90 = t89 / t88;
         let t97 = T::nearest(2.0) * parameters.nu;
         let t98 = T::one() - t97;
-        let t132 = t20 * t90;
-        let t136 = parameters.E * parameters.nu;
-        let t137 = t88 * t98;
-        let t138 = t136 / t137;
-        let t156 = parameters.nu * parameters.nu;
-        let t157 = T::nearest(2.0) * parameters.E;
-        let t158 = t157 * t156;
-        let t159 = parameters.rho0 * t88;
-        let t160 = t159 * t98;
-        let t161 = t158 / t160;
-        let t163 = t138 + t90;
-        let t179 = T::one() / parameters.rho0;
-        let t185 = parameters.E * t156;
-        let t186 = t185 / t160;
-        let t211 = T::nearest(2.0) * parameters.A;
-        let t212 = t211 * t63;
-        let t213 = t212 * parameters.E;
-        let t214 = t213 * t156;
-        let t215 = t214 / t160;
-        let t218 = t20 * t163;
-        let t219 = t65 * t156;
-        let t220 = t219 / t160;
-        let t223 = T::nearest(2.0) / t6;
-        let t360 = t179 * t218;
-        let t367 = t20 * T::nearest(2.0);
-        let t376 = t138 * t179;
-        let t383 = t70 * t138;
-        let t384 = t383 * t179;
-        let t389 = t70 * t163;
-        let t390 = t389 * t179;
+        let t108 = t20 * t90;
+        let t112 = parameters.E * parameters.nu;
+        let t113 = t88 * t98;
+        let t114 = t112 / t113;
+        let t130 = parameters.nu * parameters.nu;
+        let t131 = T::nearest(2.0) * parameters.A;
+        let t132 = t131 * t63;
+        let t133 = t132 * parameters.E;
+        let t134 = t133 * t130;
+        let t135 = parameters.rho0 * t88;
+        let t136 = t135 * t98;
+        let t137 = t134 / t136;
+        let t140 = t114 + t90;
+        let t146 = t20 * t140;
+        let t153 = T::one() / parameters.rho0;
+        let t157 = t65 * t130;
+        let t158 = t157 / t136;
+        let t179 = T::nearest(2.0) / t6;
+        let t293 = t146 * t153;
+        let t304 = t114 * t153;
+        let t311 = t70 * t114;
+        let t312 = t311 * t153;
+        let t317 = t70 * t140;
+        let t318 = t317 * t153;
         Ok(AxisAligned3d {
             parameters,
             fixed: [
@@ -179,20 +173,18 @@ impl<T: crate::Real> AxisAligned3d<T> {
                 t70,
                 t72,
                 t90,
-                t132,
-                t138,
-                t161,
-                t163,
+                t108,
+                t114,
+                t137,
+                t140,
+                t146,
+                t153,
+                t158,
                 t179,
-                t186,
-                t215,
-                t220,
-                t223,
-                t360,
-                t367,
-                t376,
-                t384,
-                t390,
+                t293,
+                t304,
+                t312,
+                t318,
             ],
         })
     }
@@ -441,71 +433,47 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t99 = T::nearest(0.5) * X[0];
-        let t100 = t99.sin_pi();
-        let t101 = T::nearest(0.5) * X[1];
-        let t102 = t101.cos_pi();
-        let t103 = t99.cos_pi();
-        let t104 = t101.sin_pi();
-        let t105 = t100 * t102;
-        let t106 = t103 * t104;
-        let t107 = t105 - t106;
-        let t108 = t105 + t106;
-        let t109 = T::nearest(0.5) * X[2];
-        let t110 = t109.sin_pi();
-        let t111 = t109.cos_pi();
-        let t112 = t102 * t110;
-        let t113 = t104 * t111;
-        let t114 = t112 - t113;
-        let t115 = t112 + t113;
-        let t116 = T::nearest(2.0) * t8;
-        let t117 = t107 * t108;
-        let t118 = t116 * t117;
-        let t119 = t114 * t115;
-        let t120 = t18 * t119;
-        let t121 = t118 - t120;
-        let t122 = self.fixed[3] * t121;
-        let t123 = t28 * t36;
-        let t124 = t123 - t31;
-        let t125 = t8 * t22;
-        let t126 = t125 * t124;
-        let t127 = self.fixed[3] * t126;
-        let t128 = t28 * t32;
-        let t129 = t127 - t122;
-        let t130 = t129 + t128;
-        let t131 = t130.ln_of_both(t38);
-        let t133 = self.fixed[12] * t8;
-        let t134 = t133 * t22;
-        let t135 = t134 * t96;
-        let t139 = t131 * t94;
-        let t140 = self.fixed[13] * t139;
-        let t141 = t135 + t140;
-        let t142 = t95 + T::one();
-        let t143 = t28 * t142;
-        let t144 = self.fixed[11] * t143;
-        let t145 = t131 * t95;
-        let t146 = self.fixed[13] * t145;
-        let t147 = t144 + t146;
-        let t148 = t93 + T::one();
-        let t149 = t32 * t148;
-        let t150 = self.fixed[11] * t149;
-        let t151 = t131 * t93;
-        let t152 = self.fixed[13] * t151;
-        let t153 = t150 + t152;
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t109 = self.fixed[12] * t8;
+        let t110 = t109 * t22;
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[13] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[11] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[13] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[11] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[13] * t127;
+        let t129 = t126 + t128;
         crate::nalgebra::SMatrix::<
             T,
             3,
             3,
         >::new(
-            t141,
+            t117,
             T::zero(),
             T::zero(),
             T::zero(),
-            t147,
+            t123,
             T::zero(),
             T::zero(),
             T::zero(),
-            t153,
+            t129,
         )
     }
     #[inline]
@@ -544,82 +512,60 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t93 = t37 * t91;
         let t94 = t35 * t92;
         let t95 = t34 * t92;
-        let t99 = T::nearest(0.5) * X[0];
-        let t100 = t99.sin_pi();
-        let t101 = T::nearest(0.5) * X[1];
-        let t102 = t101.cos_pi();
-        let t103 = t99.cos_pi();
-        let t104 = t101.sin_pi();
-        let t105 = t100 * t102;
-        let t106 = t103 * t104;
-        let t107 = t105 - t106;
-        let t108 = t105 + t106;
-        let t109 = T::nearest(0.5) * X[2];
-        let t110 = t109.sin_pi();
-        let t111 = t109.cos_pi();
-        let t112 = t102 * t110;
-        let t113 = t104 * t111;
-        let t114 = t112 - t113;
-        let t115 = t112 + t113;
-        let t116 = T::nearest(2.0) * t8;
-        let t117 = t107 * t108;
-        let t118 = t116 * t117;
-        let t119 = t114 * t115;
-        let t120 = t18 * t119;
-        let t121 = t118 - t120;
-        let t122 = self.fixed[3] * t121;
-        let t142 = t95 + T::one();
-        let t143 = t28 * t142;
-        let t148 = t93 + T::one();
-        let t149 = t32 * t148;
-        let t154 = self.fixed[7] * t8;
-        let t155 = t154 * t39;
-        let t162 = self.fixed[14] * t155;
-        let t164 = t155 * t94;
-        let t165 = -t164;
-        let t166 = t155 + t164;
-        let t167 = t28 * t24;
-        let t168 = t24 - t27;
-        let t169 = t168 + t167;
-        let t170 = t32 * t169;
-        let t171 = t170 - t122;
-        let t172 = t171 + t167;
-        let t173 = t172.ln_of_both(t38);
-        let t174 = t24 * t166;
-        let t175 = self.fixed[15] * t174;
-        let t176 = t165 * t173;
-        let t177 = self.fixed[13] * t176;
-        let t178 = t175 - t177;
-        let t180 = t178 * t94;
-        let t181 = self.fixed[16] * t180;
-        let t182 = t162 - t181;
-        let t183 = self.fixed[7] * t14;
-        let t184 = t183 * t42;
-        let t187 = self.fixed[17] * t184;
-        let t188 = self.fixed[9] * t14;
-        let t189 = t188 * t42;
-        let t190 = self.fixed[15] * t143;
-        let t191 = t173 * t95;
-        let t192 = self.fixed[13] * t191;
-        let t193 = t190 + t192;
-        let t194 = t189 * t193;
-        let t195 = t194 * t95;
-        let t196 = self.fixed[16] * t195;
-        let t197 = t196 - t187;
-        let t198 = self.fixed[7] * t18;
-        let t199 = t198 * t46;
-        let t200 = self.fixed[17] * t199;
-        let t201 = self.fixed[9] * t18;
-        let t202 = t201 * t46;
-        let t203 = self.fixed[15] * t149;
-        let t204 = t173 * t93;
-        let t205 = self.fixed[13] * t204;
-        let t206 = t203 + t205;
-        let t207 = t202 * t206;
-        let t208 = t207 * t93;
-        let t209 = self.fixed[16] * t208;
-        let t210 = t209 - t200;
-        crate::nalgebra::SVector::<T, 3>::new(t182, t197, t210)
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[13] * t121;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[13] * t127;
+        let t138 = self.fixed[14] * t8;
+        let t139 = t138 * t39;
+        let t141 = self.fixed[7] * t8;
+        let t142 = t141 * t39;
+        let t143 = t142 * t94;
+        let t144 = -t143;
+        let t145 = t142 + t143;
+        let t147 = self.fixed[16] * t8;
+        let t148 = t147 * t22;
+        let t149 = t148 * t145;
+        let t150 = t107 * t144;
+        let t151 = self.fixed[13] * t150;
+        let t152 = t149 - t151;
+        let t154 = t152 * t94;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t139 - t155;
+        let t159 = self.fixed[18] * t14;
+        let t160 = t159 * t42;
+        let t161 = self.fixed[9] * t14;
+        let t162 = t161 * t42;
+        let t163 = self.fixed[15] * t119;
+        let t164 = t122 + t163;
+        let t165 = t162 * t164;
+        let t166 = t165 * t95;
+        let t167 = self.fixed[17] * t166;
+        let t168 = t167 - t160;
+        let t169 = self.fixed[18] * t18;
+        let t170 = t169 * t46;
+        let t171 = self.fixed[9] * t18;
+        let t172 = t171 * t46;
+        let t173 = self.fixed[15] * t125;
+        let t174 = t128 + t173;
+        let t175 = t172 * t174;
+        let t176 = t175 * t93;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t170;
+        crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t7 = self.fixed[0] * t;
@@ -687,104 +633,69 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t99 = T::nearest(0.5) * X[0];
-        let t100 = t99.sin_pi();
-        let t101 = T::nearest(0.5) * X[1];
-        let t102 = t101.cos_pi();
-        let t103 = t99.cos_pi();
-        let t104 = t101.sin_pi();
-        let t105 = t100 * t102;
-        let t106 = t103 * t104;
-        let t107 = t105 - t106;
-        let t108 = t105 + t106;
-        let t109 = T::nearest(0.5) * X[2];
-        let t110 = t109.sin_pi();
-        let t111 = t109.cos_pi();
-        let t112 = t102 * t110;
-        let t113 = t104 * t111;
-        let t114 = t112 - t113;
-        let t115 = t112 + t113;
-        let t116 = T::nearest(2.0) * t8;
-        let t117 = t107 * t108;
-        let t118 = t116 * t117;
-        let t119 = t114 * t115;
-        let t120 = t18 * t119;
-        let t121 = t118 - t120;
-        let t122 = self.fixed[3] * t121;
-        let t123 = t28 * t36;
-        let t124 = t123 - t31;
-        let t125 = t8 * t22;
-        let t126 = t125 * t124;
-        let t127 = self.fixed[3] * t126;
-        let t128 = t28 * t32;
-        let t129 = t127 - t122;
-        let t130 = t129 + t128;
-        let t131 = t130.ln_of_both(t38);
-        let t133 = self.fixed[12] * t8;
-        let t134 = t133 * t22;
-        let t135 = t134 * t96;
-        let t139 = t131 * t94;
-        let t140 = self.fixed[13] * t139;
-        let t141 = t135 + t140;
-        let t142 = t95 + T::one();
-        let t143 = t28 * t142;
-        let t144 = self.fixed[11] * t143;
-        let t145 = t131 * t95;
-        let t146 = self.fixed[13] * t145;
-        let t147 = t144 + t146;
-        let t148 = t93 + T::one();
-        let t149 = t32 * t148;
-        let t150 = self.fixed[11] * t149;
-        let t151 = t131 * t93;
-        let t152 = self.fixed[13] * t151;
-        let t153 = t150 + t152;
-        let t154 = self.fixed[7] * t8;
-        let t155 = t154 * t39;
-        let t162 = self.fixed[14] * t155;
-        let t164 = t155 * t94;
-        let t165 = -t164;
-        let t166 = t155 + t164;
-        let t167 = t28 * t24;
-        let t168 = t24 - t27;
-        let t169 = t168 + t167;
-        let t170 = t32 * t169;
-        let t171 = t170 - t122;
-        let t172 = t171 + t167;
-        let t173 = t172.ln_of_both(t38);
-        let t174 = t24 * t166;
-        let t175 = self.fixed[15] * t174;
-        let t176 = t165 * t173;
-        let t177 = self.fixed[13] * t176;
-        let t178 = t175 - t177;
-        let t180 = t178 * t94;
-        let t181 = self.fixed[16] * t180;
-        let t182 = t162 - t181;
-        let t183 = self.fixed[7] * t14;
-        let t184 = t183 * t42;
-        let t187 = self.fixed[17] * t184;
-        let t188 = self.fixed[9] * t14;
-        let t189 = t188 * t42;
-        let t190 = self.fixed[15] * t143;
-        let t191 = t173 * t95;
-        let t192 = self.fixed[13] * t191;
-        let t193 = t190 + t192;
-        let t194 = t189 * t193;
-        let t195 = t194 * t95;
-        let t196 = self.fixed[16] * t195;
-        let t197 = t196 - t187;
-        let t198 = self.fixed[7] * t18;
-        let t199 = t198 * t46;
-        let t200 = self.fixed[17] * t199;
-        let t201 = self.fixed[9] * t18;
-        let t202 = t201 * t46;
-        let t203 = self.fixed[15] * t149;
-        let t204 = t173 * t93;
-        let t205 = self.fixed[13] * t204;
-        let t206 = t203 + t205;
-        let t207 = t202 * t206;
-        let t208 = t207 * t93;
-        let t209 = self.fixed[16] * t208;
-        let t210 = t209 - t200;
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = t8 * t22;
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both(t38);
+        let t109 = self.fixed[12] * t8;
+        let t110 = t109 * t22;
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[13] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[11] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[13] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[11] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[13] * t127;
+        let t129 = t126 + t128;
+        let t138 = self.fixed[14] * t8;
+        let t139 = t138 * t39;
+        let t141 = self.fixed[7] * t8;
+        let t142 = t141 * t39;
+        let t143 = t142 * t94;
+        let t144 = -t143;
+        let t145 = t142 + t143;
+        let t147 = self.fixed[16] * t8;
+        let t148 = t147 * t22;
+        let t149 = t148 * t145;
+        let t150 = t107 * t144;
+        let t151 = self.fixed[13] * t150;
+        let t152 = t149 - t151;
+        let t154 = t152 * t94;
+        let t155 = self.fixed[17] * t154;
+        let t156 = t139 - t155;
+        let t159 = self.fixed[18] * t14;
+        let t160 = t159 * t42;
+        let t161 = self.fixed[9] * t14;
+        let t162 = t161 * t42;
+        let t163 = self.fixed[15] * t119;
+        let t164 = t122 + t163;
+        let t165 = t162 * t164;
+        let t166 = t165 * t95;
+        let t167 = self.fixed[17] * t166;
+        let t168 = t167 - t160;
+        let t169 = self.fixed[18] * t18;
+        let t170 = t169 * t46;
+        let t171 = self.fixed[9] * t18;
+        let t172 = t171 * t46;
+        let t173 = self.fixed[15] * t125;
+        let t174 = t128 + t173;
+        let t175 = t172 * t174;
+        let t176 = t175 * t93;
+        let t177 = self.fixed[17] * t176;
+        let t178 = t177 - t170;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v: crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62),
@@ -825,17 +736,17 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t141,
+                t117,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t147,
+                t123,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t153,
+                t129,
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t182, t197, t210),
+            b: crate::nalgebra::SVector::<T, 3>::new(t156, t168, t178),
         }
     }
     fn traction(
@@ -863,42 +774,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t35 = t28 + T::one();
                 let t36 = t32 + T::one();
-                let t101 = T::nearest(0.5) * X[1];
-                let t102 = t101.cos_pi();
-                let t104 = t101.sin_pi();
-                let t109 = T::nearest(0.5) * X[2];
-                let t110 = t109.sin_pi();
-                let t111 = t109.cos_pi();
-                let t112 = t102 * t110;
-                let t113 = t104 * t111;
-                let t114 = t112 - t113;
-                let t115 = t112 + t113;
-                let t116 = T::nearest(2.0) * t8;
-                let t119 = t114 * t115;
-                let t120 = t18 * t119;
-                let t123 = t28 * t36;
-                let t124 = t123 - t31;
-                let t128 = t28 * t32;
-                let t224 = t23 + T::one();
-                let t225 = T::one() / t224;
-                let t226 = t225 + T::one();
-                let t227 = t104 * t104;
-                let t228 = t116 * t227;
-                let t229 = t120 + t228;
-                let t230 = t8 * t124;
-                let t231 = t230 + t229;
-                let t232 = self.fixed[3] * t231;
-                let t233 = t232 + t128;
-                let t234 = t35 * t36;
-                let t235 = t224 * t234;
-                let t236 = t233.ln_of_both(t235);
-                let t237 = t8 * t226;
-                let t238 = self.fixed[12] * t237;
-                let t239 = self.fixed[13] * t225;
-                let t240 = t239 * t236;
-                let t241 = t238 + t240;
-                let t242 = -t241;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t242, T::zero(), T::zero()))
+                let t99 = t28 * t36;
+                let t100 = t99 - t31;
+                let t180 = t23 + T::one();
+                let t181 = T::one() / t180;
+                let t182 = t181 + T::one();
+                let t183 = t8 * t100;
+                let t184 = self.fixed[3] * t183;
+                let t185 = t184 + t99;
+                let t186 = t185 - t31;
+                let t187 = t23 + t186;
+                let t188 = t35 * t36;
+                let t189 = t180 * t188;
+                let t190 = t187.ln_of_both(t189);
+                let t191 = t8 * t182;
+                let t192 = self.fixed[12] * t191;
+                let t193 = self.fixed[13] * t181;
+                let t194 = t193 * t190;
+                let t195 = t192 + t194;
+                let t196 = -t195;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t196, T::zero(), T::zero()))
             }
             crate::Surface::Upper(0) => {
                 let t7 = self.fixed[0] * t;
@@ -918,42 +813,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t35 = t28 + T::one();
                 let t36 = t32 + T::one();
-                let t101 = T::nearest(0.5) * X[1];
-                let t102 = t101.cos_pi();
-                let t104 = t101.sin_pi();
-                let t109 = T::nearest(0.5) * X[2];
-                let t110 = t109.sin_pi();
-                let t111 = t109.cos_pi();
-                let t112 = t102 * t110;
-                let t113 = t104 * t111;
-                let t114 = t112 - t113;
-                let t115 = t112 + t113;
-                let t116 = T::nearest(2.0) * t8;
-                let t119 = t114 * t115;
-                let t120 = t18 * t119;
-                let t123 = t28 * t36;
-                let t124 = t123 - t31;
-                let t128 = t28 * t32;
-                let t230 = t8 * t124;
-                let t234 = t35 * t36;
-                let t243 = T::one() - t23;
-                let t244 = T::one() / t243;
-                let t245 = t244 + T::one();
-                let t246 = t102 * t102;
-                let t247 = t116 * t246;
-                let t248 = t120 - t247;
-                let t249 = t230 - t248;
-                let t250 = self.fixed[3] * t249;
-                let t251 = t128 - t250;
-                let t252 = t243 * t234;
-                let t253 = t251.ln_of_both(t252);
-                let t254 = t8 * t245;
-                let t255 = self.fixed[12] * t254;
-                let t256 = self.fixed[13] * t244;
-                let t257 = t256 * t253;
-                let t258 = t255 - t257;
-                let t259 = -t258;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t259, T::zero(), T::zero()))
+                let t99 = t28 * t36;
+                let t100 = t99 - t31;
+                let t183 = t8 * t100;
+                let t184 = self.fixed[3] * t183;
+                let t188 = t35 * t36;
+                let t197 = T::one() - t23;
+                let t198 = T::one() / t197;
+                let t199 = t198 + T::one();
+                let t200 = t99 - t184;
+                let t201 = t200 - t31;
+                let t202 = t201 - t23;
+                let t203 = t197 * t188;
+                let t204 = t202.ln_of_both(t203);
+                let t205 = t8 * t199;
+                let t206 = self.fixed[12] * t205;
+                let t207 = self.fixed[13] * t198;
+                let t208 = t207 * t204;
+                let t209 = t206 - t208;
+                let t210 = -t209;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t210, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t7 = self.fixed[0] * t;
@@ -972,39 +851,28 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
-                let t99 = T::nearest(0.5) * X[0];
-                let t100 = t99.sin_pi();
-                let t109 = T::nearest(0.5) * X[2];
-                let t110 = t109.sin_pi();
-                let t116 = T::nearest(2.0) * t8;
-                let t125 = t8 * t22;
-                let t260 = -t26;
-                let t261 = t260 + T::one();
-                let t262 = T::one() / t261;
-                let t263 = t262 + T::one();
-                let t264 = t100 * t100;
-                let t265 = t116 * t264;
-                let t266 = t110 * t110;
-                let t267 = t18 * t266;
-                let t268 = t265 - t267;
-                let t269 = self.fixed[3] * t268;
-                let t270 = t32 * t261;
-                let t271 = t270 - t26;
-                let t272 = t125 * t271;
-                let t273 = self.fixed[3] * t272;
-                let t274 = t260 * t32;
-                let t275 = t273 - t269;
-                let t276 = t275 + t274;
-                let t277 = t34 * t36;
-                let t278 = t261 * t277;
-                let t279 = t276.ln_of_both(t278);
-                let t280 = t260 * t263;
-                let t281 = self.fixed[11] * t280;
-                let t282 = self.fixed[13] * t262;
-                let t283 = t282 * t279;
-                let t284 = t281 + t283;
-                let t285 = -t284;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t285, T::zero()))
+                let t102 = t8 * t22;
+                let t211 = -t26;
+                let t212 = t211 + T::one();
+                let t213 = T::one() / t212;
+                let t214 = t213 + T::one();
+                let t215 = t32 * t212;
+                let t216 = t215 - t26;
+                let t217 = t216 + T::one();
+                let t218 = t102 * t217;
+                let t219 = self.fixed[3] * t218;
+                let t220 = t219 + t215;
+                let t221 = t220 - t26;
+                let t222 = t34 * t36;
+                let t223 = t212 * t222;
+                let t224 = t221.ln_of_both(t223);
+                let t225 = t211 * t214;
+                let t226 = self.fixed[11] * t225;
+                let t227 = self.fixed[13] * t213;
+                let t228 = t227 * t224;
+                let t229 = t226 + t228;
+                let t230 = -t229;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t230, T::zero()))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -1023,36 +891,26 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t32 = -t31;
                 let t34 = t24 + T::one();
                 let t36 = t32 + T::one();
-                let t99 = T::nearest(0.5) * X[0];
-                let t103 = t99.cos_pi();
-                let t109 = T::nearest(0.5) * X[2];
-                let t111 = t109.cos_pi();
-                let t116 = T::nearest(2.0) * t8;
-                let t277 = t34 * t36;
-                let t286 = t26 + T::one();
-                let t287 = T::one() / t286;
-                let t288 = t287 + T::one();
-                let t289 = t103 * t103;
-                let t290 = t116 * t289;
-                let t291 = t111 * t111;
-                let t292 = t18 * t291;
-                let t293 = t290 - t292;
-                let t294 = t32 * t286;
-                let t295 = t26 + t294;
-                let t296 = t22 * t295;
-                let t297 = t8 * t296;
-                let t298 = t297 + t293;
-                let t299 = self.fixed[3] * t298;
-                let t300 = t26 * t32;
-                let t301 = t299 + t300;
-                let t302 = t286 * t277;
-                let t303 = t301.ln_of_both(t302);
-                let t304 = t26 * t288;
-                let t305 = self.fixed[11] * t304;
-                let t306 = self.fixed[13] * t287;
-                let t307 = t306 * t303;
-                let t308 = t305 + t307;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t308, T::zero()))
+                let t102 = t8 * t22;
+                let t222 = t34 * t36;
+                let t231 = t26 + T::one();
+                let t232 = T::one() / t231;
+                let t233 = t232 + T::one();
+                let t234 = t32 * t231;
+                let t235 = t26 + t234;
+                let t236 = t235 + T::one();
+                let t237 = t102 * t236;
+                let t238 = self.fixed[3] * t237;
+                let t239 = t238 + t234;
+                let t240 = t26 + t239;
+                let t241 = t231 * t222;
+                let t242 = t240.ln_of_both(t241);
+                let t243 = t26 * t233;
+                let t244 = self.fixed[11] * t243;
+                let t245 = self.fixed[13] * t232;
+                let t246 = t245 * t242;
+                let t247 = t244 + t246;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t247, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1072,44 +930,27 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
-                let t99 = T::nearest(0.5) * X[0];
-                let t100 = t99.sin_pi();
-                let t101 = T::nearest(0.5) * X[1];
-                let t102 = t101.cos_pi();
-                let t103 = t99.cos_pi();
-                let t104 = t101.sin_pi();
-                let t105 = t100 * t102;
-                let t106 = t103 * t104;
-                let t107 = t105 - t106;
-                let t108 = t105 + t106;
-                let t116 = T::nearest(2.0) * t8;
-                let t117 = t107 * t108;
-                let t118 = t116 * t117;
-                let t125 = t8 * t22;
-                let t227 = t104 * t104;
-                let t309 = -t30;
-                let t310 = t309 + T::one();
-                let t311 = T::one() / t310;
-                let t312 = t311 + T::one();
-                let t313 = t18 * t227;
-                let t314 = t118 + t313;
-                let t315 = self.fixed[3] * t314;
-                let t316 = t28 * t310;
-                let t317 = t316 - t30;
-                let t318 = t125 * t317;
-                let t319 = self.fixed[3] * t318;
-                let t320 = t309 * t28;
-                let t321 = t319 - t315;
-                let t322 = t321 + t320;
-                let t323 = t310 * t37;
-                let t324 = t322.ln_of_both(t323);
-                let t325 = t309 * t312;
-                let t326 = self.fixed[11] * t325;
-                let t327 = self.fixed[13] * t311;
-                let t328 = t327 * t324;
-                let t329 = t326 + t328;
-                let t330 = -t329;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t330))
+                let t102 = t8 * t22;
+                let t248 = -t30;
+                let t249 = t248 + T::one();
+                let t250 = T::one() / t249;
+                let t251 = t250 + T::one();
+                let t252 = t28 * t249;
+                let t253 = t252 - t30;
+                let t254 = t253 + T::one();
+                let t255 = t102 * t254;
+                let t256 = self.fixed[3] * t255;
+                let t257 = t256 + t252;
+                let t258 = t257 - t30;
+                let t259 = t249 * t37;
+                let t260 = t258.ln_of_both(t259);
+                let t261 = t248 * t251;
+                let t262 = self.fixed[11] * t261;
+                let t263 = self.fixed[13] * t250;
+                let t264 = t263 * t260;
+                let t265 = t262 + t264;
+                let t266 = -t265;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t266))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
@@ -1129,42 +970,25 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 let t34 = t24 + T::one();
                 let t35 = t28 + T::one();
                 let t37 = t34 * t35;
-                let t99 = T::nearest(0.5) * X[0];
-                let t100 = t99.sin_pi();
-                let t101 = T::nearest(0.5) * X[1];
-                let t102 = t101.cos_pi();
-                let t103 = t99.cos_pi();
-                let t104 = t101.sin_pi();
-                let t105 = t100 * t102;
-                let t106 = t103 * t104;
-                let t107 = t105 - t106;
-                let t108 = t105 + t106;
-                let t116 = T::nearest(2.0) * t8;
-                let t117 = t107 * t108;
-                let t118 = t116 * t117;
-                let t125 = t8 * t22;
-                let t246 = t102 * t102;
-                let t331 = t30 + T::one();
-                let t332 = T::one() / t331;
-                let t333 = t332 + T::one();
-                let t334 = t18 * t246;
-                let t335 = t118 - t334;
-                let t336 = self.fixed[3] * t335;
-                let t337 = t28 * t331;
-                let t338 = t30 + t337;
-                let t339 = t125 * t338;
-                let t340 = self.fixed[3] * t339;
-                let t341 = t30 * t28;
-                let t342 = t340 - t336;
-                let t343 = t342 + t341;
-                let t344 = t331 * t37;
-                let t345 = t343.ln_of_both(t344);
-                let t346 = t30 * t333;
-                let t347 = self.fixed[11] * t346;
-                let t348 = self.fixed[13] * t332;
-                let t349 = t348 * t345;
-                let t350 = t347 + t349;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t350))
+                let t102 = t8 * t22;
+                let t267 = t30 + T::one();
+                let t268 = T::one() / t267;
+                let t269 = t268 + T::one();
+                let t270 = t28 * t267;
+                let t271 = t30 + t270;
+                let t272 = t271 + T::one();
+                let t273 = t102 * t272;
+                let t274 = self.fixed[3] * t273;
+                let t275 = t274 + t270;
+                let t276 = t30 + t275;
+                let t277 = t267 * t37;
+                let t278 = t276.ln_of_both(t277);
+                let t279 = t30 * t269;
+                let t280 = self.fixed[11] * t279;
+                let t281 = self.fixed[13] * t268;
+                let t282 = t281 * t278;
+                let t283 = t280 + t282;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t283))
             }
             _ => None,
         }
@@ -1219,7 +1043,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[20]
+        self.fixed[19]
     }
     fn has_form_on_lattice(&self) -> bool {
         true
@@ -1234,19 +1058,19 @@ impl<T: crate::Real> crate::Solution<T, 3> for AxisAligned3d<T> {
                 crate::LatticePoints::<Self, T, 3, 13, 2, 5>::new(*self, lattice),
             );
         }
-        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 14, 8>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedPoints::<Self, T, 12, 6>::new(*self, X))
     }
     fn state_at(
         &self,
         X: &[crate::nalgebra::SVector<T, 3>],
     ) -> ::std::boxed::Box<dyn crate::StateAtPoints<T, 3> + '_> {
-        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 12, 3, 8>::new(*self, X))
+        ::std::boxed::Box::new(crate::StagedStates::<Self, T, 10, 3, 6>::new(*self, X))
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::BodyForceStages<T, 3, 14, 8> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::BodyForceStages<T, 3, 12, 6> for AxisAligned3d<T> {
     #[inline]
-    fn body_force_time(&self, t: T) -> [T; 14] {
+    fn body_force_time(&self, t: T) -> [T; 12] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1256,107 +1080,83 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 14, 8> for AxisAligned3d<T> {
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t83 = self.fixed[3] * t18;
-        let t154 = self.fixed[7] * t8;
-        let t216 = self.fixed[18] * t8;
-        let t221 = self.fixed[19] * t14;
-        let t222 = self.fixed[19] * t18;
-        let t361 = self.fixed[21] * t8;
-        let t368 = self.fixed[22] * t8;
-        let t385 = self.fixed[24] * t14;
-        let t391 = self.fixed[25] * t14;
-        let t399 = self.fixed[24] * t18;
-        let t403 = self.fixed[25] * t18;
-        [t23, t26, t30, t83, t154, t216, t221, t222, t361, t368, t385, t391, t399, t403]
+        let t138 = self.fixed[14] * t8;
+        let t141 = self.fixed[7] * t8;
+        let t159 = self.fixed[18] * t14;
+        let t169 = self.fixed[18] * t18;
+        let t294 = self.fixed[20] * t8;
+        let t313 = self.fixed[22] * t14;
+        let t319 = self.fixed[23] * t14;
+        let t327 = self.fixed[22] * t18;
+        let t331 = self.fixed[23] * t18;
+        [t23, t26, t30, t138, t141, t159, t169, t294, t313, t319, t327, t331]
     }
     #[inline]
-    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
+    fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
         let t22 = X[0].cos_pi();
         let t25 = X[1].cos_pi();
         let t29 = X[2].cos_pi();
         let t39 = X[0].sin_pi();
         let t42 = X[1].sin_pi();
         let t46 = X[2].sin_pi();
-        let t99 = T::nearest(0.5) * X[0];
-        let t100 = t99.sin_pi();
-        let t101 = T::nearest(0.5) * X[1];
-        let t102 = t101.cos_pi();
-        let t103 = t99.cos_pi();
-        let t104 = t101.sin_pi();
-        let t105 = t100 * t102;
-        let t106 = t103 * t104;
-        let t107 = t105 - t106;
-        let t108 = t105 + t106;
-        let t109 = T::nearest(0.5) * X[2];
-        let t110 = t109.sin_pi();
-        let t111 = t109.cos_pi();
-        let t112 = t102 * t110;
-        let t113 = t104 * t111;
-        let t114 = t112 - t113;
-        let t115 = t112 + t113;
-        let t117 = t107 * t108;
-        let t119 = t114 * t115;
-        [t22, t25, t29, t39, t42, t46, t117, t119]
+        [t22, t25, t29, t39, t42, t46]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
         &self,
-        time: &[T; 14],
-        point: &[T; 8],
+        time: &[T; 12],
+        point: &[T; 6],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t24 = time[0] * point[0];
         let t27 = time[1] * point[1];
         let t31 = time[2] * point[2];
         let t34 = t24 + T::one();
-        let t155 = time[4] * point[3];
-        let t217 = time[5] * point[3];
-        let t351 = T::one() - t27;
-        let t352 = T::one() - t31;
-        let t353 = t34 * t351;
-        let t354 = t352 * t353;
-        let t355 = T::one() / t354;
-        let t356 = t352 * t355;
-        let t357 = t351 * t356;
-        let t358 = t357 * t155;
-        let t359 = t155 + t358;
-        let t362 = time[8] * point[0];
-        let t363 = t362 * t359;
-        let t364 = t27 * t352;
-        let t365 = t364 + t31;
-        let t366 = t24 * t365;
-        let t369 = time[9] * point[6];
-        let t370 = time[3] * point[7];
-        let t371 = t369 - t370;
-        let t372 = t366 + t371;
-        let t373 = t27 * t31;
-        let t374 = t373 - t372;
-        let t375 = t374.ln_of_both_if::<NEAR>(t354);
-        let t377 = self.fixed[23] * t375;
-        let t378 = t377 * t358;
-        let t379 = t363 + t378;
-        let t380 = t357 * t379;
-        let t381 = t217 - t380;
-        let t382 = t34 * t356;
-        let t386 = time[10] * t382;
-        let t387 = t386 * t375;
-        let t388 = t382 + T::one();
-        let t392 = time[11] * t27;
-        let t393 = t392 * t388;
-        let t394 = t387 - t393;
-        let t395 = t382 * t394;
-        let t396 = t395 - time[6];
-        let t397 = point[4] * t396;
-        let t398 = t353 * t355;
-        let t400 = time[12] * t398;
-        let t401 = t400 * t375;
-        let t402 = t398 + T::one();
-        let t404 = time[13] * t31;
-        let t405 = t404 * t402;
-        let t406 = t401 - t405;
-        let t407 = t398 * t406;
-        let t408 = t407 - time[7];
-        let t409 = point[5] * t408;
-        crate::nalgebra::SVector::<T, 3>::new(t381, t397, t409)
+        let t139 = time[3] * point[3];
+        let t142 = time[4] * point[3];
+        let t284 = T::one() - t27;
+        let t285 = T::one() - t31;
+        let t286 = t34 * t284;
+        let t287 = t285 * t286;
+        let t288 = T::one() / t287;
+        let t289 = t285 * t288;
+        let t290 = t284 * t289;
+        let t291 = t290 * t142;
+        let t292 = t142 + t291;
+        let t295 = time[7] * point[0];
+        let t296 = t295 * t292;
+        let t297 = t27 * t285;
+        let t298 = t297 + t31;
+        let t299 = T::one() - t298;
+        let t300 = t24 * t299;
+        let t301 = t300 - t297;
+        let t302 = t301 - t31;
+        let t303 = t302.ln_of_both_if::<NEAR>(t287);
+        let t305 = self.fixed[21] * t303;
+        let t306 = t305 * t291;
+        let t307 = t296 + t306;
+        let t308 = t290 * t307;
+        let t309 = t139 - t308;
+        let t310 = t34 * t289;
+        let t314 = time[8] * t310;
+        let t315 = t314 * t303;
+        let t316 = t310 + T::one();
+        let t320 = time[9] * t27;
+        let t321 = t320 * t316;
+        let t322 = t315 - t321;
+        let t323 = t310 * t322;
+        let t324 = t323 - time[5];
+        let t325 = point[4] * t324;
+        let t326 = t286 * t288;
+        let t328 = time[10] * t326;
+        let t329 = t328 * t303;
+        let t330 = t326 + T::one();
+        let t332 = time[11] * t31;
+        let t333 = t332 * t330;
+        let t334 = t329 - t333;
+        let t335 = t326 * t334;
+        let t336 = t335 - time[6];
+        let t337 = point[5] * t336;
+        crate::nalgebra::SVector::<T, 3>::new(t309, t325, t337)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1372,19 +1172,19 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 13, 2, 5> for AxisAligned3d
         let t23 = self.fixed[3] * t8;
         let t26 = self.fixed[4] * t14;
         let t30 = self.fixed[4] * t18;
-        let t154 = self.fixed[7] * t8;
-        let t216 = self.fixed[18] * t8;
-        let t221 = self.fixed[19] * t14;
-        let t222 = self.fixed[19] * t18;
-        let t361 = self.fixed[21] * t8;
-        let t385 = self.fixed[24] * t14;
-        let t391 = self.fixed[25] * t14;
-        let t399 = self.fixed[24] * t18;
-        let t403 = self.fixed[25] * t18;
-        let t426 = t26 * t391;
-        let t436 = t30 * t403;
-        let t443 = self.fixed[23] * t154;
-        [t23, t26, t30, t154, t216, t221, t222, t361, t385, t399, t426, t436, t443]
+        let t138 = self.fixed[14] * t8;
+        let t141 = self.fixed[7] * t8;
+        let t159 = self.fixed[18] * t14;
+        let t169 = self.fixed[18] * t18;
+        let t294 = self.fixed[20] * t8;
+        let t313 = self.fixed[22] * t14;
+        let t319 = self.fixed[23] * t14;
+        let t327 = self.fixed[22] * t18;
+        let t331 = self.fixed[23] * t18;
+        let t354 = t26 * t319;
+        let t364 = t30 * t331;
+        let t371 = self.fixed[21] * t141;
+        [t23, t26, t30, t138, t141, t159, t169, t294, t313, t327, t354, t364, t371]
     }
     #[inline]
     fn lattice_coordinate(
@@ -1417,65 +1217,65 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 13, 2, 5> for AxisAligned3d
             0 => {
                 let t24 = time[0] * point[0];
                 let t34 = t24 + T::one();
-                let t362 = time[7] * point[0];
-                let t410 = T::one() / t34;
-                let t411 = T::one() + t410;
-                let t412 = t24.ln_of_both(t34);
-                let t415 = t362 * t411;
-                let t416 = self.fixed[23] * t412;
-                let t417 = t416 / t34;
-                let t418 = t415 + t417;
-                let t419 = time[3] * t418;
-                let t420 = t419 / t34;
-                let t421 = time[4] - t420;
-                let t442 = point[1] * t421;
-                let t444 = time[12] * point[1];
-                let t445 = t34 * t34;
-                let t446 = t444 / t445;
-                let t451 = time[8] * t412;
-                let t461 = time[9] * t412;
-                [t442, t446, t451, t461, T::zero()]
+                let t295 = time[7] * point[0];
+                let t338 = T::one() / t34;
+                let t339 = T::one() + t338;
+                let t340 = t24.ln_of_both(t34);
+                let t343 = t295 * t339;
+                let t344 = self.fixed[21] * t340;
+                let t345 = t344 / t34;
+                let t346 = t343 + t345;
+                let t347 = time[4] * t346;
+                let t348 = t347 / t34;
+                let t349 = time[3] - t348;
+                let t370 = point[1] * t349;
+                let t372 = time[12] * point[1];
+                let t373 = t34 * t34;
+                let t374 = t372 / t373;
+                let t379 = time[8] * t340;
+                let t389 = time[9] * t340;
+                [t370, t374, t379, t389, T::zero()]
             }
             1 => {
                 let t27 = time[1] * point[0];
                 let t28 = -t27;
-                let t351 = T::one() - t27;
-                let t413 = t28.ln_of_both(t351);
-                let t422 = T::one() / t351;
-                let t423 = t422 + T::one();
-                let t424 = time[8] * t413;
-                let t425 = t424 / t351;
-                let t427 = time[10] * point[0];
-                let t428 = t427 * t423;
-                let t429 = t425 - t428;
-                let t430 = t429 / t351;
-                let t431 = t430 - time[5];
-                let t452 = t351 * t351;
-                let t453 = point[1] / t452;
-                let t455 = time[8] * point[1];
-                let t456 = t455 / t452;
-                let t458 = point[1] * t431;
-                let t465 = time[9] * t413;
-                [t413, t453, t456, t458, t465]
+                let t284 = T::one() - t27;
+                let t341 = t28.ln_of_both(t284);
+                let t350 = T::one() / t284;
+                let t351 = t350 + T::one();
+                let t352 = time[8] * t341;
+                let t353 = t352 / t284;
+                let t355 = time[10] * point[0];
+                let t356 = t355 * t351;
+                let t357 = t353 - t356;
+                let t358 = t357 / t284;
+                let t359 = t358 - time[5];
+                let t380 = t284 * t284;
+                let t381 = point[1] / t380;
+                let t383 = time[8] * point[1];
+                let t384 = t383 / t380;
+                let t386 = point[1] * t359;
+                let t393 = time[9] * t341;
+                [t341, t381, t384, t386, t393]
             }
             2 => {
                 let t31 = time[2] * point[0];
                 let t32 = -t31;
-                let t352 = T::one() - t31;
-                let t414 = t32.ln_of_both(t352);
-                let t432 = T::one() / t352;
-                let t433 = t432 + T::one();
-                let t434 = time[9] * t414;
-                let t435 = t434 / t352;
-                let t437 = time[11] * point[0];
-                let t438 = t437 * t433;
-                let t439 = t435 - t438;
-                let t440 = t439 / t352;
-                let t441 = t440 - time[6];
-                let t462 = t352 * t352;
-                let t463 = point[1] / t462;
-                let t467 = point[1] * t441;
-                [t414, t463, t467, T::zero(), T::zero()]
+                let t285 = T::one() - t31;
+                let t342 = t32.ln_of_both(t285);
+                let t360 = T::one() / t285;
+                let t361 = t360 + T::one();
+                let t362 = time[9] * t342;
+                let t363 = t362 / t285;
+                let t365 = time[11] * point[0];
+                let t366 = t365 * t361;
+                let t367 = t363 - t366;
+                let t368 = t367 / t285;
+                let t369 = t368 - time[6];
+                let t390 = t285 * t285;
+                let t391 = point[1] / t390;
+                let t395 = point[1] * t369;
+                [t342, t391, t395, T::zero(), T::zero()]
             }
             _ => [T::zero(); 5],
         }
@@ -1486,25 +1286,25 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 13, 2, 5> for AxisAligned3d
         time: &[T; 13],
         layers: [&[T; 5]; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t447 = layers[0][1] * layers[1][0];
-        let t448 = layers[0][1] * layers[2][0];
-        let t449 = layers[0][0] - t447;
-        let t450 = t449 - t448;
-        let t454 = layers[0][2] * layers[1][1];
-        let t457 = layers[1][2] * layers[2][0];
-        let t459 = t454 + t457;
-        let t460 = t459 + layers[1][3];
-        let t464 = layers[0][3] * layers[2][1];
-        let t466 = layers[1][4] * layers[2][1];
-        let t468 = t464 + t466;
-        let t469 = t468 + layers[2][2];
-        crate::nalgebra::SVector::<T, 3>::new(t450, t460, t469)
+        let t375 = layers[0][1] * layers[1][0];
+        let t376 = layers[0][1] * layers[2][0];
+        let t377 = layers[0][0] - t375;
+        let t378 = t377 - t376;
+        let t382 = layers[0][2] * layers[1][1];
+        let t385 = layers[1][2] * layers[2][0];
+        let t387 = t382 + t385;
+        let t388 = t387 + layers[1][3];
+        let t392 = layers[0][3] * layers[2][1];
+        let t394 = layers[1][4] * layers[2][1];
+        let t396 = t392 + t394;
+        let t397 = t396 + layers[2][2];
+        crate::nalgebra::SVector::<T, 3>::new(t378, t388, t397)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
-impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
+impl<T: crate::Real> crate::StateStages<T, 3, 10, 3, 6> for AxisAligned3d<T> {
     #[inline]
-    fn state_time(&self, t: T) -> [T; 12] {
+    fn state_time(&self, t: T) -> [T; 10] {
         let t7 = self.fixed[0] * t;
         let t8 = t7.sin_pi();
         let t11 = t7.cos_pi();
@@ -1519,9 +1319,8 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
         let t47 = self.fixed[2] * t18;
         let t78 = self.fixed[3] * t14;
         let t83 = self.fixed[3] * t18;
-        let t116 = T::nearest(2.0) * t8;
-        let t133 = self.fixed[12] * t8;
-        [t8, t18, t23, t26, t30, t40, t43, t47, t78, t83, t116, t133]
+        let t109 = self.fixed[12] * t8;
+        [t8, t23, t26, t30, t40, t43, t47, t78, t83, t109]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 3] {
@@ -1537,40 +1336,21 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
         [t51, t56, t60]
     }
     #[inline]
-    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 8] {
+    fn state_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
         let t22 = X[0].cos_pi();
         let t25 = X[1].cos_pi();
         let t29 = X[2].cos_pi();
         let t39 = X[0].sin_pi();
         let t42 = X[1].sin_pi();
         let t46 = X[2].sin_pi();
-        let t99 = T::nearest(0.5) * X[0];
-        let t100 = t99.sin_pi();
-        let t101 = T::nearest(0.5) * X[1];
-        let t102 = t101.cos_pi();
-        let t103 = t99.cos_pi();
-        let t104 = t101.sin_pi();
-        let t105 = t100 * t102;
-        let t106 = t103 * t104;
-        let t107 = t105 - t106;
-        let t108 = t105 + t106;
-        let t109 = T::nearest(0.5) * X[2];
-        let t110 = t109.sin_pi();
-        let t111 = t109.cos_pi();
-        let t112 = t102 * t110;
-        let t113 = t104 * t111;
-        let t114 = t112 - t113;
-        let t115 = t112 + t113;
-        let t117 = t107 * t108;
-        let t119 = t114 * t115;
-        [t22, t25, t29, t39, t42, t46, t117, t119]
+        [t22, t25, t29, t39, t42, t46]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
         &self,
-        time: &[T; 12],
+        time: &[T; 10],
         velocity_time: &[T; 3],
-        point: &[T; 8],
+        point: &[T; 6],
     ) -> crate::State<T, 3> {
         let v = {
             let time = velocity_time;
@@ -1581,25 +1361,25 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
             let t62 = -t61;
             crate::nalgebra::SVector::<T, 3>::new(t52, t58, t62)
         };
-        let t24 = time[2] * point[0];
-        let t27 = time[3] * point[1];
+        let t24 = time[1] * point[0];
+        let t27 = time[2] * point[1];
         let t28 = -t27;
-        let t31 = time[4] * point[2];
+        let t31 = time[3] * point[2];
         let t32 = -t31;
         let t34 = t24 + T::one();
         let t35 = t28 + T::one();
         let t36 = t32 + T::one();
         let t37 = t34 * t35;
         let t38 = t37 * t36;
-        let t41 = time[5] * point[3];
-        let t44 = time[6] * point[4];
+        let t41 = time[4] * point[3];
+        let t44 = time[5] * point[4];
         let t45 = -t44;
-        let t48 = time[7] * point[5];
+        let t48 = time[6] * point[5];
         let t49 = -t48;
-        let t79 = time[8] * point[1];
+        let t79 = time[7] * point[1];
         let t81 = T::nearest(2.0) - t79;
         let t82 = T::nearest(0.5) * t81;
-        let t84 = time[9] * point[2];
+        let t84 = time[8] * point[2];
         let t85 = T::nearest(2.0) - t84;
         let t86 = T::nearest(0.5) * t85;
         let t91 = T::one() / t38;
@@ -1608,36 +1388,32 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
         let t94 = t35 * t92;
         let t95 = t34 * t92;
         let t96 = t94 + T::one();
-        let t118 = time[10] * point[6];
-        let t120 = time[1] * point[7];
-        let t121 = t118 - t120;
-        let t122 = self.fixed[3] * t121;
-        let t123 = t28 * t36;
-        let t124 = t123 - t31;
-        let t125 = time[0] * point[0];
-        let t126 = t125 * t124;
-        let t127 = self.fixed[3] * t126;
-        let t128 = t28 * t32;
-        let t129 = t127 - t122;
-        let t130 = t129 + t128;
-        let t131 = t130.ln_of_both_if::<NEAR>(t38);
-        let t134 = time[11] * point[0];
-        let t135 = t134 * t96;
-        let t139 = t131 * t94;
-        let t140 = self.fixed[13] * t139;
-        let t141 = t135 + t140;
-        let t142 = t95 + T::one();
-        let t143 = t28 * t142;
-        let t144 = self.fixed[11] * t143;
-        let t145 = t131 * t95;
-        let t146 = self.fixed[13] * t145;
-        let t147 = t144 + t146;
-        let t148 = t93 + T::one();
-        let t149 = t32 * t148;
-        let t150 = self.fixed[11] * t149;
-        let t151 = t131 * t93;
-        let t152 = self.fixed[13] * t151;
-        let t153 = t150 + t152;
+        let t99 = t28 * t36;
+        let t100 = t99 - t31;
+        let t101 = t100 + T::one();
+        let t102 = time[0] * point[0];
+        let t103 = t102 * t101;
+        let t104 = self.fixed[3] * t103;
+        let t105 = t104 + t99;
+        let t106 = t105 - t31;
+        let t107 = t106.ln_of_both_if::<NEAR>(t38);
+        let t110 = time[9] * point[0];
+        let t111 = t110 * t96;
+        let t115 = t107 * t94;
+        let t116 = self.fixed[13] * t115;
+        let t117 = t111 + t116;
+        let t118 = t95 + T::one();
+        let t119 = t28 * t118;
+        let t120 = self.fixed[11] * t119;
+        let t121 = t107 * t95;
+        let t122 = self.fixed[13] * t121;
+        let t123 = t120 + t122;
+        let t124 = t93 + T::one();
+        let t125 = t32 * t124;
+        let t126 = self.fixed[11] * t125;
+        let t127 = t107 * t93;
+        let t128 = self.fixed[13] * t127;
+        let t129 = t126 + t128;
         crate::State {
             u: crate::nalgebra::SVector::<T, 3>::new(t41, t45, t49),
             v,
@@ -1661,15 +1437,15 @@ impl<T: crate::Real> crate::StateStages<T, 3, 12, 3, 8> for AxisAligned3d<T> {
                 3,
                 3,
             >::new(
-                t141,
+                t117,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t147,
+                t123,
                 T::zero(),
                 T::zero(),
                 T::zero(),
-                t153,
+                t129,
             ),
         }
     }

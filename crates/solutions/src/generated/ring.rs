@@ -41,7 +41,7 @@ impl<T: crate::Real> Default for RingParameters<T> {
 pub struct Ring<T: crate::Real> {
     parameters: RingParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 14],
+    fixed: [T; 13],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Ring<T> {
@@ -143,9 +143,9 @@ impl<T: crate::Real> Ring<T> {
         let t89 = t88 / t26;
         let t97 = T::nearest(0.5) * parameters.E;
         let t120 = parameters.Ri + parameters.Ro;
-        let t138 = t97 / parameters.rho0;
-        let t161 = T::nearest(2.0) / t11;
-        let t163 = parameters.A * t97;
+        let t135 = t97 / parameters.rho0;
+        let t143 = T::nearest(2.0) / t11;
+        let t145 = parameters.A * t97;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -154,22 +154,7 @@ impl<T: crate::Real> Ring<T> {
         }
         Ok(Ring {
             parameters,
-            fixed: [
-                t11,
-                t18,
-                t24,
-                t28,
-                t44,
-                t53,
-                t61,
-                t88,
-                t89,
-                t97,
-                t120,
-                t138,
-                t161,
-                t163,
-            ],
+            fixed: [t11, t18, t24, t28, t44, t53, t61, t89, t97, t120, t135, t143, t145],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -420,7 +405,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t59 = t5 - self.parameters.Ri;
         let t70 = t20 * t59;
         let t72 = t31 * t35;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
@@ -458,7 +443,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t74 = X[0] * X[1];
         let t81 = t31 * t2;
         let t82 = t81 * t35;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
@@ -472,12 +457,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t104 = t32 * t66;
         let t105 = t104 * t101;
         let t106 = t103 + t105;
-        let t107 = self.fixed[9] * t34;
+        let t107 = self.fixed[8] * t34;
         let t108 = t107 * t106;
         let t109 = t93 * t101;
         let t110 = t102 - t109;
         let t111 = t74 * t34;
-        let t112 = self.fixed[9] * t111;
+        let t112 = self.fixed[8] * t111;
         let t113 = t112 * t110;
         let t114 = t3 * t102;
         let t115 = t32 * t82;
@@ -514,35 +499,36 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t71 = self.fixed[6] * t70;
         let t72 = t31 * t35;
         let t73 = t71 - t72;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
+        let t91 = t90 * t70;
+        let t92 = t91 + T::one();
         let t93 = t32 * t72;
         let t94 = t93 + T::one();
+        let t98 = T::one() / t92;
         let t100 = T::one() / t94;
         let t119 = t54 * t31;
-        let t121 = t23 - self.fixed[10];
+        let t121 = t23 - self.fixed[9];
         let t122 = t90 * t121;
-        let t123 = self.fixed[3] * t70;
-        let t124 = self.fixed[7] * t13;
-        let t125 = t124 * t123;
-        let t126 = t125 + T::one();
-        let t127 = T::one() / t126;
-        let t128 = t122 * t127;
-        let t129 = t73 * t35;
-        let t130 = t32 * t129;
-        let t131 = t130 * t100;
-        let t132 = t128 + t131;
-        let t133 = t93 - t125;
-        let t134 = t35 * t133;
-        let t135 = t132 * t127;
-        let t136 = t122 - t134;
-        let t137 = t136 + t135;
-        let t139 = self.fixed[11] * t137;
-        let t140 = t119 + t139;
-        let t141 = -t140;
-        let t142 = t35 * t141;
-        let t143 = X[0] * t142;
-        let t144 = X[1] * t142;
-        crate::nalgebra::SVector::<T, 2>::new(t143, t144)
+        let t123 = t122 * t98;
+        let t124 = t73 * t35;
+        let t125 = t32 * t124;
+        let t126 = t125 * t100;
+        let t127 = t123 + t126;
+        let t128 = t31 * t34;
+        let t129 = t32 * t128;
+        let t130 = t35 * t91;
+        let t131 = t127 * t98;
+        let t132 = t122 - t129;
+        let t133 = t132 + t130;
+        let t134 = t133 + t131;
+        let t136 = self.fixed[10] * t134;
+        let t137 = t119 + t136;
+        let t138 = -t137;
+        let t139 = X[0] * t35;
+        let t140 = t139 * t138;
+        let t141 = X[1] * t35;
+        let t142 = t141 * t138;
+        crate::nalgebra::SVector::<T, 2>::new(t140, t142)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -605,7 +591,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t85 = t32 * t84;
         let t86 = t69 + T::one();
         let t87 = t85 + T::one();
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
         let t91 = t90 * t70;
         let t92 = t91 + T::one();
         let t93 = t32 * t72;
@@ -620,12 +606,12 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t104 = t32 * t66;
         let t105 = t104 * t101;
         let t106 = t103 + t105;
-        let t107 = self.fixed[9] * t34;
+        let t107 = self.fixed[8] * t34;
         let t108 = t107 * t106;
         let t109 = t93 * t101;
         let t110 = t102 - t109;
         let t111 = t74 * t34;
-        let t112 = self.fixed[9] * t111;
+        let t112 = self.fixed[8] * t111;
         let t113 = t112 * t110;
         let t114 = t3 * t102;
         let t115 = t32 * t82;
@@ -633,29 +619,27 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         let t117 = t114 + t116;
         let t118 = t107 * t117;
         let t119 = t54 * t31;
-        let t121 = t23 - self.fixed[10];
+        let t121 = t23 - self.fixed[9];
         let t122 = t90 * t121;
-        let t123 = self.fixed[3] * t70;
-        let t124 = self.fixed[7] * t13;
-        let t125 = t124 * t123;
-        let t126 = t125 + T::one();
-        let t127 = T::one() / t126;
-        let t128 = t122 * t127;
-        let t129 = t73 * t35;
-        let t130 = t32 * t129;
-        let t131 = t130 * t100;
-        let t132 = t128 + t131;
-        let t133 = t93 - t125;
-        let t134 = t35 * t133;
-        let t135 = t132 * t127;
-        let t136 = t122 - t134;
-        let t137 = t136 + t135;
-        let t139 = self.fixed[11] * t137;
-        let t140 = t119 + t139;
-        let t141 = -t140;
-        let t142 = t35 * t141;
-        let t143 = X[0] * t142;
-        let t144 = X[1] * t142;
+        let t123 = t122 * t98;
+        let t124 = t73 * t35;
+        let t125 = t32 * t124;
+        let t126 = t125 * t100;
+        let t127 = t123 + t126;
+        let t128 = t31 * t34;
+        let t129 = t32 * t128;
+        let t130 = t35 * t91;
+        let t131 = t127 * t98;
+        let t132 = t122 - t129;
+        let t133 = t132 + t130;
+        let t134 = t133 + t131;
+        let t136 = self.fixed[10] * t134;
+        let t137 = t119 + t136;
+        let t138 = -t137;
+        let t139 = X[0] * t35;
+        let t140 = t139 * t138;
+        let t141 = X[1] * t35;
+        let t142 = t141 * t138;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t37, t40),
             v: crate::nalgebra::SVector::<T, 2>::new(t47, t49),
@@ -664,7 +648,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t86, t77, t77, t87),
             J: t95,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t108, t113, t113, t118),
-            b: crate::nalgebra::SVector::<T, 2>::new(t143, t144),
+            b: crate::nalgebra::SVector::<T, 2>::new(t140, t142),
         }
     }
     fn traction(
@@ -703,13 +687,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t94 = t93 + T::one();
                 let t100 = T::one() / t94;
                 let t101 = t100 + T::one();
-                let t164 = self.fixed[13] * t13;
-                let t165 = t34 * t35;
-                let t166 = t65 * t165;
-                let t167 = t164 * t166;
-                let t168 = t167 * t101;
-                let t169 = -t168;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t169, T::zero()))
+                let t146 = self.fixed[12] * t13;
+                let t147 = t34 * t35;
+                let t148 = t65 * t147;
+                let t149 = t146 * t148;
+                let t150 = t149 * t101;
+                let t151 = -t150;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t151, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -734,13 +718,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
                 let t94 = t93 + T::one();
                 let t100 = T::one() / t94;
                 let t101 = t100 + T::one();
-                let t164 = self.fixed[13] * t13;
-                let t165 = t34 * t35;
-                let t170 = t81 * t165;
-                let t171 = t164 * t170;
-                let t172 = t171 * t101;
-                let t173 = -t172;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t173))
+                let t146 = self.fixed[12] * t13;
+                let t147 = t34 * t35;
+                let t152 = t81 * t147;
+                let t153 = t146 * t152;
+                let t154 = t153 * t101;
+                let t155 = -t154;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t155))
             }
             _ => None,
         }
@@ -777,7 +761,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
             lambda: T::zero(),
-            mu: self.fixed[9],
+            mu: self.fixed[8],
         })
     }
     fn density(&self) -> T {
@@ -787,7 +771,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Ring<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[12]
+        self.fixed[11]
     }
     fn body_force_on(
         &self,
@@ -811,7 +795,7 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for Ring<T> {
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
         let t54 = self.fixed[5] * t13;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
         [t32, t54, t90]
     }
     #[inline]
@@ -849,28 +833,28 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for Ring<T> {
         let t98 = T::one() / t92;
         let t100 = T::one() / t94;
         let t119 = time[1] * t31;
-        let t121 = t23 - self.fixed[10];
+        let t121 = t23 - self.fixed[9];
         let t122 = time[2] * t121;
-        let t129 = t73 * t35;
-        let t130 = time[0] * t129;
-        let t131 = t130 * t100;
-        let t145 = t122 * t98;
-        let t146 = t145 + t131;
-        let t147 = t31 * point[3];
-        let t148 = time[0] * t147;
-        let t149 = t35 * t91;
-        let t150 = t146 * t98;
-        let t151 = t122 - t148;
-        let t152 = t151 + t149;
-        let t153 = t152 + t150;
-        let t154 = self.fixed[11] * t153;
-        let t155 = t119 + t154;
-        let t156 = -t155;
-        let t157 = point[0] * t35;
-        let t158 = t157 * t156;
-        let t159 = point[1] * t35;
-        let t160 = t159 * t156;
-        crate::nalgebra::SVector::<T, 2>::new(t158, t160)
+        let t123 = t122 * t98;
+        let t124 = t73 * t35;
+        let t125 = time[0] * t124;
+        let t126 = t125 * t100;
+        let t127 = t123 + t126;
+        let t128 = t31 * point[3];
+        let t129 = time[0] * t128;
+        let t130 = t35 * t91;
+        let t131 = t127 * t98;
+        let t132 = t122 - t129;
+        let t133 = t132 + t130;
+        let t134 = t133 + t131;
+        let t136 = self.fixed[10] * t134;
+        let t137 = t119 + t136;
+        let t138 = -t137;
+        let t139 = point[0] * t35;
+        let t140 = t139 * t138;
+        let t141 = point[1] * t35;
+        let t142 = t141 * t138;
+        crate::nalgebra::SVector::<T, 2>::new(t140, t142)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -880,7 +864,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t90 = self.fixed[8] * t13;
+        let t90 = self.fixed[7] * t13;
         [t32, t90]
     }
     #[inline]
@@ -931,9 +915,9 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 13> for Ring<T> {
         let t82 = t81 * t35;
         let t83 = t80 + t82;
         let t84 = t83 * t34;
-        let t107 = self.fixed[9] * t34;
+        let t107 = self.fixed[8] * t34;
         let t111 = t74 * t34;
-        let t112 = self.fixed[9] * t111;
+        let t112 = self.fixed[8] * t111;
         [t2, t3, t36, t39, t66, t68, t70, t72, t76, t82, t84, t107, t112]
     }
     #[inline(always)]

@@ -44,7 +44,7 @@ impl<T: crate::Real> Default for RingNuParameters<T> {
 pub struct RingNu<T: crate::Real> {
     parameters: RingNuParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 22],
+    fixed: [T; 21],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> RingNu<T> {
@@ -165,26 +165,26 @@ impl<T: crate::Real> RingNu<T> {
         let t113 = t97 * t99;
         let t114 = t112 / t113;
         let t144 = parameters.Ri + parameters.Ro;
-        let t154 = t114 + t107;
-        let t171 = T::one() / parameters.rho0;
-        let t179 = T::nearest(2.0) / t11;
-        let t180 = parameters.Ri - parameters.Ro;
-        let t181 = t180 * t180;
-        let t182 = t181 * t180;
-        let t183 = t182 / t26;
-        let t184 = T::one() - t183;
-        let t185 = parameters.A * t184;
-        let t186 = t185 / parameters.Ri;
-        let t190 = parameters.Ri * t97;
-        let t191 = t190 * t99;
-        let t192 = t112 / t191;
-        let t198 = parameters.A / parameters.Ro;
-        let t202 = parameters.Ro * t97;
-        let t203 = t202 * t99;
-        let t204 = t112 / t203;
-        let t228 = t107 * t171;
-        let t239 = t114 * t171;
-        let t241 = t154 * t171;
+        let t152 = t114 + t107;
+        let t164 = T::one() / parameters.rho0;
+        let t172 = T::nearest(2.0) / t11;
+        let t173 = parameters.Ri - parameters.Ro;
+        let t174 = t173 * t173;
+        let t175 = t174 * t173;
+        let t176 = t175 / t26;
+        let t177 = T::one() - t176;
+        let t178 = parameters.A * t177;
+        let t179 = t178 / parameters.Ri;
+        let t183 = parameters.Ri * t97;
+        let t184 = t183 * t99;
+        let t185 = t112 / t184;
+        let t191 = parameters.A / parameters.Ro;
+        let t195 = parameters.Ro * t97;
+        let t196 = t195 * t99;
+        let t197 = t112 / t196;
+        let t221 = t107 * t164;
+        let t232 = t114 * t164;
+        let t234 = t152 * t164;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -198,7 +198,6 @@ impl<T: crate::Real> RingNu<T> {
                 t18,
                 t24,
                 t28,
-                t39,
                 t40,
                 t56,
                 t65,
@@ -206,16 +205,16 @@ impl<T: crate::Real> RingNu<T> {
                 t107,
                 t114,
                 t144,
-                t154,
-                t171,
+                t152,
+                t164,
+                t172,
                 t179,
-                t186,
-                t192,
-                t198,
-                t204,
-                t228,
-                t239,
-                t241,
+                t185,
+                t191,
+                t197,
+                t221,
+                t232,
+                t234,
             ],
         })
     }
@@ -310,7 +309,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t50 = t31 * X[1];
         let t51 = t50 * t34;
         let t54 = t12.sin_pi();
-        let t57 = self.fixed[6] * t54;
+        let t57 = self.fixed[5] * t54;
         let t58 = t57 * t48;
         let t59 = -t58;
         let t60 = t57 * t51;
@@ -342,7 +341,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t48 = t47 * t34;
         let t50 = t31 * X[1];
         let t51 = t50 * t34;
-        let t66 = self.fixed[7] * t13;
+        let t66 = self.fixed[6] * t13;
         let t67 = t66 * t48;
         let t68 = -t67;
         let t69 = t66 * t51;
@@ -376,13 +375,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t38 = t31 * t34;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[8] * t73;
+        let t74 = self.fixed[7] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[8] * t37;
+        let t80 = self.fixed[7] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -390,7 +389,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[8] * t87;
+        let t88 = self.fixed[7] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -425,13 +424,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t38 = t31 * t34;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[8] * t73;
+        let t74 = self.fixed[7] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[8] * t37;
+        let t80 = self.fixed[7] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -439,7 +438,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[8] * t87;
+        let t88 = self.fixed[7] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -470,7 +469,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t35 = t5 - self.parameters.Ri;
         let t37 = t20 * t35;
         let t38 = t31 * t34;
-        let t41 = self.fixed[5] * t13;
+        let t41 = self.fixed[4] * t13;
         let t42 = t41 * t37;
         let t43 = t42 + T::one();
         let t44 = t32 * t38;
@@ -503,7 +502,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t35 = t5 - self.parameters.Ri;
         let t37 = t20 * t35;
         let t38 = t31 * t34;
-        let t41 = self.fixed[5] * t13;
+        let t41 = self.fixed[4] * t13;
         let t42 = t41 * t37;
         let t43 = t42 + T::one();
         let t44 = t32 * t38;
@@ -524,20 +523,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[10] * t115;
-        let t117 = self.fixed[9] * t111;
+        let t116 = self.fixed[9] * t115;
+        let t117 = self.fixed[8] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[10] * t120;
-        let t122 = self.fixed[9] * t119;
+        let t121 = self.fixed[9] * t120;
+        let t122 = self.fixed[8] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = t32 * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[10] * t104;
+        let t129 = self.fixed[9] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;
@@ -578,50 +577,51 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t35 = t5 - self.parameters.Ri;
         let t37 = t20 * t35;
         let t38 = t31 * t34;
-        let t41 = self.fixed[5] * t13;
+        let t41 = self.fixed[4] * t13;
         let t42 = t41 * t37;
         let t43 = t42 + T::one();
         let t44 = t32 * t38;
         let t45 = t44 + T::one();
         let t46 = t43 * t45;
-        let t66 = self.fixed[7] * t13;
-        let t80 = self.fixed[8] * t37;
+        let t66 = self.fixed[6] * t13;
+        let t80 = self.fixed[7] * t37;
         let t81 = t80 - t38;
+        let t100 = t13 * t38;
+        let t101 = t100 * t43;
+        let t102 = self.parameters.A * t101;
+        let t103 = t102 + t42;
+        let t104 = t103.ln_of_both(t46);
         let t108 = T::one() / t46;
+        let t109 = t45 * t108;
         let t110 = t43 * t108;
+        let t129 = self.fixed[9] * t104;
         let t143 = t66 * t31;
-        let t145 = t23 - self.fixed[11];
+        let t145 = t23 - self.fixed[10];
         let t146 = t41 * t145;
-        let t147 = self.fixed[3] * t37;
-        let t148 = self.fixed[4] * t13;
-        let t149 = t148 * t147;
-        let t150 = t44 - t149;
-        let t151 = t34 * t150;
-        let t152 = t146 - t151;
-        let t153 = t149 + T::one();
-        let t155 = t149 * t45;
-        let t156 = t155 + t44;
-        let t157 = t153 * t45;
-        let t158 = t156.ln_of_both(t157);
-        let t159 = self.fixed[10] * t158;
-        let t160 = self.fixed[12] - t159;
-        let t161 = T::one() / t153;
-        let t162 = t146 * t161;
-        let t163 = t81 * t34;
-        let t164 = t32 * t163;
-        let t165 = t164 * t110;
-        let t166 = t162 + t165;
-        let t167 = self.fixed[9] * t152;
-        let t168 = t160 * t166;
-        let t169 = t168 * t161;
-        let t170 = t167 + t169;
-        let t172 = self.fixed[13] * t170;
-        let t173 = t143 + t172;
-        let t174 = -t173;
-        let t175 = t34 * t174;
-        let t176 = X[0] * t175;
-        let t177 = X[1] * t175;
-        crate::nalgebra::SVector::<T, 2>::new(t176, t177)
+        let t147 = t31 * t33;
+        let t148 = t32 * t147;
+        let t149 = t34 * t42;
+        let t150 = t146 - t148;
+        let t151 = t150 + t149;
+        let t153 = t129 - self.fixed[11];
+        let t154 = -t153;
+        let t155 = t146 * t109;
+        let t156 = t81 * t34;
+        let t157 = t32 * t156;
+        let t158 = t157 * t110;
+        let t159 = t155 + t158;
+        let t160 = self.fixed[8] * t151;
+        let t161 = t154 * t159;
+        let t162 = t161 * t109;
+        let t163 = t160 + t162;
+        let t165 = self.fixed[12] * t163;
+        let t166 = t143 + t165;
+        let t167 = -t166;
+        let t168 = X[0] * t34;
+        let t169 = t168 * t167;
+        let t170 = X[1] * t34;
+        let t171 = t170 * t167;
+        crate::nalgebra::SVector::<T, 2>::new(t169, t171)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t2 = X[0] * X[0];
@@ -643,7 +643,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t35 = t5 - self.parameters.Ri;
         let t37 = t20 * t35;
         let t38 = t31 * t34;
-        let t41 = self.fixed[5] * t13;
+        let t41 = self.fixed[4] * t13;
         let t42 = t41 * t37;
         let t43 = t42 + T::one();
         let t44 = t32 * t38;
@@ -656,25 +656,25 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t51 = t50 * t34;
         let t52 = t32 * t51;
         let t54 = t12.sin_pi();
-        let t57 = self.fixed[6] * t54;
+        let t57 = self.fixed[5] * t54;
         let t58 = t57 * t48;
         let t59 = -t58;
         let t60 = t57 * t51;
         let t61 = -t60;
-        let t66 = self.fixed[7] * t13;
+        let t66 = self.fixed[6] * t13;
         let t67 = t66 * t48;
         let t68 = -t67;
         let t69 = t66 * t51;
         let t70 = -t69;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[8] * t73;
+        let t74 = self.fixed[7] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = t32 * t78;
-        let t80 = self.fixed[8] * t37;
+        let t80 = self.fixed[7] * t37;
         let t81 = t80 - t38;
         let t82 = X[0] * X[1];
         let t83 = t82 * t81;
@@ -682,7 +682,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t85 = t32 * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[8] * t87;
+        let t88 = self.fixed[7] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -700,20 +700,20 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[10] * t115;
-        let t117 = self.fixed[9] * t111;
+        let t116 = self.fixed[9] * t115;
+        let t117 = self.fixed[8] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[10] * t120;
-        let t122 = self.fixed[9] * t119;
+        let t121 = self.fixed[9] * t120;
+        let t122 = self.fixed[8] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = t32 * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[10] * t104;
+        let t129 = self.fixed[9] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;
@@ -728,37 +728,31 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         let t141 = t33 * t140;
         let t142 = t129 - t141;
         let t143 = t66 * t31;
-        let t145 = t23 - self.fixed[11];
+        let t145 = t23 - self.fixed[10];
         let t146 = t41 * t145;
-        let t147 = self.fixed[3] * t37;
-        let t148 = self.fixed[4] * t13;
-        let t149 = t148 * t147;
-        let t150 = t44 - t149;
-        let t151 = t34 * t150;
-        let t152 = t146 - t151;
-        let t153 = t149 + T::one();
-        let t155 = t149 * t45;
-        let t156 = t155 + t44;
-        let t157 = t153 * t45;
-        let t158 = t156.ln_of_both(t157);
-        let t159 = self.fixed[10] * t158;
-        let t160 = self.fixed[12] - t159;
-        let t161 = T::one() / t153;
-        let t162 = t146 * t161;
-        let t163 = t81 * t34;
-        let t164 = t32 * t163;
-        let t165 = t164 * t110;
-        let t166 = t162 + t165;
-        let t167 = self.fixed[9] * t152;
-        let t168 = t160 * t166;
-        let t169 = t168 * t161;
-        let t170 = t167 + t169;
-        let t172 = self.fixed[13] * t170;
-        let t173 = t143 + t172;
-        let t174 = -t173;
-        let t175 = t34 * t174;
-        let t176 = X[0] * t175;
-        let t177 = X[1] * t175;
+        let t147 = t31 * t33;
+        let t148 = t32 * t147;
+        let t149 = t34 * t42;
+        let t150 = t146 - t148;
+        let t151 = t150 + t149;
+        let t153 = t129 - self.fixed[11];
+        let t154 = -t153;
+        let t155 = t146 * t109;
+        let t156 = t81 * t34;
+        let t157 = t32 * t156;
+        let t158 = t157 * t110;
+        let t159 = t155 + t158;
+        let t160 = self.fixed[8] * t151;
+        let t161 = t154 * t159;
+        let t162 = t161 * t109;
+        let t163 = t160 + t162;
+        let t165 = self.fixed[12] * t163;
+        let t166 = t143 + t165;
+        let t167 = -t166;
+        let t168 = X[0] * t34;
+        let t169 = t168 * t167;
+        let t170 = X[1] * t34;
+        let t171 = t170 * t167;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 2>::new(t49, t52),
             v: crate::nalgebra::SVector::<T, 2>::new(t59, t61),
@@ -767,7 +761,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t94, t85, t85, t95),
             J: t46,
             P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t131, t136, t136, t142),
-            b: crate::nalgebra::SVector::<T, 2>::new(t176, t177),
+            b: crate::nalgebra::SVector::<T, 2>::new(t169, t171),
         }
     }
     fn traction(
@@ -780,26 +774,26 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
             crate::Surface::Inner => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t187 = self.fixed[15] * t13;
-                let t188 = t187 + T::one();
-                let t189 = t187.ln_of_both(t188);
-                let t193 = self.fixed[16] * t189;
-                let t194 = t193 * X[0];
-                let t195 = -t194;
-                let t196 = t193 * X[1];
-                let t197 = -t196;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t195, t197))
+                let t180 = self.fixed[14] * t13;
+                let t181 = t180 + T::one();
+                let t182 = t180.ln_of_both(t181);
+                let t186 = self.fixed[15] * t182;
+                let t187 = t186 * X[0];
+                let t188 = -t187;
+                let t189 = t186 * X[1];
+                let t190 = -t189;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t188, t190))
             }
             crate::Surface::Outer => {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
-                let t199 = self.fixed[17] * t13;
-                let t200 = t199 + T::one();
-                let t201 = t199.ln_of_both(t200);
-                let t205 = self.fixed[18] * t201;
-                let t206 = t205 * X[0];
-                let t207 = t205 * X[1];
-                Some(crate::nalgebra::SVector::<T, 2>::new(t206, t207))
+                let t192 = self.fixed[16] * t13;
+                let t193 = t192 + T::one();
+                let t194 = t192.ln_of_both(t193);
+                let t198 = self.fixed[17] * t194;
+                let t199 = t198 * X[0];
+                let t200 = t198 * X[1];
+                Some(crate::nalgebra::SVector::<T, 2>::new(t199, t200))
             }
             crate::Surface::Lower(0) => {
                 let t2 = X[0] * X[0];
@@ -821,7 +815,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t35 = t5 - self.parameters.Ri;
                 let t37 = t20 * t35;
                 let t38 = t31 * t34;
-                let t41 = self.fixed[5] * t13;
+                let t41 = self.fixed[4] * t13;
                 let t42 = t41 * t37;
                 let t43 = t42 + T::one();
                 let t44 = t32 * t38;
@@ -837,17 +831,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t110 = t43 * t108;
                 let t119 = t110 + T::one();
                 let t120 = t104 * t110;
-                let t121 = self.fixed[10] * t120;
-                let t122 = self.fixed[9] * t119;
+                let t121 = self.fixed[9] * t120;
+                let t122 = self.fixed[8] * t119;
                 let t123 = t121 - t122;
-                let t129 = self.fixed[10] * t104;
-                let t208 = t33 * t34;
-                let t209 = t75 * t208;
-                let t210 = t32 * t209;
-                let t211 = t210 * t123;
-                let t212 = t129 - t211;
-                let t213 = -t212;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t213, T::zero()))
+                let t129 = self.fixed[9] * t104;
+                let t201 = t33 * t34;
+                let t202 = t75 * t201;
+                let t203 = t32 * t202;
+                let t204 = t203 * t123;
+                let t205 = t129 - t204;
+                let t206 = -t205;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t206, T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t2 = X[0] * X[0];
@@ -869,7 +863,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t35 = t5 - self.parameters.Ri;
                 let t37 = t20 * t35;
                 let t38 = t31 * t34;
-                let t41 = self.fixed[5] * t13;
+                let t41 = self.fixed[4] * t13;
                 let t42 = t41 * t37;
                 let t43 = t42 + T::one();
                 let t44 = t32 * t38;
@@ -885,17 +879,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
                 let t110 = t43 * t108;
                 let t119 = t110 + T::one();
                 let t120 = t104 * t110;
-                let t121 = self.fixed[10] * t120;
-                let t122 = self.fixed[9] * t119;
+                let t121 = self.fixed[9] * t120;
+                let t122 = self.fixed[8] * t119;
                 let t123 = t121 - t122;
-                let t129 = self.fixed[10] * t104;
-                let t208 = t33 * t34;
-                let t215 = t89 * t208;
-                let t216 = t32 * t215;
-                let t217 = t216 * t123;
-                let t218 = t129 - t217;
-                let t219 = -t218;
-                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t219))
+                let t129 = self.fixed[9] * t104;
+                let t201 = t33 * t34;
+                let t208 = t89 * t201;
+                let t209 = t32 * t208;
+                let t210 = t209 * t123;
+                let t211 = t129 - t210;
+                let t212 = -t211;
+                Some(crate::nalgebra::SVector::<T, 2>::new(T::zero(), t212))
             }
             _ => None,
         }
@@ -931,8 +925,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
     }
     fn law(&self) -> crate::Law<T> {
         crate::Law::Library(crate::Material::NeoHookean {
-            lambda: self.fixed[10],
-            mu: self.fixed[9],
+            lambda: self.fixed[9],
+            mu: self.fixed[8],
         })
     }
     fn density(&self) -> T {
@@ -942,7 +936,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for RingNu<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[14]
+        self.fixed[13]
     }
     fn body_force_on(
         &self,
@@ -965,8 +959,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t41 = self.fixed[5] * t13;
-        let t66 = self.fixed[7] * t13;
+        let t41 = self.fixed[4] * t13;
+        let t66 = self.fixed[6] * t13;
         [t32, t41, t66]
     }
     #[inline]
@@ -993,47 +987,47 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 3, 4> for RingNu<T> {
         let t37 = t20 * t35;
         let t42 = time[1] * t37;
         let t43 = t42 + T::one();
-        let t80 = self.fixed[8] * t37;
-        let t145 = t23 - self.fixed[11];
+        let t80 = self.fixed[7] * t37;
+        let t145 = t23 - self.fixed[10];
         let t146 = time[1] * t145;
-        let t178 = t34 * t42;
-        let t220 = self.fixed[3] * t21;
-        let t221 = t220 * t25;
-        let t222 = t221 + T::one();
-        let t223 = time[2] * t222;
-        let t224 = time[0] * t222;
-        let t225 = t224 * point[3];
-        let t226 = t146 - t225;
-        let t227 = t226 + t178;
-        let t229 = self.fixed[19] * t227;
-        let t230 = t222 * t34;
-        let t231 = time[0] * t230;
-        let t232 = t231 + T::one();
-        let t233 = t43 * t232;
-        let t234 = T::one() / t233;
-        let t235 = t232 * t234;
-        let t236 = t231 * t43;
-        let t237 = t236 + t42;
-        let t238 = t237.ln_of_both_if::<NEAR>(t233);
-        let t240 = self.fixed[20] * t238;
-        let t242 = t240 - self.fixed[21];
-        let t243 = t235 * t146;
-        let t244 = t80 - t230;
-        let t245 = time[0] * t34;
-        let t246 = t245 * t244;
-        let t247 = t246 * t43;
-        let t248 = t247 * t234;
-        let t249 = t243 + t248;
-        let t250 = t235 * t242;
-        let t251 = t250 * t249;
-        let t252 = t229 - t251;
-        let t253 = t223 + t252;
-        let t254 = t34 * t253;
-        let t255 = point[0] * t254;
-        let t256 = -t255;
-        let t257 = point[1] * t254;
-        let t258 = -t257;
-        crate::nalgebra::SVector::<T, 2>::new(t256, t258)
+        let t149 = t34 * t42;
+        let t213 = self.fixed[3] * t21;
+        let t214 = t213 * t25;
+        let t215 = t214 + T::one();
+        let t216 = time[2] * t215;
+        let t217 = time[0] * t215;
+        let t218 = t217 * point[3];
+        let t219 = t146 - t218;
+        let t220 = t219 + t149;
+        let t222 = self.fixed[18] * t220;
+        let t223 = t215 * t34;
+        let t224 = time[0] * t223;
+        let t225 = t224 + T::one();
+        let t226 = t43 * t225;
+        let t227 = T::one() / t226;
+        let t228 = t225 * t227;
+        let t229 = t224 * t43;
+        let t230 = t229 + t42;
+        let t231 = t230.ln_of_both_if::<NEAR>(t226);
+        let t233 = self.fixed[19] * t231;
+        let t235 = t233 - self.fixed[20];
+        let t236 = t228 * t146;
+        let t237 = t80 - t223;
+        let t238 = time[0] * t34;
+        let t239 = t238 * t237;
+        let t240 = t239 * t43;
+        let t241 = t240 * t227;
+        let t242 = t236 + t241;
+        let t243 = t228 * t235;
+        let t244 = t243 * t242;
+        let t245 = t222 - t244;
+        let t246 = t216 + t245;
+        let t247 = t34 * t246;
+        let t248 = point[0] * t247;
+        let t249 = -t248;
+        let t250 = point[1] * t247;
+        let t251 = -t250;
+        crate::nalgebra::SVector::<T, 2>::new(t249, t251)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -1043,14 +1037,14 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t32 = self.parameters.A * t13;
-        let t41 = self.fixed[5] * t13;
+        let t41 = self.fixed[4] * t13;
         [t13, t32, t41]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 1] {
         let t12 = self.fixed[0] * t;
         let t54 = t12.sin_pi();
-        let t57 = self.fixed[6] * t54;
+        let t57 = self.fixed[5] * t54;
         [t57]
     }
     #[inline]
@@ -1118,13 +1112,13 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t52 = time[1] * t51;
         let t72 = t20 * t2;
         let t73 = t72 * t35;
-        let t74 = self.fixed[8] * t73;
+        let t74 = self.fixed[7] * t73;
         let t75 = t31 * t3;
         let t76 = t75 * t34;
         let t77 = t74 + t76;
         let t78 = t77 * t33;
         let t79 = time[1] * t78;
-        let t80 = self.fixed[8] * t37;
+        let t80 = self.fixed[7] * t37;
         let t81 = t80 - t38;
         let t82 = point[0] * point[1];
         let t83 = t82 * t81;
@@ -1132,7 +1126,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t85 = time[1] * t84;
         let t86 = t20 * t3;
         let t87 = t86 * t35;
-        let t88 = self.fixed[8] * t87;
+        let t88 = self.fixed[7] * t87;
         let t89 = t31 * t2;
         let t90 = t89 * t34;
         let t91 = t88 + t90;
@@ -1150,20 +1144,20 @@ impl<T: crate::Real> crate::StateStages<T, 2, 3, 1, 2> for RingNu<T> {
         let t110 = t43 * t108;
         let t111 = t109 + T::one();
         let t115 = t104 * t109;
-        let t116 = self.fixed[10] * t115;
-        let t117 = self.fixed[9] * t111;
+        let t116 = self.fixed[9] * t115;
+        let t117 = self.fixed[8] * t111;
         let t118 = t116 - t117;
         let t119 = t110 + T::one();
         let t120 = t104 * t110;
-        let t121 = self.fixed[10] * t120;
-        let t122 = self.fixed[9] * t119;
+        let t121 = self.fixed[9] * t120;
+        let t122 = self.fixed[8] * t119;
         let t123 = t121 - t122;
         let t124 = t42 * t118;
         let t125 = t2 * t124;
         let t126 = time[1] * t76;
         let t127 = t126 * t123;
         let t128 = t125 + t127;
-        let t129 = self.fixed[10] * t104;
+        let t129 = self.fixed[9] * t104;
         let t130 = t33 * t128;
         let t131 = t129 - t130;
         let t132 = t44 * t123;

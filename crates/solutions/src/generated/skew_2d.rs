@@ -38,7 +38,7 @@ impl<T: crate::Real> Default for Skew2dParameters<T> {
 pub struct Skew2d<T: crate::Real> {
     parameters: Skew2dParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 26],
+    fixed: [T; 25],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> Skew2d<T> {
@@ -109,78 +109,75 @@ impl<T: crate::Real> Skew2d<T> {
         if !(value.is_finite() && value > 0.0) {
             return Err(Self::DESCRIPTION.out_of_range(3, value));
         }
-        let t20 = parameters.E / parameters.rho0;
-        let t21 = t20.sqrt();
-        let t42 = T::nearest(0.1) * parameters.A;
-        let t46 = parameters.A * t21;
-        let t47 = t46 * T::pi();
-        let t54 = t42 * t21;
-        let t55 = t54 * T::pi();
-        let t58 = T::pi() * T::pi();
-        let t59 = parameters.A * parameters.E;
-        let t60 = t59 * t58;
-        let t61 = t60 / parameters.rho0;
-        let t65 = t42 * parameters.E;
-        let t66 = t65 * t58;
-        let t67 = t66 / parameters.rho0;
-        let t75 = T::nearest(3.0) * parameters.A;
-        let t103 = parameters.nu + T::one();
-        let t104 = T::nearest(0.5) * parameters.E;
-        let t105 = t104 / t103;
-        let t111 = T::nearest(2.0) * parameters.nu;
-        let t112 = T::one() - t111;
-        let t117 = parameters.E * parameters.nu;
-        let t118 = t103 * t112;
-        let t119 = t117 / t118;
-        let t134 = t59 * parameters.nu;
-        let t135 = t134 / t118;
-        let t150 = parameters.E * t58;
-        let t151 = t150 / parameters.rho0;
-        let t154 = T::nearest(9.0) * parameters.A;
-        let t161 = t119 + t105;
-        let t172 = T::nearest(0.2) * parameters.A;
-        let t179 = T::nearest(0.05) * parameters.A;
-        let t190 = T::nearest(0.8) * parameters.A;
-        let t210 = T::one() / parameters.rho0;
-        let t233 = T::nearest(2.0) / t21;
-        let t238 = t42 * T::pi();
-        let t280 = T::nearest(2.0).cos();
-        let t282 = T::pi() * t280;
-        let t287 = T::nearest(2.0).sin();
-        let t288 = T::nearest(4.0) * t287;
-        let t323 = parameters.A * t105;
-        let t383 = t323 * t210;
-        let t387 = t105 * t210;
-        let t415 = -t210;
+        let t10 = parameters.E / parameters.rho0;
+        let t11 = t10.sqrt();
+        let t33 = T::nearest(0.1) * parameters.A;
+        let t37 = parameters.A * t11;
+        let t38 = t37 * T::pi();
+        let t45 = t33 * t11;
+        let t46 = t45 * T::pi();
+        let t49 = T::pi() * T::pi();
+        let t50 = parameters.A * parameters.E;
+        let t51 = t50 * t49;
+        let t52 = t51 / parameters.rho0;
+        let t56 = t33 * parameters.E;
+        let t57 = t56 * t49;
+        let t58 = t57 / parameters.rho0;
+        let t63 = T::nearest(3.0) * parameters.A;
+        let t91 = parameters.nu + T::one();
+        let t92 = T::nearest(0.5) * parameters.E;
+        let t93 = t92 / t91;
+        let t99 = T::nearest(2.0) * parameters.nu;
+        let t100 = T::one() - t99;
+        let t105 = parameters.E * parameters.nu;
+        let t106 = t91 * t100;
+        let t107 = t105 / t106;
+        let t122 = t50 * parameters.nu;
+        let t123 = t122 / t106;
+        let t139 = T::nearest(9.0) * parameters.A;
+        let t144 = t107 + t93;
+        let t154 = T::nearest(0.2) * parameters.A;
+        let t161 = T::nearest(0.05) * parameters.A;
+        let t174 = T::nearest(0.8) * parameters.A;
+        let t196 = T::one() / parameters.rho0;
+        let t210 = T::nearest(2.0) / t11;
+        let t215 = t33 * T::pi();
+        let t250 = T::nearest(2.0).cos();
+        let t252 = T::pi() * t250;
+        let t257 = T::nearest(2.0).sin();
+        let t258 = T::nearest(4.0) * t257;
+        let t287 = parameters.A * t93;
+        let t339 = t287 * t196;
+        let t343 = t93 * t196;
+        let t371 = -t196;
         Ok(Skew2d {
             parameters,
             fixed: [
-                t21,
-                t42,
-                t47,
-                t55,
+                t11,
+                t33,
+                t38,
+                t46,
+                t49,
+                t52,
                 t58,
-                t61,
-                t67,
-                t75,
-                t105,
-                t119,
-                t135,
-                t151,
+                t63,
+                t93,
+                t107,
+                t123,
+                t139,
+                t144,
                 t154,
                 t161,
-                t172,
-                t179,
-                t190,
+                t174,
+                t196,
                 t210,
-                t233,
-                t238,
-                t282,
-                t288,
-                t323,
-                t383,
-                t387,
-                t415,
+                t215,
+                t252,
+                t258,
+                t287,
+                t339,
+                t343,
+                t371,
             ],
         })
     }
@@ -220,38 +217,29 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t25 = t24 * t16;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t44 = t43 * t35;
-        crate::nalgebra::SVector::<T, 2>::new(t25, t44)
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t15 = t14 * t6;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t35 = t34 * t26;
+        crate::nalgebra::SVector::<T, 2>::new(t15, t35)
     }
     #[inline]
     fn velocity(
@@ -259,39 +247,30 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t36 = t22.sin_pi();
-        let t48 = self.fixed[2] * t36;
-        let t49 = t48 * t16;
-        let t50 = -t49;
-        let t51 = T::nearest(4.0) * t23;
-        let t52 = T::nearest(3.0) * t36;
-        let t53 = t51 - t52;
-        let t56 = self.fixed[3] * t53;
-        let t57 = t56 * t35;
-        crate::nalgebra::SVector::<T, 2>::new(t50, t57)
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t27 = t12.sin_pi();
+        let t39 = self.fixed[2] * t27;
+        let t40 = t39 * t6;
+        let t41 = -t40;
+        let t42 = T::nearest(4.0) * t13;
+        let t43 = T::nearest(3.0) * t27;
+        let t44 = t42 - t43;
+        let t47 = self.fixed[3] * t44;
+        let t48 = t47 * t26;
+        crate::nalgebra::SVector::<T, 2>::new(t41, t48)
     }
     #[inline]
     fn acceleration(
@@ -299,40 +278,31 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t62 = self.fixed[5] * t23;
-        let t63 = t62 * t16;
-        let t64 = -t63;
-        let t68 = self.fixed[6] * t40;
-        let t69 = t68 * t35;
-        let t70 = -t69;
-        crate::nalgebra::SVector::<T, 2>::new(t64, t70)
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t53 = self.fixed[5] * t13;
+        let t54 = t53 * t6;
+        let t55 = -t54;
+        let t59 = self.fixed[6] * t31;
+        let t60 = t59 * t26;
+        let t61 = -t60;
+        crate::nalgebra::SVector::<T, 2>::new(t55, t61)
     }
     #[inline]
     fn displacement_gradient(
@@ -340,47 +310,38 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t33 = X[1] * X[1];
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t90 = t43 * t89;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t77, t78, t83, t90)
+        let t5 = t4 + X[1];
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t24 = X[1] * X[1];
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t78 = t34 * t77;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t65, t66, t71, t78)
     }
     #[inline]
     fn deformation_gradient(
@@ -388,100 +349,82 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t33 = X[1] * X[1];
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t92 = t77 + T::one();
-        let t93 = self.parameters.A * t40;
-        let t94 = t93 * t89;
-        let t96 = t94 + T::nearest(10.0);
-        let t97 = T::nearest(0.1) * t96;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t78, t83, t97)
+        let t5 = t4 + X[1];
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t24 = X[1] * X[1];
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t80 = t65 + T::one();
+        let t81 = self.parameters.A * t31;
+        let t82 = t81 * t77;
+        let t84 = t82 + T::nearest(10.0);
+        let t85 = T::nearest(0.1) * t84;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85)
     }
     #[inline]
     fn jacobian(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> T {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t33 = X[1] * X[1];
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t90 = t43 * t89;
-        let t92 = t77 + T::one();
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        t101
+        let t5 = t4 + X[1];
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t24 = X[1] * X[1];
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t78 = t34 * t77;
+        let t80 = t65 + T::one();
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        t89
     }
     #[inline]
     fn first_piola_kirchhoff(
@@ -489,89 +432,80 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t33 = X[1] * X[1];
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t90 = t43 * t89;
-        let t92 = t77 + T::one();
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
-        let t109 = t107 * t108;
-        let t110 = t77 - t109;
-        let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t116 = self.fixed[8] * t110;
-        let t120 = t98 * t115;
-        let t121 = t120 * t108;
-        let t122 = self.fixed[9] * t121;
-        let t123 = t116 + t122;
-        let t124 = t83 * t108;
-        let t125 = t78 + t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = t83 * t115;
-        let t128 = t127 * t108;
-        let t129 = self.fixed[9] * t128;
-        let t130 = t126 - t129;
-        let t131 = t78 * t108;
-        let t132 = t83 + t131;
+        let t5 = t4 + X[1];
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t24 = X[1] * X[1];
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t78 = t34 * t77;
+        let t80 = t65 + T::one();
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t97 = t95 * t96;
+        let t98 = t65 - t97;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t104 = self.fixed[8] * t98;
+        let t108 = t86 * t103;
+        let t109 = t108 * t96;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t104 + t110;
+        let t112 = t71 * t96;
+        let t113 = t66 + t112;
+        let t114 = self.fixed[8] * t113;
+        let t115 = t71 * t103;
+        let t116 = t115 * t96;
+        let t117 = self.fixed[9] * t116;
+        let t118 = t114 - t117;
+        let t119 = t66 * t96;
+        let t120 = t71 + t119;
+        let t121 = self.fixed[8] * t120;
+        let t124 = self.fixed[10] * t13;
+        let t125 = t124 * t62;
+        let t126 = t103 * t96;
+        let t127 = t125 * t126;
+        let t128 = t121 - t127;
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t131 = t130 * t96;
+        let t132 = t78 - t131;
         let t133 = self.fixed[8] * t132;
-        let t136 = self.fixed[10] * t23;
-        let t137 = t136 * t74;
-        let t138 = t115 * t108;
-        let t139 = t137 * t138;
-        let t140 = t133 - t139;
-        let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t143 = t142 * t108;
-        let t144 = t90 - t143;
-        let t145 = self.fixed[8] * t144;
-        let t146 = t92 * t115;
-        let t147 = t146 * t108;
-        let t148 = self.fixed[9] * t147;
-        let t149 = t145 + t148;
-        crate::nalgebra::SMatrix::<T, 2, 2>::new(t123, t130, t140, t149)
+        let t134 = t80 * t103;
+        let t135 = t134 * t96;
+        let t136 = self.fixed[9] * t135;
+        let t137 = t133 + t136;
+        crate::nalgebra::SMatrix::<T, 2, 2>::new(t111, t118, t128, t137)
     }
     #[inline]
     fn body_force(
@@ -579,311 +513,291 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         X: &crate::nalgebra::SVector<T, 2>,
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t25 = t24 * t16;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t68 = self.fixed[6] * t40;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t90 = t43 * t89;
-        let t92 = t77 + T::one();
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t106 = t77 * t98;
-        let t113 = t106 + t90;
-        let t152 = self.fixed[11] * t25;
-        let t155 = self.fixed[12] * t23;
-        let t156 = t155 * t16;
-        let t157 = -t156;
-        let t158 = t25 + t156;
-        let t159 = t83 * t78;
-        let t160 = t99 - t159;
-        let t162 = t113 - t159;
-        let t163 = t162.log_1p();
-        let t164 = self.fixed[9] * t163;
-        let t165 = self.fixed[13] - t164;
-        let t166 = t76 * t16;
-        let t167 = -t166;
-        let t168 = t79 * t84;
-        let t169 = T::pi() * t168;
-        let t170 = X[1] - t169;
-        let t173 = self.fixed[14] * t40;
-        let t174 = t173 * t170;
-        let t175 = T::nearest(4.0) * X[0];
-        let t176 = self.fixed[4] * t31;
-        let t177 = t175 - t176;
-        let t180 = self.fixed[15] * t40;
-        let t181 = t180 * t177;
-        let t182 = t98 * t167;
-        let t183 = t83 * t25;
-        let t184 = t174 * t78;
-        let t185 = t92 * t181;
-        let t186 = t182 + t183;
-        let t187 = t186 - t184;
-        let t188 = t187 + t185;
-        let t191 = self.fixed[16] * t40;
-        let t192 = t191 * t31;
-        let t193 = -t192;
-        let t194 = t98 * t157;
-        let t195 = t92 * t174;
-        let t196 = T::nearest(3.0) * t183;
-        let t197 = t78 * t193;
-        let t198 = t194 + t195;
-        let t199 = t198 + t196;
-        let t200 = t199 - t197;
-        let t201 = t83 * t188;
-        let t202 = t98 * t200;
-        let t203 = t201 - t202;
-        let t204 = self.fixed[8] * t158;
-        let t205 = t160 * t160;
-        let t206 = t165 * t203;
-        let t207 = T::one() / t205;
-        let t208 = t206 * t207;
-        let t209 = t204 + t208;
-        let t211 = self.fixed[17] * t209;
-        let t212 = t211 - t152;
-        let t213 = X[1] * t87;
-        let t214 = t32 + t213;
-        let t215 = t68 * t214;
-        let t216 = t181 - t192;
-        let t217 = t78 * t200;
-        let t218 = t92 * t188;
-        let t219 = t217 - t218;
-        let t220 = self.fixed[8] * t216;
-        let t221 = t165 * t219;
-        let t222 = t221 * t207;
-        let t223 = t220 - t222;
-        let t224 = self.fixed[17] * t223;
-        let t225 = t215 + t224;
-        let t226 = -t225;
-        crate::nalgebra::SVector::<T, 2>::new(t212, t226)
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t15 = t14 * t6;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t53 = self.fixed[5] * t13;
+        let t54 = t53 * t6;
+        let t59 = self.fixed[6] * t31;
+        let t60 = t59 * t26;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t78 = t34 * t77;
+        let t80 = t65 + T::one();
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t96 = T::one() / t89;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t140 = self.fixed[11] * t13;
+        let t141 = t140 * t6;
+        let t142 = -t141;
+        let t143 = t15 + t141;
+        let t145 = self.fixed[9] * t103;
+        let t146 = t145 - self.fixed[12];
+        let t147 = -t146;
+        let t148 = t64 * t6;
+        let t149 = -t148;
+        let t150 = t67 * t72;
+        let t151 = T::pi() * t150;
+        let t152 = X[1] - t151;
+        let t155 = self.fixed[13] * t31;
+        let t156 = t155 * t152;
+        let t157 = T::nearest(4.0) * X[0];
+        let t158 = self.fixed[4] * t22;
+        let t159 = t157 - t158;
+        let t162 = self.fixed[14] * t31;
+        let t163 = t162 * t159;
+        let t164 = t6 * t71;
+        let t165 = t62 * t156;
+        let t166 = t164 - t165;
+        let t167 = t13 * t166;
+        let t168 = self.parameters.A * t167;
+        let t169 = t86 * t149;
+        let t170 = t80 * t163;
+        let t171 = t168 + t169;
+        let t172 = t171 + t170;
+        let t175 = self.fixed[15] * t31;
+        let t176 = t175 * t22;
+        let t177 = -t176;
+        let t178 = T::nearest(3.0) * t6;
+        let t179 = t178 * t71;
+        let t180 = t62 * t177;
+        let t181 = t179 - t180;
+        let t182 = self.parameters.A * t181;
+        let t183 = t13 * t182;
+        let t184 = t86 * t142;
+        let t185 = t80 * t156;
+        let t186 = t183 + t184;
+        let t187 = t186 + t185;
+        let t188 = t71 * t172;
+        let t189 = t86 * t187;
+        let t190 = t188 - t189;
+        let t191 = self.fixed[8] * t143;
+        let t192 = t147 * t190;
+        let t193 = t96 * t96;
+        let t194 = t192 * t193;
+        let t195 = t191 + t194;
+        let t197 = self.fixed[16] * t195;
+        let t198 = t197 - t54;
+        let t199 = t163 - t176;
+        let t200 = t66 * t187;
+        let t201 = t80 * t172;
+        let t202 = t200 - t201;
+        let t203 = self.fixed[8] * t199;
+        let t204 = t147 * t202;
+        let t205 = t204 * t193;
+        let t206 = t203 - t205;
+        let t207 = self.fixed[16] * t206;
+        let t208 = t60 + t207;
+        let t209 = -t208;
+        crate::nalgebra::SVector::<T, 2>::new(t198, t209)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t25 = t24 * t16;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t44 = t43 * t35;
-        let t48 = self.fixed[2] * t36;
-        let t49 = t48 * t16;
-        let t50 = -t49;
-        let t51 = T::nearest(4.0) * t23;
-        let t52 = T::nearest(3.0) * t36;
-        let t53 = t51 - t52;
-        let t56 = self.fixed[3] * t53;
-        let t57 = t56 * t35;
-        let t62 = self.fixed[5] * t23;
-        let t63 = t62 * t16;
-        let t64 = -t63;
-        let t68 = self.fixed[6] * t40;
-        let t69 = t68 * t35;
-        let t70 = -t69;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t76 = self.fixed[7] * t23;
-        let t77 = t76 * t74;
-        let t78 = t24 * t74;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t83 = t43 * t82;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t90 = t43 * t89;
-        let t92 = t77 + T::one();
-        let t93 = self.parameters.A * t40;
-        let t94 = t93 * t89;
-        let t96 = t94 + T::nearest(10.0);
-        let t97 = T::nearest(0.1) * t96;
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
-        let t109 = t107 * t108;
-        let t110 = t77 - t109;
-        let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t116 = self.fixed[8] * t110;
-        let t120 = t98 * t115;
-        let t121 = t120 * t108;
-        let t122 = self.fixed[9] * t121;
-        let t123 = t116 + t122;
-        let t124 = t83 * t108;
-        let t125 = t78 + t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = t83 * t115;
-        let t128 = t127 * t108;
-        let t129 = self.fixed[9] * t128;
-        let t130 = t126 - t129;
-        let t131 = t78 * t108;
-        let t132 = t83 + t131;
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t15 = t14 * t6;
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t35 = t34 * t26;
+        let t39 = self.fixed[2] * t27;
+        let t40 = t39 * t6;
+        let t41 = -t40;
+        let t42 = T::nearest(4.0) * t13;
+        let t43 = T::nearest(3.0) * t27;
+        let t44 = t42 - t43;
+        let t47 = self.fixed[3] * t44;
+        let t48 = t47 * t26;
+        let t53 = self.fixed[5] * t13;
+        let t54 = t53 * t6;
+        let t55 = -t54;
+        let t59 = self.fixed[6] * t31;
+        let t60 = t59 * t26;
+        let t61 = -t60;
+        let t62 = t5.cos();
+        let t64 = self.fixed[7] * t13;
+        let t65 = t64 * t62;
+        let t66 = t14 * t62;
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t71 = t34 * t70;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t78 = t34 * t77;
+        let t80 = t65 + T::one();
+        let t81 = self.parameters.A * t31;
+        let t82 = t81 * t77;
+        let t84 = t82 + T::nearest(10.0);
+        let t85 = T::nearest(0.1) * t84;
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t97 = t95 * t96;
+        let t98 = t65 - t97;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t104 = self.fixed[8] * t98;
+        let t108 = t86 * t103;
+        let t109 = t108 * t96;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t104 + t110;
+        let t112 = t71 * t96;
+        let t113 = t66 + t112;
+        let t114 = self.fixed[8] * t113;
+        let t115 = t71 * t103;
+        let t116 = t115 * t96;
+        let t117 = self.fixed[9] * t116;
+        let t118 = t114 - t117;
+        let t119 = t66 * t96;
+        let t120 = t71 + t119;
+        let t121 = self.fixed[8] * t120;
+        let t124 = self.fixed[10] * t13;
+        let t125 = t124 * t62;
+        let t126 = t103 * t96;
+        let t127 = t125 * t126;
+        let t128 = t121 - t127;
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t131 = t130 * t96;
+        let t132 = t78 - t131;
         let t133 = self.fixed[8] * t132;
-        let t136 = self.fixed[10] * t23;
-        let t137 = t136 * t74;
-        let t138 = t115 * t108;
-        let t139 = t137 * t138;
-        let t140 = t133 - t139;
-        let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t143 = t142 * t108;
-        let t144 = t90 - t143;
-        let t145 = self.fixed[8] * t144;
-        let t146 = t92 * t115;
-        let t147 = t146 * t108;
-        let t148 = self.fixed[9] * t147;
-        let t149 = t145 + t148;
-        let t152 = self.fixed[11] * t25;
-        let t155 = self.fixed[12] * t23;
-        let t156 = t155 * t16;
-        let t157 = -t156;
-        let t158 = t25 + t156;
-        let t159 = t83 * t78;
-        let t160 = t99 - t159;
-        let t162 = t113 - t159;
-        let t163 = t162.log_1p();
-        let t164 = self.fixed[9] * t163;
-        let t165 = self.fixed[13] - t164;
-        let t166 = t76 * t16;
-        let t167 = -t166;
-        let t168 = t79 * t84;
-        let t169 = T::pi() * t168;
-        let t170 = X[1] - t169;
-        let t173 = self.fixed[14] * t40;
-        let t174 = t173 * t170;
-        let t175 = T::nearest(4.0) * X[0];
-        let t176 = self.fixed[4] * t31;
-        let t177 = t175 - t176;
-        let t180 = self.fixed[15] * t40;
-        let t181 = t180 * t177;
-        let t182 = t98 * t167;
-        let t183 = t83 * t25;
-        let t184 = t174 * t78;
-        let t185 = t92 * t181;
-        let t186 = t182 + t183;
-        let t187 = t186 - t184;
-        let t188 = t187 + t185;
-        let t191 = self.fixed[16] * t40;
-        let t192 = t191 * t31;
-        let t193 = -t192;
-        let t194 = t98 * t157;
-        let t195 = t92 * t174;
-        let t196 = T::nearest(3.0) * t183;
-        let t197 = t78 * t193;
-        let t198 = t194 + t195;
-        let t199 = t198 + t196;
-        let t200 = t199 - t197;
-        let t201 = t83 * t188;
-        let t202 = t98 * t200;
-        let t203 = t201 - t202;
-        let t204 = self.fixed[8] * t158;
-        let t205 = t160 * t160;
-        let t206 = t165 * t203;
-        let t207 = T::one() / t205;
-        let t208 = t206 * t207;
-        let t209 = t204 + t208;
-        let t211 = self.fixed[17] * t209;
-        let t212 = t211 - t152;
-        let t213 = X[1] * t87;
-        let t214 = t32 + t213;
-        let t215 = t68 * t214;
-        let t216 = t181 - t192;
-        let t217 = t78 * t200;
-        let t218 = t92 * t188;
-        let t219 = t217 - t218;
-        let t220 = self.fixed[8] * t216;
-        let t221 = t165 * t219;
-        let t222 = t221 * t207;
-        let t223 = t220 - t222;
-        let t224 = self.fixed[17] * t223;
-        let t225 = t215 + t224;
-        let t226 = -t225;
+        let t134 = t80 * t103;
+        let t135 = t134 * t96;
+        let t136 = self.fixed[9] * t135;
+        let t137 = t133 + t136;
+        let t140 = self.fixed[11] * t13;
+        let t141 = t140 * t6;
+        let t142 = -t141;
+        let t143 = t15 + t141;
+        let t145 = self.fixed[9] * t103;
+        let t146 = t145 - self.fixed[12];
+        let t147 = -t146;
+        let t148 = t64 * t6;
+        let t149 = -t148;
+        let t150 = t67 * t72;
+        let t151 = T::pi() * t150;
+        let t152 = X[1] - t151;
+        let t155 = self.fixed[13] * t31;
+        let t156 = t155 * t152;
+        let t157 = T::nearest(4.0) * X[0];
+        let t158 = self.fixed[4] * t22;
+        let t159 = t157 - t158;
+        let t162 = self.fixed[14] * t31;
+        let t163 = t162 * t159;
+        let t164 = t6 * t71;
+        let t165 = t62 * t156;
+        let t166 = t164 - t165;
+        let t167 = t13 * t166;
+        let t168 = self.parameters.A * t167;
+        let t169 = t86 * t149;
+        let t170 = t80 * t163;
+        let t171 = t168 + t169;
+        let t172 = t171 + t170;
+        let t175 = self.fixed[15] * t31;
+        let t176 = t175 * t22;
+        let t177 = -t176;
+        let t178 = T::nearest(3.0) * t6;
+        let t179 = t178 * t71;
+        let t180 = t62 * t177;
+        let t181 = t179 - t180;
+        let t182 = self.parameters.A * t181;
+        let t183 = t13 * t182;
+        let t184 = t86 * t142;
+        let t185 = t80 * t156;
+        let t186 = t183 + t184;
+        let t187 = t186 + t185;
+        let t188 = t71 * t172;
+        let t189 = t86 * t187;
+        let t190 = t188 - t189;
+        let t191 = self.fixed[8] * t143;
+        let t192 = t147 * t190;
+        let t193 = t96 * t96;
+        let t194 = t192 * t193;
+        let t195 = t191 + t194;
+        let t197 = self.fixed[16] * t195;
+        let t198 = t197 - t54;
+        let t199 = t163 - t176;
+        let t200 = t66 * t187;
+        let t201 = t80 * t172;
+        let t202 = t200 - t201;
+        let t203 = self.fixed[8] * t199;
+        let t204 = t147 * t202;
+        let t205 = t204 * t193;
+        let t206 = t203 - t205;
+        let t207 = self.fixed[16] * t206;
+        let t208 = t60 + t207;
+        let t209 = -t208;
         crate::Fields {
-            u: crate::nalgebra::SVector::<T, 2>::new(t25, t44),
-            v: crate::nalgebra::SVector::<T, 2>::new(t50, t57),
-            a: crate::nalgebra::SVector::<T, 2>::new(t64, t70),
-            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t77, t78, t83, t90),
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t78, t83, t97),
-            J: t101,
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t123, t130, t140, t149),
-            b: crate::nalgebra::SVector::<T, 2>::new(t212, t226),
+            u: crate::nalgebra::SVector::<T, 2>::new(t15, t35),
+            v: crate::nalgebra::SVector::<T, 2>::new(t41, t48),
+            a: crate::nalgebra::SVector::<T, 2>::new(t55, t61),
+            H: crate::nalgebra::SMatrix::<T, 2, 2>::new(t65, t66, t71, t78),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85),
+            J: t89,
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t111, t118, t128, t137),
+            b: crate::nalgebra::SVector::<T, 2>::new(t198, t209),
         }
     }
     fn traction(
@@ -894,211 +808,188 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> Option<crate::nalgebra::SVector<T, 2>> {
         match surface {
             crate::Surface::Lower(0) => {
-                let t22 = self.fixed[0] * t;
-                let t23 = t22.cos_pi();
-                let t24 = self.parameters.A * t23;
-                let t29 = T::nearest(0.5) * X[1];
-                let t33 = X[1] * X[1];
-                let t36 = t22.sin_pi();
-                let t37 = T::nearest(3.0) * t23;
-                let t39 = T::nearest(4.0) * t36;
-                let t40 = t37 + t39;
-                let t43 = self.fixed[1] * t40;
-                let t76 = self.fixed[7] * t23;
-                let t84 = t29.cos_pi();
-                let t136 = self.fixed[10] * t23;
-                let t235 = X[1].cos();
-                let t236 = t76 * t235;
-                let t237 = t236 + T::one();
-                let t239 = self.fixed[19] * t40;
-                let t240 = t239 * t84;
-                let t241 = t240 + T::one();
-                let t242 = t43 * t33;
-                let t243 = t237 * t241;
-                let t244 = t24 * t235;
-                let t245 = t244 * t242;
-                let t246 = t243 - t245;
-                let t247 = t236 * t241;
-                let t248 = t245 - t247;
-                let t249 = T::one() / t246;
-                let t250 = t248 * t249;
-                let t251 = t236 - t250;
-                let t252 = t247 + t240;
-                let t253 = t252 - t245;
-                let t254 = t253.log_1p();
-                let t255 = self.fixed[8] * t251;
-                let t256 = t241 * t254;
-                let t257 = t256 * t249;
-                let t258 = self.fixed[9] * t257;
-                let t259 = t255 + t258;
-                let t260 = -t259;
-                let t261 = t244 * t249;
-                let t262 = t242 + t261;
-                let t263 = self.fixed[8] * t262;
-                let t264 = t136 * t235;
-                let t265 = t254 * t249;
-                let t266 = t264 * t265;
-                let t267 = t263 - t266;
-                let t268 = -t267;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t260, t268))
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t20 = T::nearest(0.5) * X[1];
+                let t24 = X[1] * X[1];
+                let t27 = t12.sin_pi();
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = T::nearest(4.0) * t27;
+                let t31 = t28 + t30;
+                let t34 = self.fixed[1] * t31;
+                let t64 = self.fixed[7] * t13;
+                let t72 = t20.cos_pi();
+                let t124 = self.fixed[10] * t13;
+                let t212 = X[1].cos();
+                let t213 = t64 * t212;
+                let t214 = t213 + T::one();
+                let t216 = self.fixed[18] * t31;
+                let t217 = t216 * t72;
+                let t218 = t217 + T::one();
+                let t219 = t34 * t24;
+                let t220 = t214 * t218;
+                let t221 = t14 * t212;
+                let t222 = t221 * t219;
+                let t223 = t220 - t222;
+                let t224 = t213 * t218;
+                let t225 = t222 - t224;
+                let t226 = T::one() / t223;
+                let t227 = t225 * t226;
+                let t228 = t213 - t227;
+                let t229 = t224 + t217;
+                let t230 = t229 - t222;
+                let t231 = t230.log_1p();
+                let t232 = self.fixed[8] * t228;
+                let t233 = t218 * t231;
+                let t234 = t233 * t226;
+                let t235 = self.fixed[9] * t234;
+                let t236 = t232 + t235;
+                let t237 = -t236;
+                let t238 = t221 * t226;
+                let t239 = t219 + t238;
+                let t240 = self.fixed[8] * t239;
+                let t241 = t124 * t212;
+                let t242 = t231 * t226;
+                let t243 = t241 * t242;
+                let t244 = t240 - t243;
+                let t245 = -t244;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t237, t245))
             }
             crate::Surface::Upper(0) => {
-                let t22 = self.fixed[0] * t;
-                let t23 = t22.cos_pi();
-                let t24 = self.parameters.A * t23;
-                let t29 = T::nearest(0.5) * X[1];
-                let t30 = t29.sin_pi();
-                let t33 = X[1] * X[1];
-                let t36 = t22.sin_pi();
-                let t37 = T::nearest(3.0) * t23;
-                let t39 = T::nearest(4.0) * t36;
-                let t40 = t37 + t39;
-                let t43 = self.fixed[1] * t40;
-                let t76 = self.fixed[7] * t23;
-                let t84 = t29.cos_pi();
-                let t136 = self.fixed[10] * t23;
-                let t269 = T::nearest(3.0).sum_error(X[1]);
-                let t270 = T::nearest(3.0) + X[1];
-                let t271 = t270.cos();
-                let t272 = t270.sin();
-                let t273 = T::nearest(0.5) * t269;
-                let t274 = t273 * t271;
-                let t275 = t272 + t274;
-                let t276 = t269 * t275;
-                let t277 = t271 - t276;
-                let t278 = t76 * t277;
-                let t279 = t278 + T::one();
-                let t281 = T::nearest(2.0) * X[1];
-                let t283 = self.fixed[20] * t84;
-                let t284 = t281 + t283;
-                let t285 = t43 * t284;
-                let t286 = t285 + T::one();
-                let t289 = self.fixed[21] * t30;
-                let t290 = t33 - t289;
-                let t291 = t43 * t290;
-                let t292 = t279 * t286;
-                let t293 = t24 * t277;
-                let t294 = t293 * t291;
-                let t295 = t292 - t294;
-                let t296 = t278 * t286;
-                let t297 = t294 - t296;
-                let t298 = T::one() / t295;
-                let t299 = t297 * t298;
-                let t300 = t278 - t299;
-                let t301 = t296 + t285;
-                let t302 = t301 - t294;
-                let t303 = t302.log_1p();
-                let t304 = self.fixed[8] * t300;
-                let t305 = t286 * t303;
-                let t306 = t305 * t298;
-                let t307 = self.fixed[9] * t306;
-                let t308 = t304 + t307;
-                let t309 = t293 * t298;
-                let t310 = t291 + t309;
-                let t311 = self.fixed[8] * t310;
-                let t312 = t136 * t277;
-                let t313 = t303 * t298;
-                let t314 = t312 * t313;
-                let t315 = t311 - t314;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t308, t315))
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t20 = T::nearest(0.5) * X[1];
+                let t21 = t20.sin_pi();
+                let t24 = X[1] * X[1];
+                let t27 = t12.sin_pi();
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = T::nearest(4.0) * t27;
+                let t31 = t28 + t30;
+                let t34 = self.fixed[1] * t31;
+                let t64 = self.fixed[7] * t13;
+                let t72 = t20.cos_pi();
+                let t124 = self.fixed[10] * t13;
+                let t246 = X[1] + T::nearest(3.0);
+                let t247 = t246.cos();
+                let t248 = t64 * t247;
+                let t249 = t248 + T::one();
+                let t251 = T::nearest(2.0) * X[1];
+                let t253 = self.fixed[19] * t72;
+                let t254 = t251 + t253;
+                let t255 = t34 * t254;
+                let t256 = t255 + T::one();
+                let t259 = self.fixed[20] * t21;
+                let t260 = t24 - t259;
+                let t261 = t34 * t260;
+                let t262 = t249 * t256;
+                let t263 = t14 * t247;
+                let t264 = t263 * t261;
+                let t265 = t262 - t264;
+                let t266 = t248 * t256;
+                let t267 = t264 - t266;
+                let t268 = T::one() / t265;
+                let t269 = t267 * t268;
+                let t270 = t248 - t269;
+                let t271 = t266 + t255;
+                let t272 = t271 - t264;
+                let t273 = t272.log_1p();
+                let t274 = self.fixed[8] * t270;
+                let t275 = t256 * t273;
+                let t276 = t275 * t268;
+                let t277 = self.fixed[9] * t276;
+                let t278 = t274 + t277;
+                let t279 = t263 * t268;
+                let t280 = t261 + t279;
+                let t281 = self.fixed[8] * t280;
+                let t282 = t124 * t247;
+                let t283 = t273 * t268;
+                let t284 = t282 * t283;
+                let t285 = t281 - t284;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t278, t285))
             }
             crate::Surface::Lower(1) => {
-                let t3 = T::nearest(3.0).product_error(X[0]);
                 let t4 = T::nearest(3.0) * X[0];
-                let t22 = self.fixed[0] * t;
-                let t23 = t22.cos_pi();
-                let t27 = T::nearest(2.0) * X[0];
-                let t28 = t27.cos();
-                let t36 = t22.sin_pi();
-                let t37 = T::nearest(3.0) * t23;
-                let t39 = T::nearest(4.0) * t36;
-                let t40 = t37 + t39;
-                let t76 = self.fixed[7] * t23;
-                let t239 = self.fixed[19] * t40;
-                let t316 = t4.cos();
-                let t317 = t4.sin();
-                let t318 = T::nearest(0.5) * t3;
-                let t319 = t318 * t316;
-                let t320 = t317 + t319;
-                let t321 = t3 * t320;
-                let t322 = t316 - t321;
-                let t324 = self.fixed[22] * t23;
-                let t325 = t324 * t322;
-                let t326 = -t325;
-                let t327 = t239 * t28;
-                let t328 = t327 + T::one();
-                let t329 = T::one() / t328;
-                let t330 = t329 + T::one();
-                let t331 = t76 * t322;
-                let t332 = t331 * t328;
-                let t333 = t332 + t327;
-                let t334 = t333.log_1p();
-                let t335 = t327 * t330;
-                let t336 = self.fixed[8] * t335;
-                let t337 = t334 * t329;
-                let t338 = self.fixed[9] * t337;
-                let t339 = t336 + t338;
-                let t340 = -t339;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t326, t340))
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t17 = T::nearest(2.0) * X[0];
+                let t18 = t17.cos();
+                let t27 = t12.sin_pi();
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = T::nearest(4.0) * t27;
+                let t31 = t28 + t30;
+                let t64 = self.fixed[7] * t13;
+                let t216 = self.fixed[18] * t31;
+                let t286 = t4.cos();
+                let t288 = self.fixed[21] * t13;
+                let t289 = t288 * t286;
+                let t290 = -t289;
+                let t291 = t216 * t18;
+                let t292 = t291 + T::one();
+                let t293 = T::one() / t292;
+                let t294 = t293 + T::one();
+                let t295 = t64 * t286;
+                let t296 = t295 * t292;
+                let t297 = t296 + t291;
+                let t298 = t297.log_1p();
+                let t299 = t291 * t294;
+                let t300 = self.fixed[8] * t299;
+                let t301 = t298 * t293;
+                let t302 = self.fixed[9] * t301;
+                let t303 = t300 + t302;
+                let t304 = -t303;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t290, t304))
             }
             crate::Surface::Upper(1) => {
-                let t3 = T::nearest(3.0).product_error(X[0]);
                 let t4 = T::nearest(3.0) * X[0];
-                let t22 = self.fixed[0] * t;
-                let t23 = t22.cos_pi();
-                let t24 = self.parameters.A * t23;
-                let t27 = T::nearest(2.0) * X[0];
-                let t36 = t22.sin_pi();
-                let t37 = T::nearest(3.0) * t23;
-                let t39 = T::nearest(4.0) * t36;
-                let t40 = t37 + t39;
-                let t43 = self.fixed[1] * t40;
-                let t76 = self.fixed[7] * t23;
-                let t79 = t27.sin();
-                let t173 = self.fixed[14] * t40;
-                let t341 = T::one().sum_error(t4);
-                let t342 = T::one() + t4;
-                let t343 = t3 + t341;
-                let t344 = t342.cos();
-                let t345 = t342.sin();
-                let t346 = T::nearest(0.5) * t343;
-                let t347 = t346 * t344;
-                let t348 = t345 + t347;
-                let t349 = t343 * t348;
-                let t350 = t344 - t349;
-                let t351 = T::nearest(4.0) * t79;
-                let t352 = T::one() - t351;
-                let t353 = t43 * t352;
-                let t354 = t76 * t350;
-                let t355 = t354 + T::one();
-                let t356 = t173 * X[0];
-                let t357 = t356 + T::one();
-                let t358 = t355 * t357;
-                let t359 = t24 * t350;
-                let t360 = t359 * t353;
-                let t361 = t358 - t360;
-                let t362 = T::one() / t361;
-                let t363 = t353 * t362;
-                let t364 = t359 + t363;
-                let t365 = t354 * t357;
-                let t366 = t365 + t356;
-                let t367 = t366 - t360;
-                let t368 = t367.log_1p();
-                let t369 = self.fixed[8] * t364;
-                let t370 = t353 * t368;
-                let t371 = t370 * t362;
-                let t372 = self.fixed[9] * t371;
-                let t373 = t369 - t372;
-                let t374 = t355 * t356;
-                let t375 = t360 - t374;
-                let t376 = t375 * t362;
-                let t377 = t356 - t376;
-                let t378 = self.fixed[8] * t377;
-                let t379 = t355 * t368;
-                let t380 = t379 * t362;
-                let t381 = self.fixed[9] * t380;
-                let t382 = t378 + t381;
-                Some(crate::nalgebra::SVector::<T, 2>::new(t373, t382))
+                let t12 = self.fixed[0] * t;
+                let t13 = t12.cos_pi();
+                let t14 = self.parameters.A * t13;
+                let t17 = T::nearest(2.0) * X[0];
+                let t27 = t12.sin_pi();
+                let t28 = T::nearest(3.0) * t13;
+                let t30 = T::nearest(4.0) * t27;
+                let t31 = t28 + t30;
+                let t34 = self.fixed[1] * t31;
+                let t64 = self.fixed[7] * t13;
+                let t67 = t17.sin();
+                let t155 = self.fixed[13] * t31;
+                let t305 = t4 + T::one();
+                let t306 = t305.cos();
+                let t307 = T::nearest(4.0) * t67;
+                let t308 = T::one() - t307;
+                let t309 = t34 * t308;
+                let t310 = t64 * t306;
+                let t311 = t310 + T::one();
+                let t312 = t155 * X[0];
+                let t313 = t312 + T::one();
+                let t314 = t311 * t313;
+                let t315 = t14 * t306;
+                let t316 = t315 * t309;
+                let t317 = t314 - t316;
+                let t318 = T::one() / t317;
+                let t319 = t309 * t318;
+                let t320 = t315 + t319;
+                let t321 = t310 * t313;
+                let t322 = t321 + t312;
+                let t323 = t322 - t316;
+                let t324 = t323.log_1p();
+                let t325 = self.fixed[8] * t320;
+                let t326 = t309 * t324;
+                let t327 = t326 * t318;
+                let t328 = self.fixed[9] * t327;
+                let t329 = t325 - t328;
+                let t330 = t311 * t312;
+                let t331 = t316 - t330;
+                let t332 = t331 * t318;
+                let t333 = t312 - t332;
+                let t334 = self.fixed[8] * t333;
+                let t335 = t311 * t324;
+                let t336 = t335 * t318;
+                let t337 = self.fixed[9] * t336;
+                let t338 = t334 + t337;
+                Some(crate::nalgebra::SVector::<T, 2>::new(t329, t338))
             }
             _ => None,
         }
@@ -1145,7 +1036,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[18]
+        self.fixed[17]
     }
     fn body_force_on(
         &self,
@@ -1165,70 +1056,58 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
 impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 8> for Skew2d<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 9] {
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t62 = self.fixed[5] * t23;
-        let t68 = self.fixed[6] * t40;
-        let t76 = self.fixed[7] * t23;
-        let t155 = self.fixed[12] * t23;
-        let t173 = self.fixed[14] * t40;
-        let t180 = self.fixed[15] * t40;
-        let t191 = self.fixed[16] * t40;
-        let t384 = self.fixed[23] * t23;
-        let t385 = t384 - t62;
-        let t408 = -t68;
-        [t24, t43, t76, t155, t173, t180, t191, t385, t408]
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t53 = self.fixed[5] * t13;
+        let t59 = self.fixed[6] * t31;
+        let t64 = self.fixed[7] * t13;
+        let t140 = self.fixed[11] * t13;
+        let t155 = self.fixed[13] * t31;
+        let t162 = self.fixed[14] * t31;
+        let t175 = self.fixed[15] * t31;
+        let t340 = self.fixed[22] * t13;
+        let t341 = t340 - t53;
+        let t364 = -t59;
+        [t14, t34, t64, t140, t155, t162, t175, t341, t364]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        let t168 = t79 * t84;
-        let t169 = T::pi() * t168;
-        let t170 = X[1] - t169;
-        let t175 = T::nearest(4.0) * X[0];
-        let t176 = self.fixed[4] * t31;
-        let t177 = t175 - t176;
-        [t16, t31, t35, t74, t82, t89, t170, t177]
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t62 = t5.cos();
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        let t150 = t67 * t72;
+        let t151 = T::pi() * t150;
+        let t152 = X[1] - t151;
+        let t157 = T::nearest(4.0) * X[0];
+        let t158 = self.fixed[4] * t22;
+        let t159 = t157 - t158;
+        [t6, t22, t26, t62, t70, t77, t152, t159]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1236,134 +1115,122 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 8> for Skew2d<T> {
         time: &[T; 9],
         point: &[T; 8],
     ) -> crate::nalgebra::SVector<T, 2> {
-        let t77 = time[2] * point[3];
-        let t78 = time[0] * point[3];
-        let t83 = time[1] * point[4];
-        let t90 = time[1] * point[5];
-        let t92 = t77 + T::one();
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        let t106 = t77 * t98;
-        let t108 = T::one() / t101;
-        let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t156 = time[3] * point[0];
-        let t166 = time[2] * point[0];
-        let t174 = time[4] * point[6];
-        let t181 = time[5] * point[7];
-        let t185 = t92 * t181;
-        let t192 = time[6] * point[1];
-        let t195 = t92 * t174;
-        let t216 = t181 - t192;
-        let t220 = self.fixed[8] * t216;
-        let t227 = self.fixed[9] * t115;
-        let t228 = t227 - self.fixed[13];
-        let t229 = point[0] * t83;
-        let t230 = point[3] * t174;
-        let t231 = t229 - t230;
-        let t232 = t108 * t108;
-        let t386 = time[7] * point[0];
-        let t388 = self.fixed[24] * t156;
-        let t389 = t386 + t388;
-        let t390 = time[0] * t231;
-        let t391 = t166 * t98;
-        let t392 = t390 - t391;
-        let t393 = t392 + t185;
-        let t394 = t83 * t393;
-        let t395 = T::nearest(3.0) * t229;
-        let t396 = point[3] * t192;
-        let t397 = t395 + t396;
-        let t398 = time[0] * t397;
-        let t399 = t98 * t156;
-        let t400 = t398 - t399;
-        let t401 = t400 + t195;
-        let t402 = t98 * t401;
-        let t403 = t394 - t402;
-        let t404 = t228 * t232;
-        let t405 = self.fixed[17] * t403;
-        let t406 = t405 * t404;
-        let t407 = t389 - t406;
-        let t409 = time[8] * point[2];
-        let t410 = t78 * t401;
-        let t411 = t92 * t393;
-        let t412 = t410 - t411;
-        let t413 = t412 * t404;
-        let t414 = t220 + t413;
-        let t416 = self.fixed[25] * t414;
-        let t417 = t409 + t416;
-        crate::nalgebra::SVector::<T, 2>::new(t407, t417)
+        let t65 = time[2] * point[3];
+        let t66 = time[0] * point[3];
+        let t71 = time[1] * point[4];
+        let t78 = time[1] * point[5];
+        let t80 = t65 + T::one();
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t96 = T::one() / t89;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t141 = time[3] * point[0];
+        let t145 = self.fixed[9] * t103;
+        let t146 = t145 - self.fixed[12];
+        let t148 = time[2] * point[0];
+        let t156 = time[4] * point[6];
+        let t163 = time[5] * point[7];
+        let t164 = point[0] * t71;
+        let t165 = point[3] * t156;
+        let t166 = t164 - t165;
+        let t170 = t80 * t163;
+        let t176 = time[6] * point[1];
+        let t185 = t80 * t156;
+        let t193 = t96 * t96;
+        let t199 = t163 - t176;
+        let t203 = self.fixed[8] * t199;
+        let t342 = time[7] * point[0];
+        let t344 = self.fixed[23] * t141;
+        let t345 = t342 + t344;
+        let t346 = time[0] * t166;
+        let t347 = t148 * t86;
+        let t348 = t346 - t347;
+        let t349 = t348 + t170;
+        let t350 = t71 * t349;
+        let t351 = T::nearest(3.0) * t164;
+        let t352 = point[3] * t176;
+        let t353 = t351 + t352;
+        let t354 = time[0] * t353;
+        let t355 = t86 * t141;
+        let t356 = t354 - t355;
+        let t357 = t356 + t185;
+        let t358 = t86 * t357;
+        let t359 = t350 - t358;
+        let t360 = t146 * t193;
+        let t361 = self.fixed[16] * t359;
+        let t362 = t361 * t360;
+        let t363 = t345 - t362;
+        let t365 = time[8] * point[2];
+        let t366 = t66 * t357;
+        let t367 = t80 * t349;
+        let t368 = t366 - t367;
+        let t369 = t368 * t360;
+        let t370 = t203 + t369;
+        let t372 = self.fixed[24] * t370;
+        let t373 = t365 + t372;
+        crate::nalgebra::SVector::<T, 2>::new(t363, t373)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
     #[inline]
     fn state_time(&self, t: T) -> [T; 5] {
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t24 = self.parameters.A * t23;
-        let t36 = t22.sin_pi();
-        let t37 = T::nearest(3.0) * t23;
-        let t39 = T::nearest(4.0) * t36;
-        let t40 = t37 + t39;
-        let t43 = self.fixed[1] * t40;
-        let t76 = self.fixed[7] * t23;
-        let t93 = self.parameters.A * t40;
-        let t136 = self.fixed[10] * t23;
-        [t24, t43, t76, t93, t136]
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t14 = self.parameters.A * t13;
+        let t27 = t12.sin_pi();
+        let t28 = T::nearest(3.0) * t13;
+        let t30 = T::nearest(4.0) * t27;
+        let t31 = t28 + t30;
+        let t34 = self.fixed[1] * t31;
+        let t64 = self.fixed[7] * t13;
+        let t81 = self.parameters.A * t31;
+        let t124 = self.fixed[10] * t13;
+        [t14, t34, t64, t81, t124]
     }
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 2] {
-        let t22 = self.fixed[0] * t;
-        let t23 = t22.cos_pi();
-        let t36 = t22.sin_pi();
-        let t48 = self.fixed[2] * t36;
-        let t51 = T::nearest(4.0) * t23;
-        let t52 = T::nearest(3.0) * t36;
-        let t53 = t51 - t52;
-        let t56 = self.fixed[3] * t53;
-        [t48, t56]
+        let t12 = self.fixed[0] * t;
+        let t13 = t12.cos_pi();
+        let t27 = t12.sin_pi();
+        let t39 = self.fixed[2] * t27;
+        let t42 = T::nearest(4.0) * t13;
+        let t43 = T::nearest(3.0) * t27;
+        let t44 = t42 - t43;
+        let t47 = self.fixed[3] * t44;
+        [t39, t47]
     }
     #[inline]
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 5] {
-        let t3 = T::nearest(3.0).product_error(X[0]);
         let t4 = T::nearest(3.0) * X[0];
-        let t6 = t4.sum_error(X[1]);
-        let t7 = t4 + X[1];
-        let t8 = t3 + t6;
-        let t9 = t7.sin();
-        let t10 = t7.cos();
-        let t12 = T::nearest(0.5) * t8;
-        let t13 = t12 * t9;
-        let t14 = t10 - t13;
-        let t15 = t8 * t14;
-        let t16 = t9 + t15;
-        let t27 = T::nearest(2.0) * X[0];
-        let t28 = t27.cos();
-        let t29 = T::nearest(0.5) * X[1];
-        let t30 = t29.sin_pi();
-        let t31 = t28 * t30;
-        let t32 = T::nearest(2.0) * t31;
-        let t33 = X[1] * X[1];
-        let t34 = X[0] * t33;
-        let t35 = t32 + t34;
-        let t71 = t12 * t10;
-        let t72 = t9 + t71;
-        let t73 = t8 * t72;
-        let t74 = t10 - t73;
-        let t79 = t27.sin();
-        let t80 = t30 * t79;
-        let t81 = T::nearest(4.0) * t80;
-        let t82 = t33 - t81;
-        let t84 = t29.cos_pi();
-        let t85 = t28 * t84;
-        let t86 = T::pi() * t85;
-        let t87 = X[0] * X[1];
-        let t88 = T::nearest(2.0) * t87;
-        let t89 = t86 + t88;
-        [t16, t35, t74, t82, t89]
+        let t5 = t4 + X[1];
+        let t6 = t5.sin();
+        let t17 = T::nearest(2.0) * X[0];
+        let t18 = t17.cos();
+        let t20 = T::nearest(0.5) * X[1];
+        let t21 = t20.sin_pi();
+        let t22 = t18 * t21;
+        let t23 = T::nearest(2.0) * t22;
+        let t24 = X[1] * X[1];
+        let t25 = X[0] * t24;
+        let t26 = t23 + t25;
+        let t62 = t5.cos();
+        let t67 = t17.sin();
+        let t68 = t21 * t67;
+        let t69 = T::nearest(4.0) * t68;
+        let t70 = t24 - t69;
+        let t72 = t20.cos_pi();
+        let t73 = t18 * t72;
+        let t74 = T::pi() * t73;
+        let t75 = X[0] * X[1];
+        let t76 = T::nearest(2.0) * t75;
+        let t77 = t74 + t76;
+        [t6, t26, t62, t70, t77]
     }
     #[inline(always)]
     fn state_staged<const NEAR: bool>(
@@ -1374,66 +1241,66 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
     ) -> crate::State<T, 2> {
         let v = {
             let time = velocity_time;
-            let t49 = time[0] * point[0];
-            let t50 = -t49;
-            let t57 = time[1] * point[1];
-            crate::nalgebra::SVector::<T, 2>::new(t50, t57)
+            let t40 = time[0] * point[0];
+            let t41 = -t40;
+            let t48 = time[1] * point[1];
+            crate::nalgebra::SVector::<T, 2>::new(t41, t48)
         };
-        let t25 = time[0] * point[0];
-        let t44 = time[1] * point[1];
-        let t77 = time[2] * point[2];
-        let t78 = time[0] * point[2];
-        let t83 = time[1] * point[3];
-        let t90 = time[1] * point[4];
-        let t92 = t77 + T::one();
-        let t94 = time[3] * point[4];
-        let t96 = t94 + T::nearest(10.0);
-        let t97 = T::nearest(0.1) * t96;
-        let t98 = t90 + T::one();
-        let t99 = t92 * t98;
-        let t100 = t78 * t83;
-        let t101 = t99 - t100;
-        let t106 = t77 * t98;
-        let t107 = t100 - t106;
-        let t108 = T::one() / t101;
-        let t109 = t107 * t108;
-        let t110 = t77 - t109;
-        let t113 = t106 + t90;
-        let t114 = t113 - t100;
-        let t115 = t114.log_1p();
-        let t116 = self.fixed[8] * t110;
-        let t120 = t98 * t115;
-        let t121 = t120 * t108;
-        let t122 = self.fixed[9] * t121;
-        let t123 = t116 + t122;
-        let t124 = t83 * t108;
-        let t125 = t78 + t124;
-        let t126 = self.fixed[8] * t125;
-        let t127 = t83 * t115;
-        let t128 = t127 * t108;
-        let t129 = self.fixed[9] * t128;
-        let t130 = t126 - t129;
-        let t131 = t78 * t108;
-        let t132 = t83 + t131;
+        let t15 = time[0] * point[0];
+        let t35 = time[1] * point[1];
+        let t65 = time[2] * point[2];
+        let t66 = time[0] * point[2];
+        let t71 = time[1] * point[3];
+        let t78 = time[1] * point[4];
+        let t80 = t65 + T::one();
+        let t82 = time[3] * point[4];
+        let t84 = t82 + T::nearest(10.0);
+        let t85 = T::nearest(0.1) * t84;
+        let t86 = t78 + T::one();
+        let t87 = t80 * t86;
+        let t88 = t66 * t71;
+        let t89 = t87 - t88;
+        let t94 = t65 * t86;
+        let t95 = t88 - t94;
+        let t96 = T::one() / t89;
+        let t97 = t95 * t96;
+        let t98 = t65 - t97;
+        let t101 = t94 + t78;
+        let t102 = t101 - t88;
+        let t103 = t102.log_1p();
+        let t104 = self.fixed[8] * t98;
+        let t108 = t86 * t103;
+        let t109 = t108 * t96;
+        let t110 = self.fixed[9] * t109;
+        let t111 = t104 + t110;
+        let t112 = t71 * t96;
+        let t113 = t66 + t112;
+        let t114 = self.fixed[8] * t113;
+        let t115 = t71 * t103;
+        let t116 = t115 * t96;
+        let t117 = self.fixed[9] * t116;
+        let t118 = t114 - t117;
+        let t119 = t66 * t96;
+        let t120 = t71 + t119;
+        let t121 = self.fixed[8] * t120;
+        let t125 = time[4] * point[2];
+        let t126 = t103 * t96;
+        let t127 = t125 * t126;
+        let t128 = t121 - t127;
+        let t129 = t78 * t80;
+        let t130 = t88 - t129;
+        let t131 = t130 * t96;
+        let t132 = t78 - t131;
         let t133 = self.fixed[8] * t132;
-        let t137 = time[4] * point[2];
-        let t138 = t115 * t108;
-        let t139 = t137 * t138;
-        let t140 = t133 - t139;
-        let t141 = t90 * t92;
-        let t142 = t100 - t141;
-        let t143 = t142 * t108;
-        let t144 = t90 - t143;
-        let t145 = self.fixed[8] * t144;
-        let t146 = t92 * t115;
-        let t147 = t146 * t108;
-        let t148 = self.fixed[9] * t147;
-        let t149 = t145 + t148;
+        let t134 = t80 * t103;
+        let t135 = t134 * t96;
+        let t136 = self.fixed[9] * t135;
+        let t137 = t133 + t136;
         crate::State {
-            u: crate::nalgebra::SVector::<T, 2>::new(t25, t44),
+            u: crate::nalgebra::SVector::<T, 2>::new(t15, t35),
             v,
-            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t92, t78, t83, t97),
-            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t123, t130, t140, t149),
+            F: crate::nalgebra::SMatrix::<T, 2, 2>::new(t80, t66, t71, t85),
+            P: crate::nalgebra::SMatrix::<T, 2, 2>::new(t111, t118, t128, t137),
         }
     }
 }

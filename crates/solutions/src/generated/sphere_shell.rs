@@ -45,7 +45,7 @@ impl<T: crate::Real> Default for SphereShellParameters<T> {
 pub struct SphereShell<T: crate::Real> {
     parameters: SphereShellParameters<T>,
     /// What depends on the parameters only.
-    fixed: [T; 23],
+    fixed: [T; 22],
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
 impl<T: crate::Real> SphereShell<T> {
@@ -172,35 +172,33 @@ impl<T: crate::Real> SphereShell<T> {
         let t139 = parameters.E * parameters.nu;
         let t140 = t114 * t116;
         let t141 = t139 / t140;
-        let t189 = parameters.E * t45;
-        let t190 = t189 / parameters.rho0;
-        let t201 = t141 + t136;
-        let t224 = T::one() / parameters.rho0;
-        let t250 = T::nearest(2.0) / t16;
-        let t252 = parameters.Ri / parameters.Ro;
-        let t253 = T::one() - t252;
-        let t254 = t103 * parameters.Ri;
-        let t255 = t254 * t253;
-        let t256 = t255 / t11;
-        let t261 = T::nearest(2.0) * parameters.Ri;
-        let t262 = t261 / parameters.Ro;
-        let t263 = T::nearest(3.0) - t262;
-        let t265 = t119 * parameters.Ri;
-        let t266 = t265 * t263;
-        let t267 = t266 / t11;
-        let t270 = parameters.Ri * parameters.Ri;
-        let t271 = t263 * t263;
-        let t272 = t127 * t270;
-        let t273 = t272 * t271;
-        let t274 = t273 / t128;
-        let t278 = parameters.A * parameters.Ri;
-        let t279 = t278 * t263;
-        let t280 = t279 / t11;
-        let t291 = T::one() / parameters.Ri;
-        let t299 = parameters.A / parameters.Ro;
-        let t307 = parameters.Ro * t114;
-        let t308 = t307 * t116;
-        let t309 = t139 / t308;
+        let t198 = t141 + t136;
+        let t209 = T::one() / parameters.rho0;
+        let t219 = T::nearest(2.0) / t16;
+        let t221 = parameters.Ri / parameters.Ro;
+        let t222 = T::one() - t221;
+        let t223 = t103 * parameters.Ri;
+        let t224 = t223 * t222;
+        let t225 = t224 / t11;
+        let t230 = T::nearest(2.0) * parameters.Ri;
+        let t231 = t230 / parameters.Ro;
+        let t232 = T::nearest(3.0) - t231;
+        let t234 = t119 * parameters.Ri;
+        let t235 = t234 * t232;
+        let t236 = t235 / t11;
+        let t239 = parameters.Ri * parameters.Ri;
+        let t240 = t232 * t232;
+        let t241 = t127 * t239;
+        let t242 = t241 * t240;
+        let t243 = t242 / t128;
+        let t247 = parameters.A * parameters.Ri;
+        let t248 = t247 * t232;
+        let t249 = t248 / t11;
+        let t260 = T::one() / parameters.Ri;
+        let t268 = parameters.A / parameters.Ro;
+        let t276 = parameters.Ro * t114;
+        let t277 = t276 * t116;
+        let t278 = t139 / t277;
         if !(parameters.Ri < parameters.Ro) {
             return Err(Self::DESCRIPTION.requirement_broken("Ri < Ro", &values));
         }
@@ -219,17 +217,16 @@ impl<T: crate::Real> SphereShell<T> {
                 t129,
                 t136,
                 t141,
-                t190,
-                t201,
-                t224,
-                t250,
-                t256,
-                t267,
-                t274,
-                t280,
-                t291,
-                t299,
-                t309,
+                t198,
+                t209,
+                t219,
+                t225,
+                t236,
+                t243,
+                t249,
+                t260,
+                t268,
+                t278,
             ],
         })
     }
@@ -626,6 +623,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t23 = T::nearest(3.0) - t21;
         let t25 = self.fixed[2] * t18;
         let t26 = t8 * t23;
+        let t50 = self.fixed[4] * t18;
         let t59 = self.fixed[5] * t8;
         let t60 = T::one() - t59;
         let t66 = T::one() / t7;
@@ -637,49 +635,54 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t107 = t105 * t106;
         let t108 = t107 + T::one();
         let t109 = t25 * t26;
+        let t110 = t109 + T::one();
+        let t111 = t110 * t110;
+        let t112 = t108 * t111;
+        let t117 = t18 * t26;
+        let t118 = t117 * t108;
+        let t121 = self.fixed[8] * t118;
+        let t122 = t18 * t18;
+        let t123 = t23 * t23;
+        let t124 = t7 * t123;
+        let t125 = t122 * t124;
+        let t126 = t125 * t108;
+        let t130 = self.fixed[9] * t126;
+        let t131 = t121 + t130;
+        let t132 = t131 + t107;
+        let t133 = t132.ln_of_both(t112);
         let t137 = T::one() / t108;
-        let t162 = t25 * t23;
-        let t188 = t8 * t162;
-        let t191 = self.fixed[12] * t8;
-        let t192 = t191 * t188;
-        let t193 = T::one() - t21;
-        let t194 = t105 * t193;
-        let t195 = self.fixed[8] * t18;
-        let t196 = t195 * t23;
-        let t197 = T::nearest(2.0) * t67;
-        let t198 = t197 * t107;
-        let t199 = t194 - t196;
-        let t200 = t199 + t198;
-        let t202 = t107 * t188;
-        let t203 = t188 + t202;
-        let t204 = T::nearest(2.0) * t203;
-        let t205 = t188 * t188;
-        let t206 = t109 * t202;
-        let t207 = t204 + t107;
-        let t208 = t207 + t205;
-        let t209 = t208 + t206;
-        let t210 = t188 + T::one();
-        let t211 = t210 * t210;
-        let t212 = t108 * t211;
-        let t213 = t209.ln_of_both(t212);
-        let t214 = self.fixed[11] * t213;
-        let t215 = self.fixed[13] - t214;
-        let t216 = t194 * t137;
-        let t217 = t195 * t73;
-        let t218 = t217 / t210;
-        let t219 = t216 + t218;
-        let t220 = self.fixed[10] * t200;
-        let t221 = t215 * t219;
-        let t222 = t221 * t137;
-        let t223 = t220 + t222;
-        let t225 = self.fixed[14] * t223;
-        let t226 = t192 + t225;
-        let t227 = -t226;
-        let t228 = t67 * t227;
-        let t229 = X[0] * t228;
-        let t230 = X[1] * t228;
-        let t231 = X[2] * t228;
-        crate::nalgebra::SVector::<T, 3>::new(t229, t230, t231)
+        let t146 = T::one() / t110;
+        let t158 = self.fixed[11] * t133;
+        let t188 = t7 * t23;
+        let t189 = t50 * t188;
+        let t190 = T::one() - t21;
+        let t191 = t105 * t190;
+        let t192 = self.fixed[8] * t18;
+        let t193 = t192 * t23;
+        let t194 = T::nearest(2.0) * t67;
+        let t195 = t194 * t107;
+        let t196 = t191 - t193;
+        let t197 = t196 + t195;
+        let t199 = t158 - self.fixed[12];
+        let t200 = -t199;
+        let t201 = t191 * t137;
+        let t202 = t192 * t73;
+        let t203 = t202 * t146;
+        let t204 = t201 + t203;
+        let t205 = self.fixed[10] * t197;
+        let t206 = t200 * t204;
+        let t207 = t206 * t137;
+        let t208 = t205 + t207;
+        let t210 = self.fixed[13] * t208;
+        let t211 = t189 + t210;
+        let t212 = -t211;
+        let t213 = X[0] * t67;
+        let t214 = t213 * t212;
+        let t215 = X[1] * t67;
+        let t216 = t215 * t212;
+        let t217 = X[2] * t67;
+        let t218 = t217 * t212;
+        crate::nalgebra::SVector::<T, 3>::new(t214, t216, t218)
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t3 = X[1] * X[1];
@@ -824,46 +827,35 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         let t185 = t182 + t184;
         let t186 = t67 * t185;
         let t187 = t158 - t186;
-        let t188 = t8 * t162;
-        let t191 = self.fixed[12] * t8;
-        let t192 = t191 * t188;
-        let t193 = T::one() - t21;
-        let t194 = t105 * t193;
-        let t195 = self.fixed[8] * t18;
-        let t196 = t195 * t23;
-        let t197 = T::nearest(2.0) * t67;
-        let t198 = t197 * t107;
-        let t199 = t194 - t196;
-        let t200 = t199 + t198;
-        let t202 = t107 * t188;
-        let t203 = t188 + t202;
-        let t204 = T::nearest(2.0) * t203;
-        let t205 = t188 * t188;
-        let t206 = t109 * t202;
-        let t207 = t204 + t107;
-        let t208 = t207 + t205;
-        let t209 = t208 + t206;
-        let t210 = t188 + T::one();
-        let t211 = t210 * t210;
-        let t212 = t108 * t211;
-        let t213 = t209.ln_of_both(t212);
-        let t214 = self.fixed[11] * t213;
-        let t215 = self.fixed[13] - t214;
-        let t216 = t194 * t137;
-        let t217 = t195 * t73;
-        let t218 = t217 / t210;
-        let t219 = t216 + t218;
-        let t220 = self.fixed[10] * t200;
-        let t221 = t215 * t219;
-        let t222 = t221 * t137;
-        let t223 = t220 + t222;
-        let t225 = self.fixed[14] * t223;
-        let t226 = t192 + t225;
-        let t227 = -t226;
-        let t228 = t67 * t227;
-        let t229 = X[0] * t228;
-        let t230 = X[1] * t228;
-        let t231 = X[2] * t228;
+        let t188 = t7 * t23;
+        let t189 = t50 * t188;
+        let t190 = T::one() - t21;
+        let t191 = t105 * t190;
+        let t192 = self.fixed[8] * t18;
+        let t193 = t192 * t23;
+        let t194 = T::nearest(2.0) * t67;
+        let t195 = t194 * t107;
+        let t196 = t191 - t193;
+        let t197 = t196 + t195;
+        let t199 = t158 - self.fixed[12];
+        let t200 = -t199;
+        let t201 = t191 * t137;
+        let t202 = t192 * t73;
+        let t203 = t202 * t146;
+        let t204 = t201 + t203;
+        let t205 = self.fixed[10] * t197;
+        let t206 = t200 * t204;
+        let t207 = t206 * t137;
+        let t208 = t205 + t207;
+        let t210 = self.fixed[13] * t208;
+        let t211 = t189 + t210;
+        let t212 = -t211;
+        let t213 = X[0] * t67;
+        let t214 = t213 * t212;
+        let t215 = X[1] * t67;
+        let t216 = t215 * t212;
+        let t217 = X[2] * t67;
+        let t218 = t217 * t212;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t28, t30, t32),
             v: crate::nalgebra::SVector::<T, 3>::new(t40, t42, t44),
@@ -884,7 +876,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 3,
                 3,
             >::new(t160, t167, t170, t167, t177, t180, t170, t180, t187),
-            b: crate::nalgebra::SVector::<T, 3>::new(t229, t230, t231),
+            b: crate::nalgebra::SVector::<T, 3>::new(t214, t216, t218),
         }
     }
     fn traction(
@@ -898,50 +890,50 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
                 let t122 = t18 * t18;
-                let t257 = self.fixed[16] * t18;
-                let t258 = t257 + T::one();
-                let t259 = T::one() / t258;
-                let t260 = t259 + T::one();
-                let t264 = t18 * t258;
-                let t268 = self.fixed[17] * t264;
-                let t269 = t122 * t258;
-                let t275 = self.fixed[18] * t269;
-                let t276 = t268 + t275;
-                let t277 = t276 + t257;
-                let t281 = self.fixed[19] * t18;
-                let t282 = t281 + T::one();
-                let t283 = t282 * t282;
-                let t284 = t258 * t283;
-                let t285 = t277.ln_of_both(t284);
-                let t286 = t257 * t260;
-                let t287 = self.fixed[10] * t286;
-                let t288 = t285 * t259;
-                let t289 = self.fixed[11] * t288;
-                let t290 = t287 + t289;
-                let t292 = self.fixed[20] * t290;
-                let t293 = t292 * X[0];
-                let t294 = -t293;
-                let t295 = t292 * X[1];
-                let t296 = -t295;
-                let t297 = t292 * X[2];
-                let t298 = -t297;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t294, t296, t298))
+                let t226 = self.fixed[15] * t18;
+                let t227 = t226 + T::one();
+                let t228 = T::one() / t227;
+                let t229 = t228 + T::one();
+                let t233 = t18 * t227;
+                let t237 = self.fixed[16] * t233;
+                let t238 = t122 * t227;
+                let t244 = self.fixed[17] * t238;
+                let t245 = t237 + t244;
+                let t246 = t245 + t226;
+                let t250 = self.fixed[18] * t18;
+                let t251 = t250 + T::one();
+                let t252 = t251 * t251;
+                let t253 = t227 * t252;
+                let t254 = t246.ln_of_both(t253);
+                let t255 = t226 * t229;
+                let t256 = self.fixed[10] * t255;
+                let t257 = t254 * t228;
+                let t258 = self.fixed[11] * t257;
+                let t259 = t256 + t258;
+                let t261 = self.fixed[19] * t259;
+                let t262 = t261 * X[0];
+                let t263 = -t262;
+                let t264 = t261 * X[1];
+                let t265 = -t264;
+                let t266 = t261 * X[2];
+                let t267 = -t266;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t263, t265, t267))
             }
             crate::Surface::Outer => {
                 let t17 = self.fixed[0] * t;
                 let t18 = t17.cos_pi();
-                let t300 = self.fixed[21] * t18;
-                let t301 = t300 + T::nearest(2.0);
-                let t302 = t18 * t301;
-                let t303 = self.fixed[21] * t302;
-                let t304 = t300 + T::one();
-                let t305 = t304 * t304;
-                let t306 = t303.ln_of_both(t305);
-                let t310 = self.fixed[22] * t306;
-                let t311 = t310 * X[0];
-                let t312 = t310 * X[1];
-                let t313 = t310 * X[2];
-                Some(crate::nalgebra::SVector::<T, 3>::new(t311, t312, t313))
+                let t269 = self.fixed[20] * t18;
+                let t270 = t269 + T::nearest(2.0);
+                let t271 = t18 * t270;
+                let t272 = self.fixed[20] * t271;
+                let t273 = t269 + T::one();
+                let t274 = t273 * t273;
+                let t275 = t272.ln_of_both(t274);
+                let t279 = self.fixed[21] * t275;
+                let t280 = t279 * X[0];
+                let t281 = t279 * X[1];
+                let t282 = t279 * X[2];
+                Some(crate::nalgebra::SVector::<T, 3>::new(t280, t281, t282))
             }
             crate::Surface::Lower(0) => {
                 let t3 = X[1] * X[1];
@@ -988,12 +980,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t314 = t64 * t67;
-                let t315 = t25 * t314;
-                let t316 = t315 * t151;
-                let t317 = t158 - t316;
-                let t318 = -t317;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t318, T::zero(), T::zero()))
+                let t283 = t64 * t67;
+                let t284 = t25 * t283;
+                let t285 = t284 * t151;
+                let t286 = t158 - t285;
+                let t287 = -t286;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t287, T::zero(), T::zero()))
             }
             crate::Surface::Lower(1) => {
                 let t3 = X[1] * X[1];
@@ -1041,12 +1033,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t320 = t85 * t67;
-                let t321 = t25 * t320;
-                let t322 = t321 * t151;
-                let t323 = t158 - t322;
-                let t324 = -t323;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t324, T::zero()))
+                let t289 = t85 * t67;
+                let t290 = t25 * t289;
+                let t291 = t290 * t151;
+                let t292 = t158 - t291;
+                let t293 = -t292;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), t293, T::zero()))
             }
             crate::Surface::Lower(2) => {
                 let t3 = X[1] * X[1];
@@ -1094,12 +1086,12 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
                 let t150 = self.fixed[10] * t147;
                 let t151 = t149 - t150;
                 let t158 = self.fixed[11] * t133;
-                let t325 = t96 * t67;
-                let t326 = t25 * t325;
-                let t327 = t326 * t151;
-                let t328 = t158 - t327;
-                let t329 = -t328;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t329))
+                let t294 = t96 * t67;
+                let t295 = t25 * t294;
+                let t296 = t295 * t151;
+                let t297 = t158 - t296;
+                let t298 = -t297;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t298))
             }
             _ => None,
         }
@@ -1150,7 +1142,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for SphereShell<T> {
         self.fixed[0]
     }
     fn period(&self) -> T {
-        self.fixed[15]
+        self.fixed[14]
     }
     fn body_force_on(
         &self,
@@ -1176,8 +1168,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for SphereShell<T> {
         let t50 = self.fixed[4] * t18;
         let t105 = self.fixed[7] * t18;
         let t122 = t18 * t18;
-        let t195 = self.fixed[8] * t18;
-        [t18, t25, t50, t105, t122, t195]
+        let t192 = self.fixed[8] * t18;
+        [t18, t25, t50, t105, t122, t192]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 6] {
@@ -1189,11 +1181,11 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for SphereShell<T> {
         let t8 = t7.sqrt();
         let t66 = T::one() / t7;
         let t67 = t8 * t66;
-        let t197 = T::nearest(2.0) * t67;
-        let t244 = X[0] * t67;
-        let t246 = X[1] * t67;
-        let t248 = X[2] * t67;
-        [t7, t8, t197, t244, t246, t248]
+        let t194 = T::nearest(2.0) * t67;
+        let t213 = X[0] * t67;
+        let t215 = X[1] * t67;
+        let t217 = X[2] * t67;
+        [t7, t8, t194, t213, t215, t217]
     }
     #[inline(always)]
     fn body_force_staged<const NEAR: bool>(
@@ -1229,31 +1221,31 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 6, 6> for SphereShell<T> {
         let t137 = T::one() / t108;
         let t146 = T::one() / t110;
         let t158 = self.fixed[11] * t133;
-        let t193 = T::one() - t21;
-        let t194 = time[3] * t193;
-        let t196 = time[5] * t23;
-        let t198 = point[2] * t107;
-        let t199 = t194 - t196;
-        let t200 = t199 + t198;
-        let t216 = t194 * t137;
-        let t217 = time[5] * t73;
-        let t220 = self.fixed[10] * t200;
-        let t232 = point[0] * t23;
-        let t233 = time[2] * t232;
-        let t234 = t158 - self.fixed[13];
-        let t235 = -t234;
-        let t236 = t217 * t146;
-        let t237 = t216 + t236;
-        let t238 = t235 * t237;
-        let t239 = t238 * t137;
-        let t240 = t220 + t239;
-        let t241 = self.fixed[14] * t240;
-        let t242 = t233 + t241;
-        let t243 = -t242;
-        let t245 = point[3] * t243;
-        let t247 = point[4] * t243;
-        let t249 = point[5] * t243;
-        crate::nalgebra::SVector::<T, 3>::new(t245, t247, t249)
+        let t188 = point[0] * t23;
+        let t189 = time[2] * t188;
+        let t190 = T::one() - t21;
+        let t191 = time[3] * t190;
+        let t193 = time[5] * t23;
+        let t195 = point[2] * t107;
+        let t196 = t191 - t193;
+        let t197 = t196 + t195;
+        let t199 = t158 - self.fixed[12];
+        let t200 = -t199;
+        let t201 = t191 * t137;
+        let t202 = time[5] * t73;
+        let t203 = t202 * t146;
+        let t204 = t201 + t203;
+        let t205 = self.fixed[10] * t197;
+        let t206 = t200 * t204;
+        let t207 = t206 * t137;
+        let t208 = t205 + t207;
+        let t210 = self.fixed[13] * t208;
+        let t211 = t189 + t210;
+        let t212 = -t211;
+        let t214 = point[3] * t212;
+        let t216 = point[4] * t212;
+        let t218 = point[5] * t212;
+        crate::nalgebra::SVector::<T, 3>::new(t214, t216, t218)
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

@@ -124,19 +124,19 @@ impl<T: crate::Real> Torsion<T> {
         let t76 = t75 / t74;
         let t78 = parameters.A * t76;
         let t87 = T::nearest(2.0) * t44;
-        let t90 = parameters.A / t74;
-        let t94 = t10 * parameters.E;
-        let t95 = t94 / parameters.rho0;
-        let t109 = T::nearest(2.0) / t6;
-        let t110 = T::nearest(2.0) * parameters.nu;
-        let t111 = T::one() - t110;
-        let t112 = parameters.E * parameters.nu;
-        let t113 = t74 * t111;
-        let t114 = t112 / t113;
-        let t115 = -T::nearest(0.5);
+        let t91 = parameters.A / t74;
+        let t95 = t10 * parameters.E;
+        let t96 = t95 / parameters.rho0;
+        let t102 = T::nearest(2.0) / t6;
+        let t103 = T::nearest(2.0) * parameters.nu;
+        let t104 = T::one() - t103;
+        let t105 = parameters.E * parameters.nu;
+        let t106 = t74 * t104;
+        let t107 = t105 / t106;
+        let t108 = -T::nearest(0.5);
         Ok(Torsion {
             parameters,
-            fixed: [t6, t10, t35, t53, t76, t78, t87, t90, t95, t109, t114, t115],
+            fixed: [t6, t10, t35, t53, t76, t78, t87, t91, t96, t102, t107, t108],
         })
     }
     /// The solution with parameter values in the order of the description; missing ones take their
@@ -425,15 +425,16 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t58 = t56 - t57;
         let t88 = self.fixed[6] * X[2];
         let t89 = t88 * t50;
-        let t91 = self.fixed[7] * t8;
-        let t92 = t91 * t56;
-        let t93 = t89 - t92;
-        let t96 = self.fixed[8] * t93;
-        let t97 = t88 * t58;
-        let t98 = t91 * t45;
-        let t99 = t97 + t98;
-        let t100 = self.fixed[8] * t99;
-        crate::nalgebra::SVector::<T, 3>::new(t96, t100, T::zero())
+        let t90 = t8 * t8;
+        let t92 = self.fixed[7] * t90;
+        let t93 = t92 * t41;
+        let t94 = t89 - t93;
+        let t97 = self.fixed[8] * t94;
+        let t98 = t88 * t58;
+        let t99 = t92 * t33;
+        let t100 = t98 + t99;
+        let t101 = self.fixed[8] * t100;
+        crate::nalgebra::SVector::<T, 3>::new(t97, t101, T::zero())
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 3>, t: T) -> crate::Fields<T, 3> {
         let t7 = self.fixed[0] * t;
@@ -499,14 +500,15 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t86 = t79 * X[0];
         let t88 = self.fixed[6] * X[2];
         let t89 = t88 * t50;
-        let t91 = self.fixed[7] * t8;
-        let t92 = t91 * t56;
-        let t93 = t89 - t92;
-        let t96 = self.fixed[8] * t93;
-        let t97 = t88 * t58;
-        let t98 = t91 * t45;
-        let t99 = t97 + t98;
-        let t100 = self.fixed[8] * t99;
+        let t90 = t8 * t8;
+        let t92 = self.fixed[7] * t90;
+        let t93 = t92 * t41;
+        let t94 = t89 - t93;
+        let t97 = self.fixed[8] * t94;
+        let t98 = t88 * t58;
+        let t99 = t92 * t33;
+        let t100 = t98 + t99;
+        let t101 = self.fixed[8] * t100;
         crate::Fields {
             u: crate::nalgebra::SVector::<T, 3>::new(t23, t28, T::zero()),
             v: crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero()),
@@ -537,7 +539,7 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 t86,
                 T::zero(),
             ),
-            b: crate::nalgebra::SVector::<T, 3>::new(t96, t100, T::zero()),
+            b: crate::nalgebra::SVector::<T, 3>::new(t97, t101, T::zero()),
         }
     }
     fn traction(
@@ -567,8 +569,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 let t8 = t7.sin_pi();
                 let t79 = self.fixed[5] * t8;
                 let t86 = t79 * X[0];
-                let t116 = -t86;
-                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t116))
+                let t109 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(T::zero(), T::zero(), t109))
             }
             crate::Surface::Upper(1) => {
                 let t7 = self.fixed[0] * t;
@@ -583,32 +585,32 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 let t79 = self.fixed[5] * t8;
                 let t84 = t79 * X[1];
                 let t86 = t79 * X[0];
-                let t116 = -t86;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t84, t116, T::zero()))
+                let t109 = -t86;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t84, t109, T::zero()))
             }
             crate::Surface::Upper(2) => {
                 let t7 = self.fixed[0] * t;
                 let t8 = t7.sin_pi();
                 let t11 = self.fixed[1] * t8;
                 let t79 = self.fixed[5] * t8;
-                let t117 = t11.cos();
-                let t118 = t11.sin();
-                let t119 = t117 * X[0];
-                let t120 = t118 * X[1];
-                let t121 = t119 - t120;
-                let t122 = t118 * t121;
-                let t123 = T::nearest(2.0) * t122;
-                let t124 = X[1] + t123;
-                let t125 = t79 * t124;
-                let t126 = -t125;
-                let t127 = t117 * X[1];
-                let t128 = t118 * X[0];
-                let t129 = t127 + t128;
-                let t130 = t118 * t129;
-                let t131 = T::nearest(2.0) * t130;
-                let t132 = X[0] - t131;
-                let t133 = t79 * t132;
-                Some(crate::nalgebra::SVector::<T, 3>::new(t126, t133, T::zero()))
+                let t110 = t11.cos();
+                let t111 = t11.sin();
+                let t112 = t110 * X[0];
+                let t113 = t111 * X[1];
+                let t114 = t112 - t113;
+                let t115 = t111 * t114;
+                let t116 = T::nearest(2.0) * t115;
+                let t117 = X[1] + t116;
+                let t118 = t79 * t117;
+                let t119 = -t118;
+                let t120 = t110 * X[1];
+                let t121 = t111 * X[0];
+                let t122 = t120 + t121;
+                let t123 = t111 * t122;
+                let t124 = T::nearest(2.0) * t123;
+                let t125 = X[0] - t124;
+                let t126 = t79 * t125;
+                Some(crate::nalgebra::SVector::<T, 3>::new(t119, t126, T::zero()))
             }
             _ => None,
         }
@@ -705,9 +707,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t31 = t7.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t101 = t8 * t8;
-        let t102 = self.fixed[7] * t101;
-        [t8, t11, t47, t102]
+        let t90 = t8 * t8;
+        let t92 = self.fixed[7] * t90;
+        [t8, t11, t47, t92]
     }
     #[inline]
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 3>) -> [T; 3] {
@@ -743,14 +745,14 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         let t58 = t56 - t57;
         let t88 = self.fixed[6] * point[0];
         let t89 = t88 * t50;
-        let t97 = t88 * t58;
-        let t103 = time[3] * t41;
-        let t104 = t89 - t103;
-        let t105 = self.fixed[8] * t104;
-        let t106 = time[3] * t33;
-        let t107 = t97 + t106;
-        let t108 = self.fixed[8] * t107;
-        crate::nalgebra::SVector::<T, 3>::new(t105, t108, T::zero())
+        let t93 = time[3] * t41;
+        let t94 = t89 - t93;
+        let t97 = self.fixed[8] * t94;
+        let t98 = t88 * t58;
+        let t99 = time[3] * t33;
+        let t100 = t98 + t99;
+        let t101 = self.fixed[8] * t100;
+        crate::nalgebra::SVector::<T, 3>::new(t97, t101, T::zero())
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]
@@ -763,12 +765,12 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
         let t31 = t7.cos_pi();
         let t46 = t31 * t31;
         let t47 = self.parameters.A * t46;
-        let t101 = t8 * t8;
-        let t102 = self.fixed[7] * t101;
-        let t137 = T::nearest(2.0) * t8;
-        let t143 = T::nearest(2.0) * t47;
-        let t155 = T::nearest(2.0) * t102;
-        [t8, t11, t47, t102, t137, t143, t155]
+        let t90 = t8 * t8;
+        let t92 = self.fixed[7] * t90;
+        let t130 = T::nearest(2.0) * t8;
+        let t136 = T::nearest(2.0) * t47;
+        let t148 = T::nearest(2.0) * t92;
+        [t8, t11, t47, t92, t130, t136, t148]
     }
     #[inline]
     fn lattice_coordinate(
@@ -778,12 +780,12 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
     ) -> [T; 1] {
         match axis {
             0 => {
-                let t163 = self.fixed[8] * X[0];
-                [t163]
+                let t156 = self.fixed[8] * X[0];
+                [t156]
             }
             1 => {
-                let t165 = self.fixed[8] * X[1];
-                [t165]
+                let t158 = self.fixed[8] * X[1];
+                [t158]
             }
             2 => [X[2]],
             _ => [T::zero(); 1],
@@ -801,33 +803,33 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
                 let t48 = time[2] * point[0];
                 let t60 = t13 * t13;
                 let t88 = self.fixed[6] * point[0];
-                let t134 = t16 * t16;
-                let t135 = t134 - t60;
-                let t136 = t60 - t134;
-                let t138 = t13 * t16;
-                let t139 = time[4] * t138;
-                let t140 = t48 * t136;
-                let t141 = t139 + t140;
-                let t142 = time[0] * t135;
-                let t144 = time[5] * point[0];
-                let t145 = t144 * t138;
-                let t146 = t142 + t145;
-                let t147 = time[0] * t136;
-                let t148 = t147 - t145;
-                let t149 = t48 * t135;
-                let t150 = t139 - t149;
+                let t127 = t16 * t16;
+                let t128 = t127 - t60;
+                let t129 = t60 - t127;
+                let t131 = t13 * t16;
+                let t132 = time[4] * t131;
+                let t133 = t48 * t129;
+                let t134 = t132 + t133;
+                let t135 = time[0] * t128;
+                let t137 = time[5] * point[0];
+                let t138 = t137 * t131;
+                let t139 = t135 + t138;
+                let t140 = time[0] * t129;
+                let t141 = t140 - t138;
+                let t142 = t48 * t128;
+                let t143 = t132 - t142;
+                let t144 = t88 * t134;
+                let t145 = time[3] * t129;
+                let t146 = t144 - t145;
+                let t147 = t88 * t139;
+                let t149 = time[6] * t131;
+                let t150 = t147 - t149;
                 let t151 = t88 * t141;
-                let t152 = time[3] * t136;
-                let t153 = t151 - t152;
-                let t154 = t88 * t146;
-                let t156 = time[6] * t138;
-                let t157 = t154 - t156;
-                let t158 = t88 * t148;
-                let t159 = t158 + t156;
-                let t160 = t88 * t150;
-                let t161 = time[3] * t135;
-                let t162 = t160 + t161;
-                [t153, t157, t159, t162]
+                let t152 = t151 + t149;
+                let t153 = t88 * t143;
+                let t154 = time[3] * t128;
+                let t155 = t153 + t154;
+                [t146, t150, t152, t155]
             }
             _ => [T::zero(); 4],
         }
@@ -838,13 +840,13 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
         time: &[T; 7],
         layers: [&[T; 4]; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
-        let t164 = layers[0][0] * layers[2][0];
-        let t166 = layers[1][0] * layers[2][1];
-        let t167 = t164 + t166;
-        let t168 = layers[0][0] * layers[2][2];
-        let t169 = layers[1][0] * layers[2][3];
-        let t170 = t168 + t169;
-        crate::nalgebra::SVector::<T, 3>::new(t167, t170, T::zero())
+        let t157 = layers[0][0] * layers[2][0];
+        let t159 = layers[1][0] * layers[2][1];
+        let t160 = t157 + t159;
+        let t161 = layers[0][0] * layers[2][2];
+        let t162 = layers[1][0] * layers[2][3];
+        let t163 = t161 + t162;
+        crate::nalgebra::SVector::<T, 3>::new(t160, t163, T::zero())
     }
 }
 #[allow(unused_variables, clippy::all, clippy::pedantic)]

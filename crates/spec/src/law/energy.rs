@@ -5,11 +5,10 @@
 //! ([`Graph::split_at_zero`]), so that no digits are lost at small strain. By the chain rule
 //! `Div P = A(0) : grad H + (A - A(0)) : grad H`, linear part and remainder.
 
-use super::kinematics::doubled_strain;
 use super::{Deformation, Stress, modulus_at_rest, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, cofactor, determinant, principal_minors};
-use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node};
+use mmsmith_expr::{Ast, Derivatives, Expr, Function, Graph, Node, Rule};
 use mmsmith_vocabulary::Constant;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -56,7 +55,6 @@ impl ComponentLaw {
     ) -> Self {
         let h = symbols(graph, deformation.H.len());
         let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
-        let W = if deformation.is_isochoric() { linear_in_volume(graph, W) } else { W };
         let energy = graph.replace(W, &replacement);
         let mut derivatives = Derivatives::limited();
         let P = h
@@ -98,18 +96,10 @@ impl ComponentLaw {
             let value = zero_if_vanishing(graph, value);
             *entry = graph.add(value, rest);
         }
-        let doubled_strain = match &deformation.turn {
-            Some(_) => vec![vec![None; n]; n],
-            None => doubled_strain(derivation, deformation),
-        };
-        let graph = &mut derivation.graph;
         let mut P = stress.clone();
-        for (i, J) in (0..n).flat_map(|i| (0..n).map(move |J| (i, J))) {
-            let apart = doubled_strain[i][J]
-                .and_then(|strain| self.with_strain(graph, P[i][J], [i, J], strain, &small));
-            let entry = apart.unwrap_or(P[i][J]);
-            let entry = graph.replace(entry, &actual);
-            P[i][J] = zero_if_vanishing(graph, entry);
+        for entry in P.iter_mut().flatten() {
+            let value = graph.replace(*entry, &actual);
+            *entry = zero_if_vanishing(graph, value);
         }
 
         let open = derivation.second_gradient(&deformation.open, self.isotropic);
@@ -159,39 +149,6 @@ impl ComponentLaw {
     }
 }
 
-impl ComponentLaw {
-    /// An entry of `P` beside the diagonal, with what is of first order in `h_iJ` and `h_Ji` as a multiple of `strain`, their sum. `None`
-    /// where their moduli differ at rest, or the rest has no form of second order.
-    fn with_strain(
-        &self,
-        graph: &mut Graph,
-        entry: Expr,
-        [i, J]: [usize; 2],
-        strain: Expr,
-        small: &BTreeSet<Expr>,
-    ) -> Option<Expr> {
-        let mut derivatives = Derivatives::limited();
-        let mut modulus = |graph: &mut Graph, h: Expr| {
-            let slope = derivatives.of(graph, entry, h);
-            let (value, _) = graph.split_at_zero(slope, small);
-            zero_if_vanishing(graph, value)
-        };
-        let pair = [self.h[i][J], self.h[J][i]];
-        let [own, other] = pair.map(|h| modulus(graph, h));
-        let apart = graph.sub(own, other);
-        if !graph.vanishes(apart) {
-            return None;
-        }
-        let mut terms = vec![graph.mul(own, strain)];
-        for &h in self.h.iter().flatten().filter(|h| !pair.contains(h)) {
-            let modulus = modulus(graph, h);
-            terms.push(graph.mul(modulus, h));
-        }
-        terms.push(graph.beyond_linear(entry, small)?);
-        Some(graph.sum_of(terms))
-    }
-}
-
 /// `lambda ln J` and `P - lambda ln J I`, for a `P` that is linear in `ln J`: with its slope `c` this is
 /// `P(ln J = 0) + (c - lambda F^-T) ln J - lambda ln J H^T F^-T`. The modulus `lambda` of a change of volume, which next to
 /// incompressibility is large, then leaves nothing of its size in differences of diagonal entries. Zero and `P` for others.
@@ -203,7 +160,7 @@ fn isotropic_and_rest(
 ) -> (Expr, Matrix) {
     let lambda = zero_if_vanishing(graph, lambda);
     let pressure = graph.mul(lambda, deformation.log_J);
-    if pressure == Graph::ZERO {
+    if pressure == Graph::ZERO || Rule::PressureApart.is_off() {
         return (Graph::ZERO, P.clone());
     }
     let log_J = graph.symbol("ln J");
@@ -231,17 +188,6 @@ fn isotropic_and_rest(
         }
     }
     (pressure, rest)
-}
-
-/// The energy up to first order in `J - 1`: of the same stress in every motion with `J = 1`, and so of the same divergence.
-fn linear_in_volume(graph: &mut Graph, W: Expr) -> Expr {
-    let J = graph.symbol("J");
-    let slope = Derivatives::limited().of(graph, W, J);
-    let at_one = BTreeMap::from([(J, Graph::ONE)]);
-    let (value, slope) = (graph.replace(W, &at_one), graph.replace(slope, &at_one));
-    let change = graph.sub(J, Graph::ONE);
-    let first = graph.mul(slope, change);
-    graph.add(value, first)
 }
 
 fn indices(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
@@ -351,7 +297,7 @@ fn in_components(graph: &mut Graph, h: &Matrix, deformation: &Deformation) -> Co
     for (k, row) in present.iter_mut().enumerate() {
         row[k] = graph.add(Graph::ONE, row[k]);
     }
-    if matches!(graph.node(deformation.J), Node::Product(_)) {
+    if matches!(graph.node(deformation.J), Node::Product(_)) && !Rule::Quotients.is_off() {
         let product = determinant(graph, &present);
         let volume_change = graph.replace(volume_change, &simpler);
         simpler.insert(J, product);

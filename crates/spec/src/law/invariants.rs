@@ -38,18 +38,11 @@ pub(super) fn stress(derivation: &mut Derivation, deformation: &Deformation, W: 
     let law = Law::new(graph, deformation, &kinematics, W);
 
     let n = H.len();
-    let off_diagonal = graph.sub(law.N, law.S);
-    let off_diagonal = graph.whole(off_diagonal);
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
-            let (first, factor) = match kinematics.is_small[i][j] {
-                true => (D[i][j], law.N),
-                // H^T F^-T is -F^-T there.
-                false => (H[i][j], off_diagonal),
-            };
-            let terms = [graph.mul(law.S, first), graph.mul(factor, f[i][j])];
+            let terms = [graph.mul(law.S, D[i][j]), graph.mul(law.N, f[i][j])];
             let entry = graph.sum_of(terms);
             P[i][j] = zero_if_vanishing(graph, entry);
             let shear = graph.mul(law.S, D[i][j]);

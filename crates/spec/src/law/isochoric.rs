@@ -53,24 +53,14 @@ pub(super) fn stress(
     let scale = graph.whole(scale);
     let pressure = zero_if_vanishing(graph, law.pressure);
     let normal = law.normal(graph);
-    // With an entry of F^-T that is small itself, where no digits are lost to the difference.
-    let of_trace = graph.product_of([scale, law.kinematics.trace]);
-    let of_trace = graph.sum([(Rational::new((-1).into(), 3.into()), of_trace)]);
-    let off_diagonal =
-        graph.sum([(1.into(), pressure), (1.into(), of_trace), ((-1).into(), scale)]);
-    let off_diagonal = graph.whole(off_diagonal);
     let n = deformation.H.len();
     let mut P = vec![vec![Graph::ZERO; n]; n];
     let mut anisotropic = P.clone();
     for i in 0..n {
         for j in 0..n {
             let f = deformation.inverse_transpose[i][j];
-            let (first, factor) = match law.kinematics.is_small[i][j] {
-                true => (law.kinematics.difference[i][j], normal),
-                // H^T F^-T is -F^-T there.
-                false => (deformation.H[i][j], off_diagonal),
-            };
-            let terms = [graph.mul(scale, first), graph.mul(factor, f)];
+            let shear = law.kinematics.difference[i][j];
+            let terms = [graph.mul(scale, shear), graph.mul(normal, f)];
             let entry = graph.sum_of(terms);
             P[i][j] = zero_if_vanishing(graph, entry);
             let shear = graph.mul(scale, law.K[i][j]);

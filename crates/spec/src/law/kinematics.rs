@@ -4,7 +4,7 @@ use super::{Deformation, Divergence, OfGradient, modulus_at_rest, zero_if_vanish
 use crate::derivation::Derivation;
 use crate::derivation::is_joined;
 use crate::tensor::{Matrix, Vector, determinant, matrix_product, minors_beyond_trace};
-use mmsmith_expr::{Expr, Function, Graph, Rational};
+use mmsmith_expr::{Expr, Function, Graph, Rational, Rule};
 use std::collections::BTreeMap;
 
 /// Measures of the strain of one deformation.
@@ -17,8 +17,6 @@ pub(super) struct Kinematics {
     pub(super) doubled_strain: DoubledStrain,
     /// `F - F^-T`.
     pub(super) difference: Matrix,
-    /// Whether the entry of that is of first order in strains; else it has the size of `H`, and the two parts are better apart.
-    pub(super) is_small: Vec<Vec<bool>>,
     /// `H^T F^-T = I - F^-T`.
     pub(super) M: Matrix,
 }
@@ -49,23 +47,21 @@ impl Kinematics {
         let f = &deformation.inverse_transpose;
         let M = deformation.transposed_gradient_times_inverse(graph);
         let mut doubled_strain = vec![vec![None; n]; n];
-        let (difference, is_small) = if let Some(B) = &strain {
+        let difference = if let Some(B) = &strain {
             // F - F^-T = (F F^T - I) F^-T
-            (matrix_product(graph, B, f), vec![vec![true; n]; n])
+            matrix_product(graph, B, f)
         } else {
             doubled_strain = self::doubled_strain(derivation, deformation);
             let graph = &mut derivation.graph;
             let mut whole = M.clone();
-            let mut is_small = vec![vec![true; n]; n];
             for i in 0..n {
                 for j in 0..n {
-                    is_small[i][j] = i == j || doubled_strain[i][j].is_some();
                     whole[i][j] = difference(graph, deformation, &doubled_strain, &M, [i, j]);
                 }
             }
-            (whole, is_small)
+            whole
         };
-        Kinematics { trace, strain, doubled_strain, difference, is_small, M }
+        Kinematics { trace, strain, doubled_strain, difference, M }
     }
 
     /// `J - 1 - tr(C - I)/2`, of second order.
@@ -250,22 +246,17 @@ pub(super) fn doubled_strain(
     let open = &deformation.open;
     let n = open.len();
     let mut strain = vec![vec![None; n]; n];
+    if Rule::DoubledStrain.is_off() {
+        return strain;
+    }
     for i in 0..n {
         for j in 0..i {
             let negative = graph.neg(open[j][i]);
             let whole = graph.sub(open[i][j], negative);
-            let joined = graph.cancel(whole, variables);
-            let is_joined = is_joined(graph, joined, [open[i][j], negative], variables);
-            let of_joined = graph.in_differences(joined, places);
-            let differences = if is_joined || of_joined != joined {
-                of_joined
-            } else {
-                let differences = graph.in_differences(whole, places);
-                if differences == whole {
-                    continue;
-                }
-                differences
-            };
+            let differences = graph.in_differences(whole, places);
+            if differences == whole && !is_joined(graph, whole, [open[i][j], negative], variables) {
+                continue;
+            }
             let sum = graph.whole(differences);
             (strain[i][j], strain[j][i]) = (Some(sum), Some(sum));
         }

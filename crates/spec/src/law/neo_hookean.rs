@@ -17,7 +17,7 @@ use super::kinematics::{DoubledStrain, difference, doubled_strain};
 use super::{Deformation, Divergence, OfGradient, Stress, zero_if_vanishing};
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, matrix_product};
-use mmsmith_expr::{Expr, Graph};
+use mmsmith_expr::{Expr, Graph, Rule};
 
 pub(super) fn stress(
     derivation: &mut Derivation,
@@ -112,8 +112,8 @@ impl NeoHookean<'_> {
         let H = &self.deformation.H;
         let n = H.len();
         let pressure = graph.mul(self.lambda, self.deformation.log_J);
-        if pressure == Graph::ZERO {
-            return (pressure, P.clone());
+        if pressure == Graph::ZERO || Rule::PressureApart.is_off() {
+            return (Graph::ZERO, P.clone());
         }
         let mut rest = vec![vec![Graph::ZERO; n]; n];
         if let Some(strain) = strain {

@@ -17,11 +17,11 @@ use super::energy::{RATIO, own_symbol};
 use super::kinematics::{
     ChainRule, Kinematics, volume_symbols, volume_values, with_transpose, work_along,
 };
-use super::{Deformation, Divergence, Stress, modulus_at_rest, zero_if_vanishing};
+use super::{Deformation, Divergence, Stress, zero_if_vanishing};
 use crate::DeriveError;
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector};
-use mmsmith_expr::{Derivatives, Expr, Function, Graph, Rational};
+use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
 use mmsmith_vocabulary::InStretches;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -215,28 +215,8 @@ impl InPlane {
         let (psi_by_v, psi_by_z) = (derivatives.of(graph, psi, v), derivatives.of(graph, psi, z));
         let (_, energy) = graph.split_at_zero(W, &small);
 
-        let normal = match beside_logarithm(graph, phi, v, z) {
-            Some(beside) => {
-                let lambda = graph.sub(chi_at_rest, psi_at_rest);
-                let lambda = modulus_at_rest(graph, lambda);
-                let lambda = graph.whole(lambda);
-                let logarithm = graph.call(Function::Ln1p, &[v]);
-                let beyond = graph.call(Function::Ln1pMinusX, &[v]);
-                let of_shear = graph.mul(psi_change, v);
-                let terms = [
-                    (1, graph.mul(lambda, logarithm)),
-                    (1, graph.mul(psi_at_rest, beyond)),
-                    (1, beside),
-                    (-1, of_shear),
-                ];
-                graph.sum(terms.map(|(sign, term)| (Rational::from(sign), term)))
-            }
-            None => {
-                let of_shear = graph.mul(psi, v);
-                graph.sub(phi, of_shear)
-            }
-        };
-
+        let of_shear = graph.mul(psi, v);
+        let normal = graph.sub(phi, of_shear);
         let ratio = ratio(graph, deformation, kinematics);
         let mut actual = volume_values(graph, deformation);
         actual.insert(z, ratio);
@@ -260,22 +240,6 @@ impl InPlane {
             energy: at(energy),
         }
     }
-}
-
-/// `phi` without its part linear in `ln J`, where the rest is of second order.
-fn beside_logarithm(graph: &mut Graph, phi: Expr, v: Expr, z: Expr) -> Option<Expr> {
-    let sum = graph.add(Graph::ONE, v);
-    let log_J = graph.symbol("ln J");
-    let logarithms = [(Function::Ln1p, v), (Function::Ln, sum)];
-    let logarithms = logarithms.map(|(function, of)| (graph.call(function, &[of]), log_J));
-    let phi = graph.replace(phi, &logarithms.into());
-    let mut derivatives = Derivatives::limited();
-    let slope = derivatives.of(graph, phi, log_J);
-    let rest = graph.replace(phi, &BTreeMap::from([(log_J, Graph::ZERO)]));
-    let of_rest = derivatives.of(graph, rest, v);
-    let (of_rest, _) = graph.split_at_zero(of_rest, &BTreeSet::from([v, z]));
-    let is_linear = !graph.depends_on(slope, &BTreeSet::from([log_J, v, z]));
-    (is_linear && graph.vanishes(of_rest)).then_some(rest)
 }
 
 /// `z = (a - b)^2/(2 a b)` of the principal stretches `a` and `b`, as sums of squares over what is positive.

@@ -56,7 +56,6 @@ pub(super) fn stress(
         for j in 0..n {
             P[i][j] = graph.add(P[i][j], turned[i][j]);
             P[i][j] = zero_if_vanishing(graph, P[i][j]);
-            P[i][j] = graph.shortened(P[i][j]);
             anisotropic[i][j] = match i == j && pressure != Graph::ZERO {
                 true => {
                     let shear = graph.mul(mu, G[i][j]);

@@ -6,7 +6,7 @@
 
 use crate::derivation::Derivation;
 use crate::tensor::{Matrix, Vector, determinant, index_sets, principal_minors, transpose};
-use mmsmith_expr::{Expr, Function, Graph, Node, Rational};
+use mmsmith_expr::{Expr, Function, Graph, Node, Rational, Rule};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A turn has few angles. Sums of many waves have none that turns the body, and each angle is work.
@@ -23,6 +23,9 @@ impl Turn {
     /// The turn within the gradient of the displacement `u`, if there is one: `S` is the gradient with the angles held, `N` what their own
     /// gradients add.
     pub(crate) fn of(derivation: &mut Derivation, u: &Vector) -> Option<Self> {
+        if Rule::Turn.is_off() {
+            return None;
+        }
         let n = u.len();
         let graph = &mut derivation.graph;
         let angles = angles(graph, u, &derivation.geometry.coordinates);
@@ -120,8 +123,7 @@ impl Turn {
                     terms.push(graph.mul(N[i][m], S[j][m]));
                     terms.push(graph.mul(N[i][m], N[j][m]));
                 }
-                let sum = graph.sum_of(terms);
-                strain[i][j] = graph.shortened(sum);
+                strain[i][j] = graph.sum_of(terms);
             }
         }
         strain

@@ -44,7 +44,7 @@ struct Part {
     changing: Expr,
 }
 
-/// A displacement, or its slope, over one denominator.
+/// A displacement over one denominator.
 pub(super) struct Joined<'a> {
     form: Form<'a>,
     /// The power of the coordinate that is set apart.
@@ -113,20 +113,6 @@ impl<'a> Joined<'a> {
             along.places.iter().filter_map(|place| space.polynomial(graph, *place)).collect();
         let form = Form { graph, space, coordinate, places };
         Some(Self { form, least, numerators, denominator })
-    }
-
-    /// Whether the coordinate occurs in its distances from places alone.
-    fn is_product_of_distances(&self) -> bool {
-        let Self { form, numerators, .. } = self;
-        let mut numerators = numerators.values();
-        let (Some(numerator), None) = (numerators.next(), numerators.next()) else { return false };
-        let without = |rest: Polynomial, root| rest.divided_out(&root).0;
-        form.roots().into_iter().fold(numerator.clone(), without).degree(form.coordinate) == 0
-    }
-
-    /// The factored form, where all that changes along the coordinate are distances from places: no terms cancel then.
-    pub(super) fn product_of_distances(self) -> Option<Expr> {
-        self.is_product_of_distances().then(|| self.formed()).flatten()
     }
 
     /// The factored form; `None` where nothing is gained by it.

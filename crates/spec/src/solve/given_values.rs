@@ -6,9 +6,8 @@
 
 use super::factored::{Common, Form, Shifts};
 use super::polynomial::{Fraction, Polynomial};
-use mmsmith_expr::{Expr, Graph, Rational};
+use mmsmith_expr::{Expr, Rational, Rule};
 use num_traits::One;
-use std::collections::BTreeSet;
 
 /// Values that the conditions give, and `rest R^power` over the denominator, which is left of them.
 struct Given {
@@ -37,20 +36,16 @@ impl Form<'_> {
         common: &Common<'_>,
         shifts: &Shifts,
     ) -> Option<Expr> {
+        if Rule::GivenValues.is_off() {
+            return None;
+        }
         let given = self.given_values(numerator, least, common)?;
         let base = self.places[given.nodes.first()?.place].clone();
         let base = self.in_differences(&base, shifts)?;
         let radius = self.space.atoms[self.coordinate];
         let ratio = self.graph.div(radius, base);
         let factor = self.graph.powi(ratio, given.power.max(0));
-        let given_at: BTreeSet<usize> = given.nodes.iter().map(|node| node.place).collect();
-        // A value with a slope at one place alone is best gone on from: next to a rim that is near nothing cancels then.
-        let is_slope = given_at.len() == 1 && given.nodes.len() > 1;
-        let other = (0..self.places.len()).find(|place| !is_slope && !given_at.contains(place));
-        let total = match other.and_then(|other| self.between(&given, other, common, shifts)) {
-            Some(total) => total,
-            None => self.beside_the_first(&given, common, shifts)?,
-        };
+        let total = self.beside_the_first(&given, common, shifts)?;
         Some(self.graph.mul(factor, total))
     }
 
@@ -117,66 +112,6 @@ impl Form<'_> {
         let power = self.graph.powi(self.space.atoms[self.coordinate], given.power.min(0));
         total = self.graph.mul(total, power);
         self.newton(&given.nodes, total, shifts)
-    }
-
-    /// Next to a place `o` where nothing is given as well: `(R - o) K + W/W(o) [u(o) + (R - o) ...]`, where `W` is the product of the
-    /// distances to the places with values and `K` interpolates so that these come out.
-    fn between(
-        &mut self,
-        given: &Given,
-        other: usize,
-        common: &Common<'_>,
-        shifts: &Shifts,
-    ) -> Option<Expr> {
-        let x = self.coordinate;
-        let roots = self.roots();
-        let at_other = |polynomial: &Polynomial| -> Option<Polynomial> {
-            Some(polynomial.divided_by_distance(x, &self.places[other])?.1)
-        };
-        let one = self.space.constant(Rational::one());
-        let mut W = one.clone();
-        let (mut above, mut below) = (Polynomial::default(), one);
-        for node in given.nodes.iter().rev() {
-            let value = &node.value;
-            let step = above.times(&roots[node.place])?.times(&value.denominator)?;
-            above = value.numerator.times(&below)?.plus(&step);
-            below = below.times(&value.denominator)?;
-            W = W.times(&roots[node.place])?;
-        }
-        let (W_there, value_there) = (at_other(&W)?, at_other(&above)?);
-        let below = below.times(&W_there)?;
-        // I - W/W(o) I(o) vanishes at o.
-        let vanishing = above.times(&W_there)?.minus(&W.times(&value_there)?);
-        let (mut rest, _) = vanishing.divided_by_distance(x, &self.places[other])?;
-        let mut nodes = Vec::new();
-        for node in &given.nodes {
-            let (quotient, value) = rest.divided_by_distance(x, &self.places[node.place])?;
-            let value = Fraction::reduced(value, below.clone())?.with_monic_denominator();
-            nodes.push(Coefficient { place: node.place, value });
-            rest = quotient;
-        }
-        // I(o)/W(o) + Q.
-        let first = &self.places[given.nodes.first()?.place];
-        let scaled = given.rest.times(&self.to_the(first, given.power)?)?;
-        let coordinate = self.space.power(x, 1);
-        let own = value_there.times(&given.denominator)?;
-        let own = own.times(&self.to_the(&coordinate, -given.power)?)?;
-        let sum = Fraction {
-            numerator: own.plus(&scaled.times(&below)?),
-            denominator: below.times(&given.denominator)?,
-        };
-        let sum = sum.without(&below).with_monic_denominator();
-
-        let interpolated = self.newton(&nodes, Graph::ZERO, shifts)?;
-        let distance = self.in_differences(&roots[other], shifts)?;
-        let interpolated = self.graph.mul(distance, interpolated);
-        let mut factors = vec![self.quotient(&sum.numerator, &sum.denominator, common, shifts)?];
-        factors.push(self.graph.powi(self.space.atoms[x], given.power.min(0)));
-        for node in &given.nodes {
-            factors.push(self.in_differences(&roots[node.place], shifts)?);
-        }
-        let rest = self.graph.product_of(factors);
-        Some(self.graph.add(interpolated, rest))
     }
 
     /// `c_0 + (R - p) (c_1 + (R - q) (... + innermost))`.

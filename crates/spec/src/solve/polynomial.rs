@@ -238,14 +238,6 @@ impl Fraction {
         self.numerator.is_zero()
     }
 
-    /// With `factor` taken off both where it divides both.
-    pub(super) fn without(self, factor: &Polynomial) -> Self {
-        match (self.numerator.divided_by(factor), self.denominator.divided_by(factor)) {
-            (Some(numerator), Some(denominator)) => Fraction { numerator, denominator },
-            _ => self,
-        }
-    }
-
     /// This fraction with the leading coefficient of the denominator one.
     pub(super) fn with_monic_denominator(self) -> Self {
         let leading = self.denominator.terms().last().map(|(_, leading)| Rational::one() / leading);
