@@ -25,8 +25,9 @@ const MORE_WORK: f64 = 1.25;
 /// Forms without a rule nest deeply.
 const STACK: usize = 1 << 28;
 const PAGE: &str = "docs/src/results/ablation.md";
-const BEGIN: &str = "<!-- table of rules -->";
-const END: &str = "<!-- table of rules ends -->";
+/// Headings that the table stands between.
+const BEGIN: &str = "## The rules\n";
+const END: &str = "## Rules that are gone\n";
 
 /// One specification with all rules and without each.
 struct Ablated {
@@ -74,7 +75,7 @@ pub(crate) fn run(repository: &Path, check: bool) -> anyhow::Result<(Vec<String>
         ));
     }
     let table = format!(
-        "{BEGIN}\n\n{}\n\n{} specifications, {POINTS} points in each class.\n\n| rule | before | after | why | without it | changed | lines of C | needed by |\n\
+        "{BEGIN}\n{}\n\n{} specifications, {POINTS} points in each class.\n\n| rule | before | after | why | without it | changed | lines of C | needed by |\n\
          |---|---|---|---|---|---:|---:|---|\n{}\n\n{}\n{END}",
         docs::stamp(repository)?,
         all.len(),
