@@ -12,12 +12,13 @@ use std::path::{Path, PathBuf};
 /// The specifications of the library and those of the other laws.
 fn specifications() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut found: Vec<PathBuf> = ["mms-specs", "tests/data/specs", "tests/data/specs/materials"]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-        .collect();
+    let mut found: Vec<PathBuf> =
+        ["mms-specs", "tests/data/specs", "tests/data/specs/materials", "tests/data/specs/digits"]
+            .iter()
+            .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+            .collect();
     found.sort();
     found
 }
