@@ -55,7 +55,7 @@ pub(crate) fn integrate(
                 }
                 // Few columns were needed: the step may be longer.
                 let factor = if columns < COLUMNS - 2 { 1.6 } else { 1.0 };
-                *step = (trial * factor).max(*step * if trial < *step { 1.0 } else { 0.0 });
+                *step = step.max(trial * factor);
             }
             None => {
                 *step = 0.5 * trial;

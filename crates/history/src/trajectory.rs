@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::extrapolation::{Stop, integrate};
 use crate::law::{Branch, Kinematics, LawWithHistory};
 use crate::number::{Dual, Number};
-use crate::tensor::Tensor;
+use crate::tensor::{Tensor, tensor};
 
 /// Why a history could not be followed.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -177,11 +177,13 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Particle<'_, L, M, K> {
     fn onset(&mut self) {
         let at = self.motion.at(self.time);
         let margin = self.law.margin(&at, &self.z, Branch::Elastic);
-        // The rate of the margin while the variables stay, along the motion.
-        let step = 1e-6 * self.time.abs().max(f64::MIN_POSITIVE);
-        let value =
-            |time: f64| self.law.margin(&self.motion.at(time), &self.z, Branch::Elastic).value;
-        let rate = (value(self.time + step) - value(self.time - step)) / (2.0 * step);
+        // The rate of the margin along the motion while the variables stay; it depends on F alone.
+        let along = Kinematics {
+            F: tensor(|i, j| Dual { value: at.F[i][j].value, slopes: [at.rate[i][j].value] }),
+            rate: tensor(|i, j| Dual::constant(at.rate[i][j].value)),
+        };
+        let at_rest: Vec<Dual<f64, 1>> = self.z.iter().map(|z| Dual::constant(z.value)).collect();
+        let [rate] = self.law.margin(&along, &at_rest, Branch::Elastic).slopes;
         let mut rates = vec![Dual::<f64, K>::constant(0.0); self.z.len()];
         self.law.rate(&at, &self.z, Branch::Flowing, &mut rates);
         for (z, rate_of_z) in self.z.iter_mut().zip(rates) {
