@@ -41,9 +41,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         } else {
             self.p2g(body_force, times);
         }
-        if let Some(corners) = &mut self.corners {
-            corners.follow(&self.grid.constants, &self.grid.nodes);
-        }
+        self.move_corners();
         let outcome = self.g2p_and_to_corners(body_force, times.end);
         let outcome = self.reduce_outcome(outcome);
         // A sort may bring other particles here, and after a failure the sums are of no use.

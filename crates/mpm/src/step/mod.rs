@@ -74,9 +74,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let VelocityUpdate::FilteredReplace(filter) = self.transfer.velocity_update() {
             self.filter(filter);
         }
-        if let Some(corners) = &mut self.corners {
-            corners.follow(&self.grid.constants, &self.grid.nodes);
-        }
+        self.move_corners();
         let outcome = if integrator.reprojects() {
             self.g2p_velocity();
             self.p2g_updated_momentum();
@@ -86,6 +84,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
         };
         let outcome = self.reduce_outcome(outcome);
         self.resort_if(outcome)
+    }
+
+    /// The corners that particles share move with the grid; their new positions are stored beside the old.
+    fn move_corners(&mut self) {
+        if let Some(corners) = &mut self.corners {
+            corners.follow(&self.grid.constants, &self.grid.nodes);
+        }
     }
 
     /// A step in a single pass.
