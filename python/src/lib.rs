@@ -73,6 +73,7 @@ impl Facts {
                     names.zip(material.values()).collect()
                 }
                 Law::Stated(stated) => stated.constants.into_iter().collect(),
+                Law::WithMemory(law) => law.named_values().into_iter().collect(),
             },
             density: solution.density(),
             wave_speed: solution.wave_speed(),

@@ -26,7 +26,10 @@ pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 pub use libm;
 /// The functions that [`Real`] has beyond those of a field.
 pub use mmsmith_scalar_functions::ScalarFunctions;
-pub use mmsmith_vocabulary::{Components, Law, Material, Response, Stated, Volumetric};
+pub use mmsmith_vocabulary::{
+    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Stated,
+    Volumetric, WithMemory,
+};
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;
 pub use parameters::{Description, Parameter, ParameterError};

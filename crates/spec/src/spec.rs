@@ -283,6 +283,8 @@ impl Law {
                     response: Response::Energy(energy_text(material)),
                     components: Components::Curvilinear,
                     constants: constants.map(|(row, value)| (row.name.to_owned(), value)).collect(),
+                    given: Vec::new(),
+                    internal: Vec::new(),
                 });
             }
             Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W], false),
@@ -304,7 +306,8 @@ impl Law {
         };
         let constants =
             others.into_iter().filter(|(name, _)| !INVARIANTS.contains(&name.as_str())).collect();
-        mmsmith_vocabulary::Law::Stated(Stated { response, components, constants })
+        let (given, internal) = (Vec::new(), Vec::new());
+        mmsmith_vocabulary::Law::Stated(Stated { response, components, constants, given, internal })
     }
 }
 

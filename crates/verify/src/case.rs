@@ -186,6 +186,7 @@ pub(crate) fn law<T: Real + Compiled<D>, const D: usize>(
     let material = match law {
         mmsmith_runtime::Law::Library(material) => material,
         mmsmith_runtime::Law::Stated(stated) => return stated_law::read(stated),
+        mmsmith_runtime::Law::WithMemory(_) => return Err(SceneError::WithMemory),
     };
     let planted = Planted::here();
     if planted.is(Fault::LambdaForMu)

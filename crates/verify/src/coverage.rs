@@ -223,7 +223,7 @@ fn without_pressure(law: Law<f64>) -> Law<f64> {
             let keep = |name, value| if modulus == Some(name) { 0.0 } else { value };
             Law::Library(material.map_named(keep))
         }
-        stated @ Law::Stated(_) => stated,
+        law @ (Law::Stated(_) | Law::WithMemory(_)) => law,
     }
 }
 

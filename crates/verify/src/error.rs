@@ -124,6 +124,11 @@ pub enum SceneError {
          I1 and I2, or the solution in Cartesian coordinates (mms check, eval and gen serve it all the same)"
     )]
     CurvilinearComponents,
+    /// A law with internal variables.
+    #[error(
+        "the solver has no law with these internal variables yet (mms check, eval and gen serve it all the same)"
+    )]
+    WithMemory,
     /// A stated law that cannot be read.
     #[error("the law that the specification states: {0}")]
     StatedLaw(#[from] StatedLawError),

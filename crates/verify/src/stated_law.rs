@@ -16,7 +16,7 @@ use crate::error::SceneError;
 pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
     stated: Stated<T>,
 ) -> Result<Law<T, D>, SceneError> {
-    let Stated { response, components, constants } = stated;
+    let Stated { response, components, constants, .. } = stated;
     if components == Components::Curvilinear {
         return Err(SceneError::CurvilinearComponents);
     }

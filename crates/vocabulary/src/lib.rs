@@ -9,7 +9,9 @@
 mod law;
 mod material;
 
-pub use law::{Components, Law, Response, Stated};
+pub use law::{
+    Components, Element, Flow, Internal, Law, Memory, Overstress, Response, Stated, WithMemory,
+};
 pub use material::{
     Constant, Derivation, InStretches, Material, Moduli, Row, Term, UnknownLaw, Volumetric,
 };

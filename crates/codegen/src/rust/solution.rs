@@ -4,7 +4,10 @@ use super::Generator;
 use mmsmith_expr::Slot;
 use mmsmith_spec::{Boundary, Condition, Surface};
 use mmsmith_stage::{Measures, Shape};
-use mmsmith_vocabulary::{Components, Law, Response, Stated};
+use mmsmith_vocabulary::{
+    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Stated,
+    WithMemory,
+};
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
@@ -145,22 +148,10 @@ impl Generator<'_> {
         let runtime = self.runtime;
         match &self.staged.constants.law {
             Law::Library(material) => {
-                let row = material.row();
-                let variant = format_ident!("{}", row.variant);
-                let constants = row.constants.iter().zip(material.values());
-                let constants = constants.map(|(constant, slot)| {
-                    let (name, value) = (format_ident!("{}", constant.name), self.constant(slot));
-                    quote!(#name: #value,)
-                });
-                let volumetric = material.volumetric().map(|chosen| {
-                    let chosen = format_ident!("{}", chosen.variant());
-                    quote!(volumetric: #runtime::Volumetric::#chosen,)
-                });
-                quote! {
-                    #runtime::Law::Library(#runtime::Material::#variant { #(#constants)* #volumetric })
-                }
+                let material = self.material(material);
+                quote!(#runtime::Law::Library(#material))
             }
-            Law::Stated(Stated { response, components, constants }) => {
+            Law::Stated(Stated { response, components, constants, given, internal }) => {
                 let response = match response {
                     Response::Energy(W) => quote!(Energy(#W.to_owned())),
                     Response::Stress(P) => {
@@ -176,13 +167,86 @@ impl Generator<'_> {
                     let value = self.constant(*slot);
                     quote!((#name.to_owned(), #value))
                 });
+                let given =
+                    given.iter().map(|(name, text)| quote!((#name.to_owned(), #text.to_owned())));
+                let internal = internal.iter().map(|Internal { name, rate, initial }| {
+                    quote!(#runtime::Internal {
+                        name: #name.to_owned(),
+                        rate: #rate.to_owned(),
+                        initial: #initial.to_owned(),
+                    })
+                });
                 quote! {
                     #runtime::Law::Stated(#runtime::Stated {
                         response: #runtime::Response::#response,
                         components: #runtime::Components::#components,
                         constants: vec![#(#constants),*],
+                        given: vec![#(#given),*],
+                        internal: vec![#(#internal),*],
                     })
                 }
+            }
+            Law::WithMemory(WithMemory { elastic, memory }) => {
+                let elastic = self.material(elastic);
+                let memory = self.memory(memory);
+                quote! {
+                    #runtime::Law::WithMemory(#runtime::WithMemory {
+                        elastic: #elastic,
+                        memory: #runtime::Memory::#memory,
+                    })
+                }
+            }
+        }
+    }
+
+    fn material(&self, material: &Material<Slot>) -> TokenStream {
+        let runtime = self.runtime;
+        let row = material.row();
+        let variant = format_ident!("{}", row.variant);
+        let constants = row.constants.iter().zip(material.values());
+        let constants = constants.map(|(constant, slot)| {
+            let (name, value) = (format_ident!("{}", constant.name), self.constant(slot));
+            quote!(#name: #value,)
+        });
+        let volumetric = material.volumetric().map(|chosen| {
+            let chosen = format_ident!("{}", chosen.variant());
+            quote!(volumetric: #runtime::Volumetric::#chosen,)
+        });
+        quote!(#runtime::Material::#variant { #(#constants)* #volumetric })
+    }
+
+    fn memory(&self, memory: &Memory<Slot>) -> TokenStream {
+        let runtime = self.runtime;
+        let constant = |slot: Slot| self.constant(slot);
+        match memory {
+            Memory::Flow(flow) => {
+                let Flow { yield_stress, modulus, exponent, .. } = flow.map(constant);
+                let is_on_yield = flow.is_on_yield;
+                let overstress = match &flow.overstress {
+                    None => quote!(None),
+                    Some(overstress) => {
+                        let Overstress { drag, exponent, time } = overstress.map(constant);
+                        quote!(Some(#runtime::Overstress {
+                            drag: #drag,
+                            exponent: #exponent,
+                            time: #time,
+                        }))
+                    }
+                };
+                quote!(Flow(#runtime::Flow {
+                    yield_stress: #yield_stress,
+                    modulus: #modulus,
+                    exponent: #exponent,
+                    overstress: #overstress,
+                    is_on_yield: #is_on_yield,
+                }))
+            }
+            Memory::Maxwell(elements) => {
+                let elements = elements.iter().map(|Element { share, time }| {
+                    let (share, time) = (constant(*share), constant(*time));
+                    quote!(#runtime::Element { share: #share, time: #time })
+                });
+                quote!(Maxwell(vec![#(#elements),*]))
             }
         }
     }

@@ -82,12 +82,13 @@ where
         };
         let changed = match self.declared.clone() {
             Declared::Library(material) => Declared::Library(material.map_named(&mut change)),
-            Declared::Stated(Stated { response, components, constants }) => {
+            Declared::Stated(Stated { response, components, constants, given, internal }) => {
                 let constants = constants.into_iter();
                 let constants =
                     constants.map(|(name, value)| (name.clone(), change(&name, value))).collect();
-                Declared::Stated(Stated { response, components, constants })
+                Declared::Stated(Stated { response, components, constants, given, internal })
             }
+            Declared::WithMemory(_) => return None,
         };
         if found == 2 { law(changed).ok() } else { None }
     }
