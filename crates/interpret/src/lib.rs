@@ -175,6 +175,7 @@ struct Interpreted<T: Interpretable, const D: usize> {
     cell_length: T,
     law: Law<T>,
     density: T,
+    density_here: Option<Program>,
     wave_speed: T,
     period: T,
 }
@@ -236,6 +237,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             cell_length: constant(staged.constants.cell_length),
             law: staged.constants.law.clone().map(constant),
             density: constant(staged.constants.density),
+            density_here: staged.density_here.map(|density| part(&[density])),
             wave_speed: constant(staged.constants.wave_speed),
             period: constant(staged.constants.period),
             parameters,
@@ -365,6 +367,11 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn law(&self) -> Law<T> {
         self.law.clone()
+    }
+
+    fn density_at(&self, X: &SVector<T, D>) -> T {
+        let inputs = || inputs(X.as_slice(), T::zero(), &self.parameters);
+        self.density_here.as_ref().map_or(self.density, |program| program.evaluate_in(&inputs())[0])
     }
 
     fn density(&self) -> T {

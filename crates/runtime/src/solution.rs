@@ -100,8 +100,30 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn cell_length(&self) -> T;
     /// The constitutive law and its constants.
     fn law(&self) -> Law<T>;
-    /// Mass per reference volume.
+    /// Mass per reference volume; in the middle of the body where it depends on the place.
     fn density(&self) -> T;
+    /// Mass per reference volume at a place.
+    fn density_at(&self, _X: &SVector<T, D>) -> T {
+        self.density()
+    }
+    /// The names of the law's internal variables, in the order of the solver's own law; none for elastic laws.
+    fn internal_variables(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// The internal variables at a place and time, in Cartesian components, in the order of
+    /// [`internal_variables`](Self::internal_variables).
+    fn internal(&self, _X: &SVector<T, D>, _t: T) -> Vec<T> {
+        Vec::new()
+    }
+    /// Prepares fields that follow from the history of each particle for times up to `end`: tables that
+    /// [`body_force_at`](Self::body_force_at) and [`state_at`](Self::state_at) then use. Solutions that are formulas need none.
+    ///
+    /// # Errors
+    ///
+    /// The reason where a history cannot be followed.
+    fn prepare_until(&self, _end: T) -> Result<(), String> {
+        Ok(())
+    }
     /// The speed that CFL numbers refer to, `sqrt(E/rho0)` unless the specification says otherwise.
     fn wave_speed(&self) -> T;
     /// The time after which the motion repeats, or a study ends.

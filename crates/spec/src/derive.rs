@@ -40,14 +40,34 @@ pub struct Fields {
     pub F: Matrix,
     /// `det F`.
     pub J: Expr,
-    /// First Piola-Kirchhoff stress.
+    /// First Piola-Kirchhoff stress; empty where it depends on the [`history`](Self::history).
     pub P: Matrix,
-    /// Body force per unit mass.
+    /// Body force per unit mass; empty where it depends on the [`history`](Self::history).
     pub b: Vector,
+    /// Fields from which the history of internal variables follows, for a law that has some.
+    pub history: Option<HistoryFields>,
     /// Strain energy per reference volume, where the material is given by one.
     pub W: Option<Expr>,
     /// Tractions and the claims of boundary conditions, for every surface of the body.
     pub surfaces: Vec<SurfaceFields>,
+}
+
+/// The motion as histories of internal variables need it, in physical components of the specification's own coordinates: at a particle
+/// these are Cartesian components in a frame that stays.
+#[derive(Clone, Debug)]
+pub struct HistoryFields {
+    /// Acceleration.
+    pub a: Vector,
+    /// Deformation gradient.
+    pub F: Matrix,
+    /// `dF/dt`.
+    pub rate: Matrix,
+    /// `[J][i][K]`: the derivative of `F_iK` along direction `J`.
+    pub slopes: Vec<Matrix>,
+    /// `[J][i][K]`: the derivative of `dF_iK/dt` along direction `J`.
+    pub slopes_of_rate: Vec<Matrix>,
+    /// `[i][a]`: Cartesian component `i` of the unit vector `a`.
+    pub frame: Matrix,
 }
 
 /// Why fields could not be derived.
@@ -89,7 +109,10 @@ impl Fields {
         let a: Vector = v.iter().map(|&v| derivation.derivative(v, time)).collect();
         let H = derivation.gradient(&u);
         let deformation = Deformation::new(&mut derivation, &u, H.clone());
-        let stress = law::stress(&mut derivation, &deformation, &spec.material)?;
+        if spec.has_history() {
+            return Self::derive_motion(spec, derivation, [u, v, a], H, deformation.J);
+        }
+        let stress = law::stress(&mut derivation, &deformation, spec)?;
         let b = body_force(&mut derivation, &a, &stress, spec.density);
 
         if derivation.graph.is_overgrown() {
@@ -120,18 +143,65 @@ impl Fields {
         let components = Components { own_u: &spec.displacement, own_P: &stress.P, u: &u, P: &P };
         let surfaces = surface_fields(&mut graph, &geometry, spec, &components);
 
-        let rate = |position, time| Dependence { position, time };
-        let mut inputs: Vec<(Expr, Dependence)> =
-            geometry.cartesian.iter().map(|&X| (X, rate(true, false))).collect();
-        inputs.push((time, rate(false, true)));
-        for parameter in &spec.parameters {
-            inputs.push((graph.symbol(&parameter.name), rate(false, false)));
-        }
+        let inputs = inputs(spec, &mut graph, &geometry, time);
         let definitions = geometry.definitions;
-        let mut fields = Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, W, surfaces };
+        let history = None;
+        let mut fields =
+            Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, history, W, surfaces };
         if let Some(rotation) = &spec.rotation {
             rotation.apply(&mut fields, &geometry.cartesian, time);
         }
+        fields.check()?;
+        Ok(fields)
+    }
+
+    /// The fields of a law with internal variables, without stresses: these follow from the history of each particle.
+    fn derive_motion(
+        spec: &Spec,
+        mut derivation: Derivation,
+        [u, v, a]: [Vector; 3],
+        H: Matrix,
+        J: Expr,
+    ) -> Result<Self, DeriveError> {
+        let time = derivation.time;
+        let mut rate = H.clone();
+        for entry in rate.iter_mut().flatten() {
+            *entry = derivation.derivative(*entry, time);
+        }
+        let slopes = by_direction(&derivation.second_gradient(&H, true));
+        let slopes_of_rate = by_direction(&derivation.second_gradient(&rate, true));
+        if derivation.graph.is_overgrown() {
+            return Err(DeriveError::TooLarge { nodes: derivation.graph.len() });
+        }
+        let Derivation { mut graph, geometry, .. } = derivation;
+        let with_identity = |graph: &mut Graph, H: &Matrix| {
+            let mut F = H.clone();
+            for (i, row) in F.iter_mut().enumerate() {
+                row[i] = graph.add(Graph::ONE, row[i]);
+            }
+            F
+        };
+        let own_F = with_identity(&mut graph, &H);
+        let history = HistoryFields {
+            a: a.clone(),
+            F: own_F,
+            rate,
+            slopes,
+            slopes_of_rate,
+            frame: geometry.rotation.clone(),
+        };
+        let vector = |graph: &mut Graph, x: &Vector| turn_vector(graph, &geometry, x);
+        let (u, v, a) = (vector(&mut graph, &u), vector(&mut graph, &v), vector(&mut graph, &a));
+        let H = if geometry.is_cartesian() { H } else { turn_matrix(&mut graph, &geometry, &H) };
+        let F = with_identity(&mut graph, &H);
+        let J = geometry.without_angles(&mut graph, J);
+        let inputs = inputs(spec, &mut graph, &geometry, time);
+        let definitions = geometry.definitions;
+        let (P, b, surfaces) = (Matrix::new(), Vector::new(), Vec::new());
+        let history = Some(history);
+        let W = None;
+        let fields =
+            Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, history, W, surfaces };
         fields.check()?;
         Ok(fields)
     }
@@ -154,6 +224,32 @@ impl Fields {
         }
         Ok(())
     }
+}
+
+/// The coordinates, the time and the parameters, with what each of them is.
+fn inputs(
+    spec: &Spec,
+    graph: &mut Graph,
+    geometry: &Geometry,
+    time: Expr,
+) -> Vec<(Expr, Dependence)> {
+    let rate = |position, time| Dependence { position, time };
+    let mut inputs: Vec<(Expr, Dependence)> =
+        geometry.cartesian.iter().map(|&X| (X, rate(true, false))).collect();
+    inputs.push((time, rate(false, true)));
+    for parameter in &spec.parameters {
+        inputs.push((graph.symbol(&parameter.name), rate(false, false)));
+    }
+    inputs
+}
+
+/// From `[k][L][J]` to `[J][k][L]`.
+fn by_direction(gradient: &[Matrix]) -> Vec<Matrix> {
+    let n = gradient.len();
+    let of = |J: usize| {
+        gradient.iter().map(|rows| rows.iter().map(|row| row[J]).collect()).collect::<Matrix>()
+    };
+    (0..n).map(of).collect()
 }
 
 /// `b = [a - Div P_linear / rho0] - Div P_remainder / rho0`, the bracket joined in symbols. Where nothing of it joins, the divergence

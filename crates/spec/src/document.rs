@@ -38,6 +38,11 @@ pub(crate) struct Document {
     #[serde(default)]
     pub(crate) cross_check: List<Spanned<CrossCheckTable>>,
     pub(crate) time: Option<Spanned<TimeTable>>,
+    #[serde(default)]
+    pub(crate) given: Entries<Text>,
+    #[serde(default)]
+    pub(crate) internal: Entries<InternalTable>,
+    pub(crate) start: Option<Spanned<StartTable>>,
 }
 
 /// The most parameters; each costs every evaluation of every field.
@@ -75,6 +80,9 @@ impl Document {
             ("[let]", self.lets.0.len(), MOST_LETS),
             ("require", self.require.0.len(), MOST_ENTRIES),
             ("[displacement]", self.displacement.0.len(), MOST_ENTRIES),
+            ("[given]", self.given.0.len(), MOST_ENTRIES),
+            ("[internal]", self.internal.0.len(), MOST_ENTRIES),
+            ("[[material.maxwell]]", self.material.get_ref().maxwell.0.len(), MOST_ENTRIES),
             ("[[boundary]]", self.boundary.0.len(), MOST_ENTRIES),
             ("[[cross-check]]", self.cross_check.0.len(), MOST_ENTRIES),
             ("unknowns", solve.map_or(0, |s| s.unknowns.0.len()), MOST_ENTRIES),
@@ -130,6 +138,54 @@ pub(crate) struct MaterialTable {
     pub(crate) W: Option<Text>,
     pub(crate) P: Option<Entries<Text>>,
     pub(crate) density: Option<Text>,
+    pub(crate) flow: Option<Spanned<FlowTable>>,
+    pub(crate) maxwell: List<Spanned<MaxwellTable>>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [material.flow] and below it kind = 'j2', yield = 'sy + K*alpha'"
+)]
+pub(crate) struct FlowTable {
+    pub(crate) kind: Spanned<String>,
+    pub(crate) r#yield: Option<Text>,
+    pub(crate) drag: Option<Text>,
+    pub(crate) exponent: Option<Text>,
+    pub(crate) time: Option<Text>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [[material.maxwell]] and below it share = 'g1', time = 'tau1'"
+)]
+pub(crate) struct MaxwellTable {
+    pub(crate) share: Text,
+    pub(crate) time: Text,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in q = { rate = '(J - 1 - q)/tau', initial = '0' }"
+)]
+pub(crate) struct InternalTable {
+    pub(crate) rate: Text,
+    pub(crate) initial: Option<Text>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename_all = "kebab-case",
+    expecting = "a table, as in [start] and below it on-yield = true"
+)]
+pub(crate) struct StartTable {
+    pub(crate) on_yield: bool,
 }
 
 #[derive(serde::Deserialize)]
@@ -320,6 +376,11 @@ impl Listed for BoundaryTable {
         "[[boundary]] in two pairs of brackets, once for each surface, with surface and condition";
 }
 
+impl Listed for Spanned<MaxwellTable> {
+    const FORM: &'static str =
+        "[[material.maxwell]] in two pairs of brackets, once for each element, with share and time";
+}
+
 impl Listed for Spanned<CrossCheckTable> {
     const FORM: &'static str =
         "[[cross-check]] in two pairs of brackets, once for each listing, with source and listing";
@@ -475,6 +536,7 @@ impl<'de> Deserialize<'de> for MaterialTable {
                 let mut law = None;
                 let mut constants = Entries::default();
                 let (mut volumetric, mut W, mut P, mut density) = (None, None, None, None);
+                let (mut flow, mut maxwell) = (None, List::default());
                 while let Some(key) = map.next_key::<Spanned<String>>()? {
                     match key.get_ref().as_str() {
                         "law" => law = Some(map.next_value()?),
@@ -482,12 +544,14 @@ impl<'de> Deserialize<'de> for MaterialTable {
                         "W" => W = Some(map.next_value()?),
                         "P" => P = Some(map.next_value()?),
                         "density" => density = Some(map.next_value()?),
+                        "flow" => flow = Some(map.next_value()?),
+                        "maxwell" => maxwell = map.next_value()?,
                         _ => constants.0.push((key, map.next_value()?)),
                     }
                 }
                 constants.0.sort_by_key(|(key, _)| key.span().start);
                 let law = law.ok_or_else(|| serde::de::Error::missing_field("law"))?;
-                Ok(MaterialTable { law, constants, volumetric, W, P, density })
+                Ok(MaterialTable { law, constants, volumetric, W, P, density, flow, maxwell })
             }
         }
         deserializer.deserialize_map(MaterialVisitor)

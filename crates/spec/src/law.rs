@@ -10,11 +10,12 @@ mod st_venant_kirchhoff;
 mod turn;
 
 use crate::derivation::Derivation;
+use crate::spec::Law;
 use crate::tensor::{
     Matrix, Vector, cofactor, determinant, matrix_product, minors_beyond_trace, transpose,
 };
-use crate::{DeriveError, Law};
-use energy::ComponentLaw;
+use crate::{DeriveError, Spec};
+use energy::{ComponentLaw, Field};
 use kinematics::{doubled_strain, with_transpose};
 use mmsmith_expr::{Expr, Function, Graph, Node, Rule};
 use mmsmith_vocabulary::{Derivation as Formulas, Material, Volumetric};
@@ -281,11 +282,43 @@ fn dilation(
 pub(crate) fn stress(
     derivation: &mut Derivation,
     deformation: &Deformation,
-    law: &Law,
+    spec: &Spec,
 ) -> Result<Stress, DeriveError> {
+    let law = &spec.material;
+    let mut fields: Vec<Field> =
+        spec.given.iter().map(|given| Field { symbol: given.symbol, value: given.value }).collect();
     let (W, isotropic) = match law {
         Law::Stress { P } => {
-            return Ok(ComponentLaw::of_stress(&mut derivation.graph, deformation, P)
+            return Ok(ComponentLaw::of_stress(derivation, deformation, P, fields)
+                .stress(derivation, deformation));
+        }
+        Law::Library(material) if spec.has_graded_constants() => {
+            let text = match material.derivation() {
+                Formulas::PrincipalStretches(parts) => {
+                    let (text, _) =
+                        principal_stretches::energy(&derivation.graph, &deformation.H, &parts)?;
+                    let volume = material.volumetric().map(Volumetric::formula);
+                    text + &volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default()
+                }
+                _ => energy_text(material, deformation.H.len()),
+            };
+            let constants = law.constants();
+            let mut symbols = Vec::with_capacity(constants.len());
+            for (constant, value) in constants {
+                let symbol = energy::own_symbol(&mut derivation.graph, constant.name);
+                fields.push(Field { symbol, value });
+                symbols.push((constant, symbol));
+            }
+            let W = energy::named(&mut derivation.graph, &text, &symbols);
+            let isotropic = material.row().is_isotropic
+                && !matches!(
+                    material.derivation(),
+                    Formulas::PrincipalStretches(_)
+                        | Formulas::StVenantKirchhoff { .. }
+                        | Formulas::LinearElastic { .. }
+                );
+            return Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
+                .with_fields(fields)
                 .stress(derivation, deformation));
         }
         Law::Energy { W } => {
@@ -360,7 +393,8 @@ pub(crate) fn stress(
     let graph = &mut derivation.graph;
     let n = deformation.H.len();
     // Where principal directions are those of the coordinates the components are the shorter form.
-    if !Rule::Invariants.is_off()
+    if fields.is_empty()
+        && !Rule::Invariants.is_off()
         && !deformation.is_diagonal()
         && energy::uses_invariants_only(graph, W, n)
         && let Some(W) = invariants::in_two_invariants(graph, W, n)
@@ -368,6 +402,7 @@ pub(crate) fn stress(
         return Ok(invariants::stress(derivation, deformation, W));
     }
     Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
+        .with_fields(fields)
         .stress(derivation, deformation))
 }
 
@@ -377,18 +412,44 @@ fn in_invariants(W: &str, others: &str) -> String {
 }
 
 /// The energy of a law with directions in `J`, `I1`, components and its constants, as a specification would state it.
-pub(crate) fn energy_text(material: &Material<Expr>) -> String {
+pub(crate) fn energy_text(material: &Material<Expr>, dimension: usize) -> String {
     let text = match material.derivation() {
         Formulas::Energy { W } => W.to_owned(),
         Formulas::Isochoric { W, others } => in_invariants(W, others),
-        // These laws are isotropic.
-        Formulas::NeoHookean { .. }
-        | Formulas::StVenantKirchhoff { .. }
-        | Formulas::LinearElastic { .. }
-        | Formulas::PrincipalStretches(_) => String::new(),
+        Formulas::NeoHookean { .. } => "mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2".to_owned(),
+        Formulas::StVenantKirchhoff { .. } => {
+            let C = |i: usize, j: usize| match i == j {
+                true => format!("(C{i}{i} - 1)"),
+                false => format!("C{i}{j}"),
+            };
+            quadratic_energy("lambda/8", "mu/4", dimension, C)
+        }
+        Formulas::LinearElastic { .. } => {
+            let twice_strain = |i: usize, j: usize| match i == j {
+                true => format!("(2*F{i}{i} - 2)"),
+                false => format!("(F{i}{j} + F{j}{i})"),
+            };
+            quadratic_energy("lambda/8", "mu/4", dimension, twice_strain)
+        }
+        Formulas::PrincipalStretches(parts) => {
+            principal_stretches::energy_of_all(dimension, &parts).unwrap_or_default()
+        }
     };
     let volume = material.volumetric().map(Volumetric::formula);
     text + &volume.map(|U| format!(" + kappa*({U})")).unwrap_or_default()
+}
+
+/// `lambda (tr A)^2 + mu A : A` as text.
+fn quadratic_energy(
+    lambda: &str,
+    mu: &str,
+    dimension: usize,
+    A: impl Fn(usize, usize) -> String,
+) -> String {
+    let trace: Vec<String> = (1..=dimension).map(|i| A(i, i)).collect();
+    let squares = (1..=dimension).flat_map(|i| (1..=dimension).map(move |j| (i, j)));
+    let squares: Vec<String> = squares.map(|(i, j)| format!("{}^2", A(i, j))).collect();
+    format!("{lambda}*({})^2 + {mu}*({})", trace.join(" + "), squares.join(" + "))
 }
 
 /// `P = lambda tr(H) I + mu (H + H^T)`.

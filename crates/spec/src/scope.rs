@@ -28,6 +28,8 @@ pub(crate) struct Scope<'a> {
     pub(crate) time: Expr,
     /// The unknowns of `[solve]`.
     unknowns: BTreeSet<Expr>,
+    /// The names of `[given]`, which mean something in the law alone.
+    given: BTreeMap<String, Expr>,
 }
 
 impl<'a> Scope<'a> {
@@ -56,6 +58,7 @@ impl<'a> Scope<'a> {
             coordinates: symbols,
             time,
             unknowns: BTreeSet::new(),
+            given: BTreeMap::new(),
         }
     }
 
@@ -76,6 +79,77 @@ impl<'a> Scope<'a> {
         Ok(())
     }
 
+    /// Adds a field of `[given]`, which the fields after it, and the law, may use. The names of coordinates that are not those of the
+    /// file are free: `theta` may be a temperature.
+    pub(crate) fn declare_given(
+        &mut self,
+        name: &str,
+        span: std::ops::Range<usize>,
+        text: &Text,
+    ) -> Result<(Expr, Expr), Diagnostic> {
+        let elsewhere = std::mem::take(&mut self.elsewhere);
+        let checked = self.check_new_name(name, span.clone());
+        self.elsewhere = elsewhere;
+        checked?;
+        if self.given.contains_key(name) {
+            let message = format!("the name '{name}' is declared twice");
+            return Err(self.source.error(message, span, Some("choose another name".into())));
+        }
+        let value = self.with_given(|scope| scope.expression(text))?;
+        if self.has_unknowns(value) {
+            let message =
+                format!("the given field '{name}' may not depend on the unknowns of [solve]");
+            return Err(self.source.error(message, text.span.clone(), None));
+        }
+        let symbol = self.graph.symbol(name);
+        self.given.insert(name.to_owned(), symbol);
+        Ok((symbol, value))
+    }
+
+    /// `work` where the names of `[given]` are known.
+    pub(crate) fn with_given<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> R {
+        let declared = self.names.clone();
+        self.names.extend(self.given.iter().map(|(name, symbol)| (name.clone(), *symbol)));
+        let result = work(self);
+        self.names = declared;
+        result
+    }
+
+    /// As [`Scope::expression`], for a constant of a law, which may depend on position, time, and given fields.
+    pub(crate) fn constant_of_law(&mut self, text: &Text, what: &str) -> Result<Expr, Diagnostic> {
+        let expr = self.with_given(|scope| scope.expression(text))?;
+        if self.has_unknowns(expr) {
+            let message = format!("{what} may not depend on the unknowns of [solve]");
+            let help = "unknowns are for [displacement], and for [let] expressions that feed it";
+            return Err(self.source.error(message, text.span.clone(), Some(help.into())));
+        }
+        Ok(expr)
+    }
+
+    /// Whether an expression depends on position, time, or given fields.
+    pub(crate) fn is_field(&self, expr: Expr) -> bool {
+        let variables: BTreeSet<Expr> = self.variables();
+        self.graph.depends_on(expr, &variables)
+    }
+
+    fn variables(&self) -> BTreeSet<Expr> {
+        let given = self.given.values().copied();
+        self.coordinates.iter().copied().chain([self.time]).chain(given).collect()
+    }
+
+    /// Adds a name for an expression in `work` alone.
+    pub(crate) fn with_names<R>(
+        &mut self,
+        names: &[(String, Expr)],
+        work: impl FnOnce(&mut Self) -> R,
+    ) -> R {
+        let declared = self.names.clone();
+        self.names.extend(names.iter().cloned());
+        let result = work(self);
+        self.names = declared;
+        result
+    }
+
     /// Adds an unknown of `[solve]`, of which only the displacement may make use.
     pub(crate) fn declare_unknown(
         &mut self,
@@ -92,7 +166,11 @@ impl<'a> Scope<'a> {
         self.graph.depends_on(expr, &self.unknowns)
     }
 
-    fn check_new_name(&self, name: &str, span: std::ops::Range<usize>) -> Result<(), Diagnostic> {
+    pub(crate) fn check_new_name(
+        &self,
+        name: &str,
+        span: std::ops::Range<usize>,
+    ) -> Result<(), Diagnostic> {
         let mut characters = name.chars();
         let valid = characters.next().is_some_and(|c| c.is_ascii_alphabetic())
             && characters.all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -194,8 +272,8 @@ impl<'a> Scope<'a> {
         Ok(expr)
     }
 
-    /// As [`Scope::expression`], for a material's response: in `names`, which mean something here only, and in what
-    /// depends on parameters only.
+    /// As [`Scope::expression`], for a material's response: in `names`, which mean something here only, in parameters, the position, the
+    /// time, and given fields.
     pub(crate) fn response(
         &mut self,
         text: &Text,
@@ -213,7 +291,7 @@ impl<'a> Scope<'a> {
             let symbol = self.graph.symbol(name);
             self.names.insert(name.clone(), symbol);
         }
-        let expr = self.constant(text, what);
+        let expr = self.constant_of_law(text, what);
         self.names = declared;
         expr
     }
@@ -224,11 +302,11 @@ impl<'a> Scope<'a> {
         let ast = self.source.parse(text)?;
         let Some(call) = call_of(&ast, "diff") else { return Ok(()) };
         let message = format!(
-            "{what} may not use diff: it is a function of F, J, C and parameters at one place and time, without rates or gradients \
-             of them"
+            "{what} may not use diff: it is a function of F, J, C, their rates and parameters at one place and time, without gradients of \
+             them"
         );
-        let help = "viscous and gradient laws cannot be stated; write a derivative by J, I1 or a component as the formula that it is, \
-                    as 2*(J - 1) for diff((J - 1)^2, J)";
+        let help = "rates have names, Fdot11, d11 and Jdot; a rate of another field is a line of [given]; write a derivative by J, I1 or a \
+                    component as the formula that it is, as 2*(J - 1) for diff((J - 1)^2, J)";
         Err(self.source.error(
             message,
             text.locate(self.source.text, &call.span),
@@ -236,17 +314,26 @@ impl<'a> Scope<'a> {
         ))
     }
 
-    /// As [`Scope::constant`], for text that the specification leaves out: the conventional expression.
-    pub(crate) fn constant_or(
+    /// As [`Scope::constant`], for the density, which may depend on the place: mass stays where it is.
+    pub(crate) fn density(&mut self, text: &Text) -> Result<Expr, Diagnostic> {
+        let expr = self.expression(text)?;
+        if self.graph.depends_on(expr, &BTreeSet::from([self.time])) {
+            let message = "density may depend on parameters and the place only, not on time: it is mass per reference volume";
+            return Err(self.source.error(message, text.span.clone(), None));
+        }
+        match self.is_field(expr) {
+            true => Ok(expr),
+            false => self.constant(text, "density"),
+        }
+    }
+
+    /// The conventional expression of a quantity that the specification leaves out.
+    pub(crate) fn usual(
         &mut self,
-        given: Option<&Text>,
         usual: &str,
         key: &str,
         table: std::ops::Range<usize>,
     ) -> Result<Expr, Diagnostic> {
-        if let Some(text) = given {
-            return self.constant(text, key);
-        }
         let span = table.clone();
         let missing = |message: String, scope: &Self| {
             let message = format!("{key} is not given, and '{usual}' does not serve: {message}");

@@ -12,7 +12,11 @@ pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Resu
         Domain::Box { lower, upper } => [lower.as_slice(), upper].concat(),
         Domain::Annulus { inner, outer } => vec![*inner, *outer],
     };
-    let mut constants = vec![spec.density, spec.period, spec.wave_speed, spec.cell_length];
+    let mut graph = spec.graph.clone();
+    let density = spec.in_the_middle(&mut graph, spec.density);
+    let middle = Spec { graph, ..spec.clone() };
+    let spec = &middle;
+    let mut constants = vec![density, spec.period, spec.wave_speed, spec.cell_length];
     constants.extend(&measures);
     let values = at_defaults(spec, &constants);
     let (values, measures) = values.split_at(constants.len() - measures.len());

@@ -179,7 +179,7 @@ impl<'a> Solver<'a> {
         let u = spec.displacement.clone();
         let H = derivation.gradient(&u);
         let deformation = Deformation::new(&mut derivation, &u, H.clone());
-        let stress = law::stress(&mut derivation, &deformation, &spec.material)
+        let stress = law::stress(&mut derivation, &deformation, spec)
             .map_err(|error| scope.source.error(error.to_string(), span.clone(), None))?;
         if derivation.graph.is_overgrown() {
             let message = "the fields grow too large to solve for anything".to_owned();

@@ -7,15 +7,15 @@ use crate::coordinates::CARTESIAN;
 use crate::diagnostic::nearest;
 use crate::document::{BoundaryTable, Document, DomainTable, Entries, List, ParameterEntry, Text};
 use crate::law::energy::{INVARIANTS, component_names};
-use crate::law::energy_text;
 use crate::read::LONGEST_FILE;
 use crate::scope::Scope;
 use crate::source::Source;
-use crate::{Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Rotation, Solved};
-use mmsmith_expr::{Expr, Function, Graph, Node, Program, RangeOfInputs, Rational};
-use mmsmith_vocabulary::{
-    Components, Constant, Material, Moduli, Response, Row, Stated, Term, UnknownLaw, Volumetric,
+use crate::{
+    Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Given, InternalVariable, Rotation,
+    Solved,
 };
+use mmsmith_expr::{Expr, Function, Graph, Node, Program, RangeOfInputs, Rational};
+use mmsmith_vocabulary::{Constant, Material, Memory, Moduli, Row, Term, UnknownLaw, Volumetric};
 use toml::Spanned;
 
 /// A specification that has been read and checked.
@@ -43,9 +43,15 @@ pub struct Spec {
     pub graph: Graph,
     /// Physical components of the displacement.
     pub displacement: Vec<Expr>,
-    /// The constitutive law.
+    /// The constitutive law; the elastic part of one with [`memory`](Self::memory).
     pub material: Law,
-    /// Mass per reference volume.
+    /// Fields of position and time that the law uses.
+    pub given: Vec<Given>,
+    /// What a law of the library remembers.
+    pub memory: Option<Memory<Expr>>,
+    /// The internal variables of a law that the specification states.
+    pub internal: Vec<InternalVariable>,
+    /// Mass per reference volume; it may depend on the place.
     pub density: Expr,
     /// The body's shape.
     pub domain: Domain,
@@ -261,53 +267,6 @@ impl Law {
             .iter()
             .map(|(constant, value)| format!("{} = {}", constant.name, graph.print(*value)));
         std::iter::once(law).chain(values).collect()
-    }
-
-    /// The law as a solver needs it: one that the specification states in text, with the parameters in it.
-    #[must_use]
-    pub fn for_solver(
-        &self,
-        graph: &Graph,
-        coordinates: Coordinates,
-    ) -> mmsmith_vocabulary::Law<Expr> {
-        let (response, of_response, is_stress) = match self {
-            Law::Library(material)
-                if material.row().is_isotropic || coordinates == Coordinates::Cartesian =>
-            {
-                return mmsmith_vocabulary::Law::Library(*material);
-            }
-            // The library's laws have their directions along Cartesian axes; here they turn from place to place.
-            Law::Library(material) => {
-                let constants = self.constants().into_iter();
-                return mmsmith_vocabulary::Law::Stated(Stated {
-                    response: Response::Energy(energy_text(material)),
-                    components: Components::Curvilinear,
-                    constants: constants.map(|(row, value)| (row.name.to_owned(), value)).collect(),
-                    given: Vec::new(),
-                    internal: Vec::new(),
-                });
-            }
-            Law::Energy { W } => (Response::Energy(graph.print(*W)), vec![*W], false),
-            Law::Stress { P } => {
-                let row = |row: &Vec<Expr>| row.iter().map(|&entry| graph.print(entry)).collect();
-                (Response::Stress(P.iter().map(row).collect()), P.concat(), true)
-            }
-        };
-        let names = ["F", "C"].map(|letter| component_names(letter, 3).concat()).concat();
-        let symbols = graph.symbols_in(&of_response).into_iter();
-        let (in_components, others): (Vec<_>, Vec<_>) = symbols
-            .filter_map(|symbol| Some((graph.symbol_name(symbol)?.to_owned(), symbol)))
-            .partition(|(name, _)| names.contains(name));
-        let has_components = is_stress || !in_components.is_empty();
-        let components = match coordinates {
-            Coordinates::Cartesian => Components::Cartesian,
-            _ if has_components => Components::Curvilinear,
-            _ => Components::Cartesian,
-        };
-        let constants =
-            others.into_iter().filter(|(name, _)| !INVARIANTS.contains(&name.as_str())).collect();
-        let (given, internal) = (Vec::new(), Vec::new());
-        mmsmith_vocabulary::Law::Stated(Stated { response, components, constants, given, internal })
     }
 }
 
@@ -546,10 +505,10 @@ impl Spec {
     }
 }
 
-struct Reader<'a> {
-    scope: Scope<'a>,
+pub(crate) struct Reader<'a> {
+    pub(crate) scope: Scope<'a>,
     coordinates: Coordinates,
-    dimension: usize,
+    pub(crate) dimension: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -597,10 +556,16 @@ impl<'a> Reader<'a> {
         self.scope.define_all(&document.lets.0)?;
         let requirements = self.requirements(document, &parameters)?;
         let displacement = self.displacement(document)?;
+        let given = self.given(document)?;
         let material = self.material(document)?;
+        let memory = self.memory(document, &material)?;
+        let internal = self.internal(document, &material)?;
         let table = document.material.span();
         let density = document.material.get_ref().density.as_ref();
-        let density = self.scope.constant_or(density, "rho0", "density", table)?;
+        let density = match density {
+            Some(text) => self.scope.density(text)?,
+            None => self.scope.usual("rho0", "density", table)?,
+        };
         let domain = self.domain(&document.domain)?;
         let cell_length = match &document.domain.get_ref().cell_length {
             Some(text) => self.scope.constant(text, "cell-length")?,
@@ -616,6 +581,9 @@ impl<'a> Reader<'a> {
         if let Some(table) = &document.with_rotation {
             rotation = Some(Rotation::read(&mut self.scope, table, self.dimension)?);
             Rotation::check(&self.scope, table, &material, &boundaries, &document.boundary.0)?;
+        }
+        if memory.is_some() || !internal.is_empty() {
+            self.refuse_beside_history(document)?;
         }
         let cross_checks = document
             .cross_check
@@ -650,6 +618,9 @@ impl<'a> Reader<'a> {
             graph: std::mem::take(&mut self.scope.graph),
             displacement,
             material,
+            given,
+            memory,
+            internal,
             density,
             domain,
             cell_length,
@@ -825,10 +796,22 @@ impl<'a> Reader<'a> {
         let given = table.constants.0.iter().map(|(key, _)| (key.get_ref().as_str(), key.span()));
         let given = given.chain(table.W.iter().map(|text| ("W", text.span.clone())));
         let given = given.chain(table.P.iter().map(|_| ("P", table.law.span())));
+        // Young's modulus and Poisson's ratio serve constants that are left out and follow from them.
+        let moduli: Vec<&str> = match kind {
+            Kind::Library(row) => {
+                let left_out =
+                    row.constants.iter().filter(|c| table.constants.get(c.name).is_none());
+                let words: Vec<&str> = left_out
+                    .flat_map(|c| c.usual.split(|c: char| !c.is_ascii_alphanumeric()))
+                    .collect();
+                ["E", "nu"].into_iter().filter(|name| words.contains(name)).collect()
+            }
+            Kind::Energy | Kind::Stress => Vec::new(),
+        };
         let volumetric = table.volumetric.as_ref();
         let given = given.chain(volumetric.map(|word| ("volumetric", word.span())));
         for (key, span) in given {
-            if !keys.contains(&key) {
+            if !keys.contains(&key) && !moduli.contains(&key) {
                 let message = format!("the law '{law}' has no '{key}'");
                 let mut help = format!("it takes {}", keys.join(", "));
                 if let Some(usual) = usual_modulus(key, &keys) {
@@ -853,7 +836,8 @@ impl<'a> Reader<'a> {
                         "give its components, as P = { 11 = 'mu*(F11 - 1/F11)', 12 = '...' }";
                     return Err(missing(&self.scope, "P", help));
                 };
-                return self.stress_components(entries);
+                let names = self.stress_names(document);
+                return self.stress_components(entries, &names);
             }
             Kind::Energy => {
                 let Some(text) = &table.W else {
@@ -861,7 +845,9 @@ impl<'a> Reader<'a> {
                                 W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
                     return Err(missing(&self.scope, "W", help));
                 };
-                let names = self.response_names();
+                let internal = document.internal.0.iter().map(|(name, _)| name.get_ref().clone());
+                let names: Vec<String> =
+                    self.response_names().into_iter().chain(internal).collect();
                 return Ok(Law::Energy { W: self.scope.response(text, "an energy", &names)? });
             }
         };
@@ -870,6 +856,12 @@ impl<'a> Reader<'a> {
             None => Volumetric::default(),
         };
         let span = document.material.span();
+        let mut local = Vec::new();
+        for name in moduli {
+            if let Some(text) = table.constants.get(name) {
+                local.push((name.to_owned(), self.scope.constant_of_law(text, name)?));
+            }
+        }
         let mut values = Vec::with_capacity(row.constants.len());
         for Constant { name, usual, .. } in row.constants {
             let text = table.constants.get(name);
@@ -881,7 +873,10 @@ impl<'a> Reader<'a> {
                     let key = if other { usual } else { name };
                     return Err(missing(&self.scope, key, &format!("give {key} = '...' here")));
                 }
-                text => self.scope.constant_or(text, usual, name, span.clone())?,
+                Some(text) => self.scope.constant_of_law(text, name)?,
+                None => {
+                    self.scope.with_names(&local, |scope| scope.usual(usual, name, span.clone()))?
+                }
             });
         }
         let mut values = values.into_iter();
@@ -894,15 +889,18 @@ impl<'a> Reader<'a> {
     }
 
     /// The names that a material's response may use.
-    fn response_names(&self) -> Vec<String> {
+    pub(crate) fn response_names(&self) -> Vec<String> {
         let components = ["F", "C"].map(|letter| component_names(letter, self.dimension).concat());
         INVARIANTS.iter().map(|&name| name.to_owned()).chain(components.concat()).collect()
     }
 
     /// Components that are left out are zero.
-    fn stress_components(&mut self, entries: &Entries<Text>) -> Result<Law, Diagnostic> {
+    fn stress_components(
+        &mut self,
+        entries: &Entries<Text>,
+        names: &[String],
+    ) -> Result<Law, Diagnostic> {
         let n = self.dimension;
-        let names = self.response_names();
         let keys = component_names("", n);
         let mut P = vec![vec![Graph::ZERO; n]; n];
         for (key, text) in &entries.0 {
@@ -915,7 +913,7 @@ impl<'a> Reader<'a> {
                 let help = format!("the components are {}", keys.concat().join(", "));
                 return Err(self.scope.source.error(message, key.span(), Some(help)));
             };
-            P[i][j] = self.scope.response(text, "a stress", &names)?;
+            P[i][j] = self.scope.response(text, "a stress", names)?;
         }
         Ok(Law::Stress { P })
     }
@@ -927,8 +925,14 @@ impl<'a> Reader<'a> {
         density: Expr,
         table: std::ops::Range<usize>,
     ) -> Result<Expr, Diagnostic> {
-        let graph = &mut self.scope.graph;
         let moduli = match material {
+            Law::Library(material) if material.values().iter().any(|&c| self.scope.is_field(c)) => {
+                let message =
+                    "the constants of the law depend on the place, and so does the speed of waves";
+                let help =
+                    "give wave-speed = '...' under [time], the speed that CFL numbers refer to";
+                return Err(self.scope.source.error(message, table, Some(help.into())));
+            }
             Law::Library(material) => material.moduli(),
             Law::Energy { .. } | Law::Stress { .. } => None,
         };
@@ -937,6 +941,7 @@ impl<'a> Reader<'a> {
             let help = "give wave-speed = '...' here, the speed that CFL numbers refer to";
             return Err(self.scope.source.error(message, table, Some(help.into())));
         };
+        let graph = &mut self.scope.graph;
         let mut sum = |terms: Vec<Term<Expr>>| {
             let mut summands = Vec::with_capacity(terms.len());
             for Term { factor: [numerator, denominator], powers } in terms {
@@ -1110,7 +1115,7 @@ impl<'a> Reader<'a> {
         Err(self.scope.source.error(message, surface.span(), Some(help.into())))
     }
 
-    fn choice<'b, T>(
+    pub(crate) fn choice<'b, T>(
         &self,
         word: &Spanned<String>,
         what: &str,
@@ -1146,7 +1151,7 @@ fn usual_modulus(key: &str, keys: &[&str]) -> Option<&'static str> {
     let is_modulus =
         matches!(key, "E" | "nu" | "young" | "youngs-modulus" | "poisson" | "poissons-ratio");
     (is_modulus && keys.contains(&"mu")).then_some(if keys.contains(&"lambda") {
-        "declare E and nu under [parameters]: lambda and mu follow from them where they are not given"
+        "declare E and nu under [parameters], or give them here: lambda and mu follow from them where they are not given"
     } else {
         "declare E and nu under [parameters], and write mu = 'E/(2*(1 + nu))' and the like here"
     })

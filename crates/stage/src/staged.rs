@@ -4,9 +4,9 @@ use crate::block::{Block, Stage, is_computed, needed, numbered};
 use crate::field::{Field, FieldName};
 use crate::outputs::{Group, Outputs, Single};
 use mmsmith_expr::{
-    Dependence, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
+    Dependence, Expr, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
 };
-use mmsmith_spec::{Domain, Fields, Spec, Surface};
+use mmsmith_spec::{Domain, Fields, HistoryFields, Spec, Surface};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeMap;
 
@@ -29,12 +29,49 @@ pub struct Staged {
     pub velocity: Stages,
     /// The scalars that depend on parameters only.
     pub constants: Constants,
+    /// The density at a place, where it depends on it; [`Constants::density`] is that in the middle of the body then.
+    pub density_here: Option<Slot>,
     /// The strain energy, where the material is given by one.
     pub energy: Option<Slot>,
     /// The traction on each surface.
     pub tractions: Vec<Traction>,
     /// The two sides of each requirement of the specification.
     pub requirements: Vec<Sides>,
+    /// The motion as histories of internal variables need it, where the law has some; then there is no stress and no body force.
+    pub history: Option<History>,
+}
+
+/// The motion as histories of internal variables need it, see [`HistoryFields`], as a program of its own.
+#[derive(Clone, Debug)]
+pub struct History {
+    /// The values that histories need at each time: the deformation gradient, its rate, and the derivatives of both along each
+    /// direction, row by row.
+    pub motion: Program,
+    /// The acceleration in the same frame, and the frame: `[i][a]`, Cartesian component `i` of its unit vector `a`.
+    pub inertia: Program,
+    /// The coordinates of the specification that the motion depends on.
+    pub coordinates: Vec<bool>,
+}
+
+impl History {
+    fn new(spec: &Spec, fields: &mut Fields) -> Option<Self> {
+        let HistoryFields { a, F, rate, slopes, slopes_of_rate, frame } = fields.history.take()?;
+        let all = [F, rate].into_iter().chain(slopes).chain(slopes_of_rate);
+        let motion: Vec<Expr> = all.flat_map(|matrix| matrix.concat()).collect();
+        let symbols =
+            fields.graph.symbols_in(&motion.iter().chain(&a).copied().collect::<Vec<_>>());
+        let names = spec.coordinates.coordinate_names(spec.dimension);
+        let coordinates = names
+            .iter()
+            .map(|name| symbols.iter().any(|s| fields.graph.symbol_name(*s) == Some(name)))
+            .collect();
+        let inertia: Vec<Expr> = a.into_iter().chain(frame.concat()).collect();
+        Some(History {
+            motion: fields.program(&motion),
+            inertia: fields.program(&inertia),
+            coordinates,
+        })
+    }
 }
 
 /// Values that are computed in stages, and which values are kept for them.
@@ -150,11 +187,14 @@ impl Staged {
     #[must_use]
     pub fn of(spec: &Spec, mut fields: Fields) -> Self {
         let dimension = spec.dimension;
+        let history = History::new(spec, &mut fields);
         let mut outputs = Outputs::default();
         let parts = FieldName::ALL.map(|name| (name, outputs.add(name.derived(&fields))));
         // Solvers sample the body force at the same points in every step; a single call does all the work each time.
         let staged = outputs.add(fields.b.iter().copied());
-        let constants = ConstantOutputs::new(spec, &mut outputs);
+        let density = spec.in_the_middle(&mut fields.graph, spec.density);
+        let density_here = (density != spec.density).then(|| outputs.add_one(spec.density));
+        let constants = ConstantOutputs::new(spec, density, &mut outputs);
         let energy = fields.W.map(|energy| outputs.add_one(energy));
         let requirements: Vec<(Single, Single)> = spec
             .requirements
@@ -200,6 +240,7 @@ impl Staged {
             body_force,
             lattice,
             constants: constants.slots(&program),
+            density_here: density_here.map(|density| density.slot(&program)),
             energy: energy.map(|energy| energy.slot(&program)),
             requirements: requirements
                 .into_iter()
@@ -212,6 +253,7 @@ impl Staged {
                 .into_iter()
                 .map(|(surface, group)| Traction { surface, outputs: group.slots(&program) })
                 .collect(),
+            history,
             fields: fields.into(),
             fixed,
             program,
@@ -378,16 +420,13 @@ impl Stages {
 }
 
 impl ConstantOutputs {
-    fn new(spec: &Spec, outputs: &mut Outputs) -> Self {
+    fn new(spec: &Spec, density: Expr, outputs: &mut Outputs) -> Self {
         ConstantOutputs {
             cell_length: outputs.add_one(spec.cell_length),
-            density: outputs.add_one(spec.density),
+            density: outputs.add_one(density),
             wave_speed: outputs.add_one(spec.wave_speed),
             period: outputs.add_one(spec.period),
-            law: spec
-                .material
-                .for_solver(&spec.graph, spec.coordinates)
-                .map(|value| outputs.add_one(value)),
+            law: spec.law_for_solver().map(|value| outputs.add_one(value)),
             domain: match &spec.domain {
                 Domain::Box { lower, upper } => DomainOutputs::Box {
                     lower: outputs.add(lower.iter().copied()),

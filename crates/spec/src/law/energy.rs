@@ -41,11 +41,29 @@ pub(super) struct ComponentLaw {
     energy: Option<Expr>,
     /// Quantities of `h` that the deformation has in a form of its own.
     known: BTreeMap<Expr, Expr>,
+    /// The symbols that stand for the components of the rate of the displacement gradient, where the law uses them.
+    rates: Option<Matrix>,
+    /// Fields of position and time that the law uses.
+    fields: Vec<Field>,
     /// Components that vanish, and `J`, where it is a product of stretches then: for derivatives, once they are formed.
     simpler: BTreeMap<Expr, Expr>,
 }
 
+/// A field of position and time that a law uses.
+#[derive(Clone, Copy)]
+pub(super) struct Field {
+    /// Its symbol in the law.
+    pub(super) symbol: Expr,
+    /// The field, which may use the symbols of fields before it.
+    pub(super) value: Expr,
+}
+
 impl ComponentLaw {
+    /// With fields of position and time that the law uses.
+    pub(super) fn with_fields(self, fields: Vec<Field>) -> Self {
+        Self { fields, ..self }
+    }
+
     /// From the strain energy; `isotropic` where it is an isotropic function of every deformation.
     pub(super) fn of_energy(
         graph: &mut Graph,
@@ -61,29 +79,59 @@ impl ComponentLaw {
             .iter()
             .map(|row| row.iter().map(|&h| derivatives.of(graph, energy, h)).collect())
             .collect();
-        ComponentLaw { h, P, isotropic, energy: Some(energy), known, simpler }
+        let fields = Vec::new();
+        ComponentLaw { h, P, isotropic, energy: Some(energy), known, rates: None, fields, simpler }
     }
 
     /// From the components of the stress.
-    pub(super) fn of_stress(graph: &mut Graph, deformation: &Deformation, P: &Matrix) -> Self {
+    pub(super) fn of_stress(
+        derivation: &mut Derivation,
+        deformation: &Deformation,
+        P: &Matrix,
+        fields: Vec<Field>,
+    ) -> Self {
+        let graph = &mut derivation.graph;
         let h = symbols(graph, deformation.H.len());
         let Components { mut replacement, known, simpler } = in_components(graph, &h, deformation);
         if deformation.is_isochoric() {
             replacement.insert(graph.symbol("J"), Graph::ONE);
         }
+        let names = crate::memory::rate_names(h.len());
+        let used = graph.symbols_in(&P.concat());
+        let uses_rates = names.iter().any(|name| used.contains(&graph.symbol(name)));
+        let rates = uses_rates.then(|| rates_in_components(graph, &h, &mut replacement));
         let P = P
             .iter()
             .map(|row| row.iter().map(|&p| graph.replace(p, &replacement)).collect())
             .collect();
-        ComponentLaw { h, P, isotropic: false, energy: None, known, simpler }
+        ComponentLaw { h, P, isotropic: false, energy: None, known, rates, fields, simpler }
     }
 
     pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
         let n = self.h.len();
-        let small: BTreeSet<Expr> = self.h.iter().flatten().copied().collect();
+        let mut small: BTreeSet<Expr> = self.h.iter().flatten().copied().collect();
         let mut actual = self.known.clone();
         for (symbol, entry) in self.h.iter().flatten().zip(deformation.H.iter().flatten()) {
             actual.insert(*symbol, *entry);
+        }
+        let mut rate = Matrix::new();
+        if let Some(symbols) = &self.rates {
+            let time = derivation.time;
+            rate = deformation.H.clone();
+            for (entry, symbol) in rate.iter_mut().flatten().zip(symbols.iter().flatten()) {
+                let derivative = derivation.derivative(*entry, time);
+                *entry = derivation.graph.whole(derivative);
+                small.insert(*symbol);
+                actual.insert(*symbol, *entry);
+            }
+        }
+        // Fields may use fields before them.
+        let mut of_fields = BTreeMap::new();
+        for Field { symbol, value } in &self.fields {
+            let value = derivation.graph.replace(*value, &of_fields);
+            let value = derivation.graph.whole(value);
+            of_fields.insert(*symbol, value);
+            actual.insert(*symbol, value);
         }
         let graph = &mut derivation.graph;
         let mut general = self.P.clone();
@@ -104,6 +152,10 @@ impl ComponentLaw {
 
         let open = derivation.second_gradient(&deformation.open, self.isotropic);
         let whole = derivation.second_gradient(&deformation.H, self.isotropic);
+        let of_rate = match &self.rates {
+            Some(_) => derivation.second_gradient(&rate, self.isotropic),
+            None => Vec::new(),
+        };
         let mut derivatives = Derivatives::limited();
         let (mut linear, mut remainder) = (Vector::new(), Vector::new());
         for i in 0..n {
@@ -121,10 +173,29 @@ impl ComponentLaw {
                     derivatives.of(graph, stress[i][J], h)
                 };
                 let (value, rest) = graph.split_at_zero(modulus, &small);
-                let value = modulus_at_rest(graph, value);
+                let value = if self.fields.is_empty() {
+                    modulus_at_rest(graph, value)
+                } else {
+                    graph.replace(value, &actual)
+                };
                 first.push(graph.mul(value, open[k][L][J]));
                 let rest = graph.replace(rest, &actual);
                 second.push(graph.mul(rest, whole[k][L][J]));
+            }
+            for (J, k, L) in indices(if self.rates.is_some() { n } else { 0 }) {
+                let Some(symbols) = &self.rates else { continue };
+                let viscosity = derivatives.of(&mut derivation.graph, stress[i][J], symbols[k][L]);
+                let viscosity = derivation.graph.replace(viscosity, &actual);
+                second.push(derivation.graph.mul(viscosity, of_rate[k][L][J]));
+            }
+            // Of the law at one deformation from place to place.
+            for (J, &Field { symbol, .. }) in
+                (0..n).flat_map(|J| self.fields.iter().map(move |field| (J, field)))
+            {
+                let slope = derivatives.of(&mut derivation.graph, stress[i][J], symbol);
+                let slope = derivation.graph.replace(slope, &actual);
+                let along = derivation.along(of_fields[&symbol], J);
+                second.push(derivation.graph.mul(slope, along));
             }
             if !self.isotropic {
                 second.extend(derivation.divergence_of_frame(&P, i));
@@ -132,13 +203,15 @@ impl ComponentLaw {
             linear.push(derivation.graph.sum_of(first));
             remainder.push(derivation.graph.sum_of(second));
         }
-        let energy = self.energy.map(|energy| {
+        // The energy of a law that changes from place to place, or in time, is not the work that the stress has done.
+        let energy = self.energy.filter(|_| self.fields.is_empty()).map(|energy| {
             let (value, rest) = derivation.graph.split_at_zero(energy, &small);
             let value = zero_if_vanishing(&mut derivation.graph, value);
             let energy = derivation.graph.add(value, rest);
             derivation.graph.replace(energy, &actual)
         });
-        let (isotropic, anisotropic) = if derivation.geometry.is_cartesian() || n < 2 {
+        let has_one_place = derivation.geometry.is_cartesian() || n < 2;
+        let (isotropic, anisotropic) = if has_one_place || !self.fields.is_empty() {
             (Graph::ZERO, P.clone())
         } else {
             let cross = derivatives.of(&mut derivation.graph, general[0][0], self.h[1][1]);
@@ -188,6 +261,55 @@ fn isotropic_and_rest(
         }
     }
     (pressure, rest)
+}
+
+/// Puts the rates of the deformation in symbols for the components of the rate of the displacement gradient, which it gives:
+/// `d = sym(dF/dt F^-1)` and `dJ/dt = cof F : dF/dt`.
+fn rates_in_components(
+    graph: &mut Graph,
+    h: &Matrix,
+    replacement: &mut BTreeMap<Expr, Expr>,
+) -> Matrix {
+    let n = h.len();
+    let mut F = h.clone();
+    for (k, row) in F.iter_mut().enumerate() {
+        row[k] = graph.add(Graph::ONE, row[k]);
+    }
+    let rates: Matrix = component_names("rate of h ", n)
+        .iter()
+        .map(|row| row.iter().map(|name| graph.symbol(name)).collect())
+        .collect();
+    let J = determinant(graph, &F);
+    let mut cofactors = F.clone();
+    for i in 0..n {
+        for k in 0..n {
+            cofactors[i][k] = cofactor(graph, &F, i, k);
+        }
+    }
+    let terms: Vec<Expr> =
+        (0..n * n).map(|m| graph.mul(cofactors[m / n][m % n], rates[m / n][m % n])).collect();
+    let rate_of_J = graph.sum_of(terms);
+    replacement.insert(graph.symbol("Jdot"), rate_of_J);
+    // l = dF/dt F^-1 with F^-1 = cof(F)^T / J.
+    let mut l = F.clone();
+    for i in 0..n {
+        for j in 0..n {
+            let terms: Vec<Expr> =
+                (0..n).map(|k| graph.mul(rates[i][k], cofactors[j][k])).collect();
+            let sum = graph.sum_of(terms);
+            l[i][j] = graph.div(sum, J);
+        }
+    }
+    let two = graph.integer(2);
+    for i in 0..n {
+        for j in 0..n {
+            replacement.insert(graph.symbol(&format!("Fdot{}{}", i + 1, j + 1)), rates[i][j]);
+            let sum = graph.add(l[i][j], l[j][i]);
+            let half = graph.div(sum, two);
+            replacement.insert(graph.symbol(&format!("d{}{}", i + 1, j + 1)), half);
+        }
+    }
+    rates
 }
 
 fn indices(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {

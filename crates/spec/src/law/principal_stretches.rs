@@ -47,9 +47,21 @@ pub(super) fn energy(
              three: choose coordinates in which it does not, or another law",
         ));
     }
+    Ok((in_components(n, pairs.first().copied(), parts), n == 2 && pairs.len() == 1))
+}
+
+/// The energy of every deformation in one or two dimensions as text in the components of `F`; none in space, where all directions are
+/// coupled.
+pub(super) fn energy_of_all(dimension: usize, parts: &InStretches) -> Option<String> {
+    let pair = (dimension == 2).then_some((0, 1));
+    (dimension < 3).then(|| in_components(dimension, pair, parts))
+}
+
+/// The energy as text in the components of `F`, of which at most two directions are coupled.
+fn in_components(n: usize, pair: Option<(usize, usize)>, parts: &InStretches) -> String {
     let mut text = parts.volume.to_owned();
     let mut alone: Vec<usize> = (0..n).collect();
-    if let Some(&(i, j)) = pairs.first() {
+    if let Some((i, j)) = pair {
         alone.retain(|&k| k != i && k != j);
         let (i, j) = (i + 1, j + 1);
         let area = format!("(F{i}{i}*F{j}{j} - F{i}{j}*F{j}{i})");
@@ -64,7 +76,7 @@ pub(super) fn energy(
     }
     // Nothing stretches along the directions left out.
     text.extend((n..3).map(|_| along("1")));
-    Ok((text, n == 2 && pairs.len() == 1))
+    text
 }
 
 /// Whether the deformation is one in the plane whose principal directions are not those of the coordinates.

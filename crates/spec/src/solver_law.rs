@@ -1,0 +1,190 @@
+//! The law of a specification as a solver needs it, with texts where the library has no law of the kind.
+
+use crate::law::energy::{INVARIANTS, component_names};
+use crate::law::energy_text;
+use crate::memory::rate_names;
+use crate::spec::Law;
+use crate::{Coordinates, Domain, Spec};
+use mmsmith_expr::{Expr, Graph};
+use mmsmith_vocabulary::{Components, Internal, Law as ForSolver, Response, Stated, WithMemory};
+
+impl Spec {
+    /// The law as a solver needs it: one that the specification states in text, with the parameters in it.
+    #[must_use]
+    pub fn law_for_solver(&self) -> ForSolver<Expr> {
+        let graph = &self.graph;
+        let print = |expr: Expr| graph.print(expr);
+        if let (Law::Library(elastic), Some(memory)) = (&self.material, &self.memory) {
+            return ForSolver::WithMemory(WithMemory { elastic: *elastic, memory: memory.clone() });
+        }
+        let mut given: Vec<(String, String)> = Vec::new();
+        let mut of_given = Vec::new();
+        for field in &self.given {
+            given.push((field.name.clone(), print(field.value)));
+            of_given.push(field.value);
+        }
+        let (response, mut of_response, is_stress) = match &self.material {
+            Law::Library(material) => {
+                let is_graded = self.has_graded_constants();
+                let has_directions = !material.row().is_isotropic;
+                if !is_graded && (!has_directions || self.coordinates == Coordinates::Cartesian) {
+                    return ForSolver::Library(*material);
+                }
+                // The library's laws have their directions along Cartesian axes; here they turn from place to place.
+                let response = Response::Energy(energy_text(material, self.dimension));
+                let constants = self.material.constants().into_iter();
+                let components = match self.coordinates {
+                    Coordinates::Cartesian => Components::Cartesian,
+                    _ if has_directions => Components::Curvilinear,
+                    _ => Components::Cartesian,
+                };
+                if !is_graded {
+                    return ForSolver::Stated(Stated {
+                        response,
+                        components,
+                        constants: constants
+                            .map(|(row, value)| (row.name.to_owned(), value))
+                            .collect(),
+                        given,
+                        internal: Vec::new(),
+                    });
+                }
+                let constants: Vec<(String, Expr)> =
+                    constants.map(|(row, value)| (row.name.to_owned(), value)).collect();
+                // A constant that is a field hides a parameter of its name, which its own text may use.
+                let mut of_constants = of_given.clone();
+                for (name, value) in &constants {
+                    given.push((format!("{name}_here"), print(*value)));
+                    of_constants.push(*value);
+                }
+                let Response::Energy(text) = response else { return ForSolver::Library(*material) };
+                let names: Vec<String> = constants.iter().map(|(name, _)| name.clone()).collect();
+                let response = Response::Energy(with_suffix(&text, &names, "_here"));
+                let given_names = self.given.iter().map(|field| field.name.as_str());
+                return ForSolver::Stated(Stated {
+                    response,
+                    components,
+                    constants: self.parameters_in(&of_constants, given_names),
+                    given,
+                    internal: Vec::new(),
+                });
+            }
+            Law::Energy { W } => (Response::Energy(print(*W)), vec![*W], false),
+            Law::Stress { P } => {
+                let row = |row: &Vec<Expr>| row.iter().map(|&entry| print(entry)).collect();
+                (Response::Stress(P.iter().map(row).collect()), P.concat(), true)
+            }
+        };
+        let names = ["F", "C"].map(|letter| component_names(letter, 3).concat()).concat();
+        let rates = rate_names(3);
+        let has_components = graph
+            .symbols_in(&of_response)
+            .into_iter()
+            .filter_map(|symbol| graph.symbol_name(symbol))
+            .any(|name| names.iter().any(|known| known == name));
+        let components = match self.coordinates {
+            Coordinates::Cartesian => Components::Cartesian,
+            _ if is_stress || has_components => Components::Curvilinear,
+            _ => Components::Cartesian,
+        };
+        let internal: Vec<Internal> = self
+            .internal
+            .iter()
+            .map(|variable| Internal {
+                name: variable.name.clone(),
+                rate: print(variable.rate),
+                initial: print(variable.initial),
+            })
+            .collect();
+        of_response
+            .extend(self.internal.iter().flat_map(|variable| [variable.rate, variable.initial]));
+        of_response.extend(&of_given);
+        let own = self.given.iter().map(|field| field.name.as_str());
+        let own = own.chain(self.internal.iter().map(|variable| variable.name.as_str()));
+        let own =
+            own.chain(names.iter().map(String::as_str)).chain(rates.iter().map(String::as_str));
+        let constants = self.parameters_in(&of_response, own.chain(INVARIANTS));
+        ForSolver::Stated(Stated { response, components, constants, given, internal })
+    }
+
+    /// The parameters in expressions, which may also use coordinates, the time, and the names in `others`.
+    fn parameters_in<'a>(
+        &self,
+        expressions: &[Expr],
+        others: impl Iterator<Item = &'a str>,
+    ) -> Vec<(String, Expr)> {
+        let coordinates = self.coordinates.coordinate_names(self.dimension);
+        let others: Vec<&str> = others.chain(coordinates.iter().copied()).chain(["t"]).collect();
+        self.graph
+            .symbols_in(expressions)
+            .into_iter()
+            .filter_map(|symbol| Some((self.graph.symbol_name(symbol)?.to_owned(), symbol)))
+            .filter(|(name, _)| !others.contains(&name.as_str()))
+            .collect()
+    }
+
+    /// An expression of the place in the middle of the body: of a box, or between the two radii on the first axis.
+    #[must_use]
+    pub fn in_the_middle(&self, graph: &mut Graph, expr: Expr) -> Expr {
+        if !self.is_field(expr) {
+            return expr;
+        }
+        let names = self.coordinates.coordinate_names(self.dimension);
+        let middle = |graph: &mut Graph, low: Expr, high: Expr| {
+            let (sum, two) = (graph.add(low, high), graph.integer(2));
+            graph.div(sum, two)
+        };
+        let place: Vec<Expr> = match &self.domain {
+            Domain::Box { lower, upper } => {
+                lower.iter().zip(upper).map(|(&low, &high)| middle(graph, low, high)).collect()
+            }
+            Domain::Annulus { inner, outer } => {
+                let radius = middle(graph, *inner, *outer);
+                let rest = vec![Graph::ZERO; names.len().saturating_sub(1)];
+                [vec![radius], rest].concat()
+            }
+        };
+        let symbols = names.iter().map(|name| graph.symbol(name)).collect::<Vec<_>>();
+        graph.replace(expr, &symbols.into_iter().zip(place).collect())
+    }
+
+    /// Whether constants of a law of the library depend on the place, the time, or given fields.
+    #[must_use]
+    pub fn has_graded_constants(&self) -> bool {
+        self.material.constants().iter().any(|(_, value)| self.is_field(*value))
+    }
+
+    /// Whether an expression depends on the place, the time, or given fields.
+    pub(crate) fn is_field(&self, expr: Expr) -> bool {
+        let coordinates = self.coordinates.coordinate_names(self.dimension);
+        let given = self.given.iter().map(|field| field.name.as_str());
+        let names: Vec<&str> = coordinates.iter().copied().chain(["t"]).chain(given).collect();
+        let symbols = self.graph.symbols_in(&[expr]);
+        symbols.iter().filter_map(|s| self.graph.symbol_name(*s)).any(|name| names.contains(&name))
+    }
+
+    /// Whether the stress depends on the history of the deformation, so that its fields are no formulas of position and time.
+    #[must_use]
+    pub fn has_history(&self) -> bool {
+        self.memory.is_some() || !self.internal.is_empty()
+    }
+}
+
+/// A text in which some names have a suffix.
+fn with_suffix(text: &str, names: &[String], suffix: &str) -> String {
+    let mut changed = String::new();
+    let mut word = String::new();
+    for c in text.chars().chain([' ']) {
+        if c.is_ascii_alphanumeric() || c == '_' {
+            word.push(c);
+            continue;
+        }
+        changed.push_str(&word);
+        if names.contains(&word) {
+            changed.push_str(suffix);
+        }
+        word.clear();
+        changed.push(c);
+    }
+    changed.trim_end().to_owned()
+}
