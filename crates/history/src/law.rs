@@ -12,15 +12,6 @@ pub struct Kinematics<N> {
     pub rate: Tensor<N>,
 }
 
-/// An internal variable.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
-    /// Its name.
-    pub name: String,
-    /// Its value in a body that has not been deformed.
-    pub initial: f64,
-}
-
 /// The set of rate equations that a particle follows for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Branch {
@@ -30,25 +21,129 @@ pub enum Branch {
     Flowing,
 }
 
-/// A law of a material with memory. Its functions are generic over the numbers, so that slopes along positions come by dual numbers.
-pub trait LawWithHistory: Sync {
-    /// The internal variables, in their order.
-    fn variables(&self) -> Vec<Variable>;
+/// How the body force behaves where particles change their branch, from worst to best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Smoothness {
+    /// It jumps.
+    Jump,
+    /// It is continuous and its slopes are not.
+    Kink,
+    /// Its slopes are continuous.
+    Smooth,
+}
 
-    /// Writes the rates of the internal variables `z` on a branch.
-    fn rate<N: Number>(&self, at: &Kinematics<N>, z: &[N], branch: Branch, rates: &mut [N]);
+/// By how much the variables of a particle miss conditions that exact ones keep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Residuals {
+    /// `|f|` over the yield stress of the virgin material, while the particle flows without regard to the rate.
+    pub yield_condition: f64,
+    /// `|det G - 1|`: flow keeps the volume.
+    pub volume: f64,
+}
+
+impl Residuals {
+    /// The larger of both, each.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            yield_condition: self.yield_condition.max(other.yield_condition),
+            volume: self.volume.max(other.volume),
+        }
+    }
+}
+
+/// A law of a material with memory. It holds no numbers: each call has the values of its [constants](Self::constants), which may depend on
+/// the position. Functions are generic over the numbers, so that slopes along positions come by dual numbers.
+pub trait LawWithHistory: Sync {
+    /// The names of the constants, in their order.
+    fn constants(&self) -> Vec<String>;
+
+    /// Whether constants change with time. Default: they do not, and are asked for once.
+    fn constants_change(&self) -> bool {
+        false
+    }
+
+    /// The names of the variables that are integrated, in their order.
+    fn variables(&self) -> Vec<String>;
+
+    /// The values of the variables at the time zero, where the body has not moved.
+    fn initial<N: Number>(&self, constants: &[N]) -> Vec<N>;
+
+    /// Writes the rates of the variables `z` on a branch.
+    fn rate<N: Number>(
+        &self,
+        at: &Kinematics<N>,
+        constants: &[N],
+        z: &[N],
+        branch: Branch,
+        rates: &mut [N],
+    );
 
     /// The first Piola-Kirchhoff stress.
-    fn first_piola_kirchhoff<N: Number>(&self, at: &Kinematics<N>, z: &[N]) -> Tensor<N>;
+    fn first_piola_kirchhoff<N: Number>(
+        &self,
+        at: &Kinematics<N>,
+        constants: &[N],
+        z: &[N],
+    ) -> Tensor<N>;
 
-    /// The branch on which a particle begins. Default: it flows, and always does.
-    fn first_branch(&self, _at: &Kinematics<f64>, _z: &[f64]) -> Branch {
+    /// Whether the law has branches. Default: particles flow, and always do.
+    fn has_branches(&self) -> bool {
+        false
+    }
+
+    /// The branch on which a particle begins. Default: it flows.
+    fn first_branch(&self, _at: &Kinematics<f64>, _constants: &[f64], _z: &[f64]) -> Branch {
         Branch::Flowing
     }
 
+    /// The share of the variables' size that stresses depend on, such as the elastic part of a strain: errors of the integrator are held
+    /// against it. Default: all.
+    fn resolution(&self, _constants: &[f64]) -> f64 {
+        1.0
+    }
+
+    /// The share of the yield stress by which a start is beyond it. Default: there is none.
+    fn excess(&self, _at: &Kinematics<f64>, _constants: &[f64], _z: &[f64]) -> f64 {
+        0.0
+    }
+
     /// A number that is positive as long as a branch lasts: on the elastic one the share of the yield stress that is left, on the flowing
-    /// one the rate at which the stress would grow, as a share of the rate of deformation. Default: it lasts.
-    fn margin<N: Number>(&self, _at: &Kinematics<N>, _z: &[N], _branch: Branch) -> N {
+    /// one the rate at which the stress would grow, as a share of the rate of deformation, or where flow depends on its rate the stress
+    /// beyond the yield stress. Default: it lasts.
+    fn margin<N: Number>(
+        &self,
+        _at: &Kinematics<N>,
+        _constants: &[N],
+        _z: &[N],
+        _branch: Branch,
+    ) -> N {
         N::constant(1.0)
+    }
+
+    /// How smooth the body force is where a branch begins. Default: smooth.
+    fn smoothness(&self, _constants: &[f64], _z: &[f64], _begins: Branch) -> Smoothness {
+        Smoothness::Smooth
+    }
+
+    /// By how much variables miss conditions that exact ones keep. Default: there are none.
+    fn residuals(
+        &self,
+        _at: &Kinematics<f64>,
+        _constants: &[f64],
+        _z: &[f64],
+        _branch: Branch,
+    ) -> Residuals {
+        Residuals::default()
+    }
+
+    /// The names of the variables as the solver's law has them. Default: as they are integrated.
+    fn observable_names(&self) -> Vec<String> {
+        self.variables()
+    }
+
+    /// The values of the variables as the solver's law has them. Default: as they are integrated.
+    fn observables<N: Number>(&self, _constants: &[N], z: &[N]) -> Vec<N> {
+        z.to_vec()
     }
 }

@@ -14,19 +14,24 @@
 
 #![allow(non_snake_case)]
 
-mod extrapolation;
-mod j2;
+mod any_law;
+mod dormand_prince;
+mod flow;
+mod function;
 mod law;
+mod maxwell;
 mod number;
+mod stated;
 mod table;
 mod tensor;
 mod trajectory;
-mod viscoelastic;
 
-pub use j2::{Hardening, J2, Overstress};
-pub use law::{Branch, Kinematics, LawWithHistory, Variable};
+pub use any_law::{AnyLaw, UnsupportedLaw};
+pub use flow::Flow;
+pub use law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+pub use maxwell::{ElasticPart, Maxwell};
 pub use number::{Dual, Number};
+pub use stated::{StatedHistory, StatedHistoryError};
 pub use table::{AtPoint, Grid, Series, Table};
 pub use tensor::{Tensor, determinant, identity};
 pub use trajectory::{Change, HistoryError, Motion, Trajectory, divergence};
-pub use viscoelastic::{Maxwell, Viscoelastic};

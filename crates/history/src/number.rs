@@ -2,6 +2,10 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use mmsmith_expr::{Function, Scalar};
+
+use crate::function::derivative;
+
 /// A number with the operations that rates and stresses of laws need.
 pub trait Number:
     Copy
@@ -25,35 +29,54 @@ pub trait Number:
     fn powf(self, exponent: f64) -> Self;
     /// A multiple.
     fn times(self, factor: f64) -> Self;
+    /// Whether a slope is not zero.
+    fn has_slopes(self) -> bool;
+    /// A function of one argument of the language of formulas; not a number for others.
+    fn call(self, function: Function) -> Self;
 }
 
 impl Number for f64 {
+    #[inline]
     fn constant(value: f64) -> Self {
         value
     }
 
+    #[inline]
     fn value(self) -> f64 {
         self
     }
 
+    #[inline]
     fn sqrt(self) -> Self {
         self.sqrt()
     }
 
+    #[inline]
     fn ln(self) -> Self {
         self.ln()
     }
 
+    #[inline]
     fn exp(self) -> Self {
         self.exp()
     }
 
+    #[inline]
     fn powf(self, exponent: f64) -> Self {
         self.powf(exponent)
     }
 
+    #[inline]
     fn times(self, factor: f64) -> Self {
         self * factor
+    }
+
+    fn has_slopes(self) -> bool {
+        false
+    }
+
+    fn call(self, function: Function) -> Self {
+        Scalar::call(function, self)
     }
 }
 
@@ -69,10 +92,12 @@ pub struct Dual<N, const K: usize> {
 
 impl<N: Number, const K: usize> Dual<N, K> {
     /// This number where a function has the value `value` and the slope `slope`.
+    #[inline]
     fn of(self, value: N, slope: N) -> Self {
         Self { value, slopes: self.slopes.map(|own| own * slope) }
     }
 
+    #[inline]
     fn with(self, other: Self, value: N, slope: impl Fn(N, N) -> N) -> Self {
         let slopes = std::array::from_fn(|k| slope(self.slopes[k], other.slopes[k]));
         Self { value, slopes }
@@ -82,6 +107,7 @@ impl<N: Number, const K: usize> Dual<N, K> {
 impl<N: Number, const K: usize> Add for Dual<N, K> {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         self.with(other, self.value + other.value, |a, b| a + b)
     }
@@ -90,6 +116,7 @@ impl<N: Number, const K: usize> Add for Dual<N, K> {
 impl<N: Number, const K: usize> Sub for Dual<N, K> {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self.with(other, self.value - other.value, |a, b| a - b)
     }
@@ -100,6 +127,7 @@ impl<N: Number, const K: usize> Sub for Dual<N, K> {
 impl<N: Number, const K: usize> Mul for Dual<N, K> {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         let (x, y) = (self.value, other.value);
         self.with(other, x * y, |a, b| a * y + x * b)
@@ -110,6 +138,7 @@ impl<N: Number, const K: usize> Mul for Dual<N, K> {
 impl<N: Number, const K: usize> Div for Dual<N, K> {
     type Output = Self;
 
+    #[inline]
     fn div(self, other: Self) -> Self {
         let quotient = self.value / other.value;
         self.with(other, quotient, |a, b| (a - quotient * b) / other.value)
@@ -119,44 +148,79 @@ impl<N: Number, const K: usize> Div for Dual<N, K> {
 impl<N: Number, const K: usize> Neg for Dual<N, K> {
     type Output = Self;
 
+    #[inline]
     fn neg(self) -> Self {
         Self { value: -self.value, slopes: self.slopes.map(|slope| -slope) }
     }
 }
 
 impl<N: Number, const K: usize> Number for Dual<N, K> {
+    #[inline]
     fn constant(value: f64) -> Self {
         Self { value: N::constant(value), slopes: [N::constant(0.0); K] }
     }
 
+    #[inline]
     fn value(self) -> f64 {
         self.value.value()
     }
 
+    #[inline]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.of(root, N::constant(0.5) / root)
     }
 
+    #[inline]
     fn ln(self) -> Self {
         self.of(self.value.ln(), N::constant(1.0) / self.value)
     }
 
+    #[inline]
     fn exp(self) -> Self {
         let value = self.value.exp();
         self.of(value, value)
     }
 
+    #[inline]
     fn powf(self, exponent: f64) -> Self {
+        // At zero the value tells nothing of the slope.
         let slope = self.value.powf(exponent - 1.0).times(exponent);
         self.of(self.value.powf(exponent), slope)
     }
 
+    #[inline]
     fn times(self, factor: f64) -> Self {
         Self {
             value: self.value.times(factor),
             slopes: self.slopes.map(|slope| slope.times(factor)),
         }
+    }
+
+    fn has_slopes(self) -> bool {
+        self.value.has_slopes()
+            || self.slopes.iter().any(|slope| slope.value() != 0.0 || slope.has_slopes())
+    }
+
+    fn call(self, function: Function) -> Self {
+        let value = self.value.call(function);
+        self.of(value, derivative(function, self.value, value))
+    }
+}
+
+/// A power of a number that is not negative; zero, and less, has none, and no slopes.
+#[inline]
+pub(crate) fn power<N: Number>(x: N, exponent: N) -> N {
+    if exponent.has_slopes() {
+        return if x.value() <= 0.0 { N::constant(0.0) } else { (x.ln() * exponent).exp() };
+    }
+    match exponent.value() {
+        0.0 => N::constant(1.0),
+        1.0 => x,
+        2.0 => x * x,
+        3.0 => x * x * x,
+        _ if x.value() <= 0.0 => N::constant(0.0),
+        exponent => x.powf(exponent),
     }
 }
 

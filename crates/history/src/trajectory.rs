@@ -1,11 +1,9 @@
 //! The history of one particle along an exact motion.
 
-use std::cell::Cell;
-
 use thiserror::Error;
 
-use crate::extrapolation::{Stop, integrate};
-use crate::law::{Branch, Kinematics, LawWithHistory};
+use crate::dormand_prince::{Errors, Step, factor};
+use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
 use crate::number::{Dual, Number};
 use crate::tensor::{Tensor, tensor};
 
@@ -35,6 +33,14 @@ pub enum HistoryError {
         /// The time.
         time: f64,
     },
+    /// The body begins beyond its yield surface.
+    #[error(
+        "at the time 0 the stress is beyond the yield stress, by {excess:e} of it: let the motion begin with F = I, or closer to it"
+    )]
+    BeyondYield {
+        /// The share of the yield stress.
+        excess: f64,
+    },
 }
 
 /// A particle begins to flow, or ends.
@@ -44,6 +50,8 @@ pub struct Change {
     pub time: f64,
     /// The branch that follows.
     pub branch: Branch,
+    /// How smooth the body force is there.
+    pub smoothness: Smoothness,
 }
 
 /// The internal variables of a particle at some times, with their slopes in `K` directions.
@@ -53,20 +61,34 @@ pub struct Trajectory<const K: usize> {
     pub states: Vec<Vec<Dual<f64, K>>>,
     /// Where the set of rate equations changed.
     pub changes: Vec<Change>,
-    /// The least margin of the flow at the times: how fast the stress would grow, as a share of the rate of deformation; infinite where
-    /// the particle never flows.
+    /// The least margin of the flow at the times: how fast the stress would grow, as a share of the rate of deformation, or where flow
+    /// depends on its rate the least stress beyond the yield stress while it flows; infinite where the particle never flows.
     pub least_margin: f64,
+    /// By how much variables miss conditions that exact ones keep, at most at the times.
+    pub residuals: Residuals,
+    /// How often rates were evaluated.
+    pub evaluations: usize,
 }
 
-/// The deformation gradient of a particle and its rate at a time, with their slopes along the particle's position.
+/// The motion of a particle, with slopes along the particle's position.
 pub trait Motion<const K: usize>: Sync {
-    /// At a time.
+    /// The deformation gradient and its rate at a time.
     fn at(&self, time: f64) -> Kinematics<Dual<f64, K>>;
+
+    /// Writes the constants of the law at a time, in the order of its [names](LawWithHistory::constants). `constants` is empty before.
+    fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, K>>);
 }
 
-impl<const K: usize, M: Fn(f64) -> Kinematics<Dual<f64, K>> + Sync> Motion<K> for M {
+/// Kinematics as a function of time, and constants that do not change.
+impl<const K: usize, M: Fn(f64) -> Kinematics<Dual<f64, K>> + Sync> Motion<K>
+    for (M, Vec<Dual<f64, K>>)
+{
     fn at(&self, time: f64) -> Kinematics<Dual<f64, K>> {
-        self(time)
+        self.0(time)
+    }
+
+    fn constants(&self, _: f64, constants: &mut Vec<Dual<f64, K>>) {
+        constants.extend_from_slice(&self.1);
     }
 }
 
@@ -76,117 +98,69 @@ fn values<const K: usize>(at: &Kinematics<Dual<f64, K>>) -> Kinematics<f64> {
     Kinematics { F: of(&at.F), rate: of(&at.rate) }
 }
 
-/// Variables and slopes side by side, each variable with its slopes.
-fn pack<const K: usize>(z: &[Dual<f64, K>], numbers: &mut [f64]) {
-    for (z, own) in z.iter().zip(numbers.chunks_exact_mut(K + 1)) {
-        own[0] = z.value;
-        own[1..].copy_from_slice(&z.slopes);
-    }
+fn values_of<const K: usize>(numbers: &[Dual<f64, K>]) -> Vec<f64> {
+    numbers.iter().map(|number| number.value).collect()
 }
 
-fn unpacked<const K: usize>(numbers: &[f64]) -> Vec<Dual<f64, K>> {
-    let of = |own: &[f64]| Dual { value: own[0], slopes: std::array::from_fn(|k| own[k + 1]) };
-    numbers.chunks_exact(K + 1).map(of).collect()
-}
+/// Margins this small count as none.
+const NOTHING: f64 = 1e-13;
+/// A start this far beyond the yield surface is on it.
+const ON_SURFACE: f64 = 1e-9;
+/// Intervals in which a time without flow is searched for its end, at least.
+const INTERVALS: f64 = 64.0;
 
-/// A particle on its way.
-struct Particle<'a, L, M, const K: usize> {
+/// A law along a motion.
+struct Along<'a, L, M, const K: usize> {
     law: &'a L,
     motion: &'a M,
-    tolerance: f64,
-    branch: Branch,
-    time: f64,
-    z: Vec<Dual<f64, K>>,
-    /// The last step of the integrator, with which the next one begins.
-    step: Cell<f64>,
+    /// The constants, for those that do not change.
+    steady: Vec<Dual<f64, K>>,
+    steady_values: Vec<f64>,
 }
 
-impl<L: LawWithHistory, M: Motion<K>, const K: usize> Particle<'_, L, M, K> {
-    fn margin(&self, time: f64, z: &[Dual<f64, K>]) -> Dual<f64, K> {
-        self.law.margin(&self.motion.at(time), z, self.branch)
+impl<'a, L: LawWithHistory, M: Motion<K>, const K: usize> Along<'a, L, M, K> {
+    fn new(law: &'a L, motion: &'a M) -> Self {
+        let mut steady = Vec::new();
+        motion.constants(0.0, &mut steady);
+        let steady_values = values_of(&steady);
+        Self { law, motion, steady, steady_values }
     }
 
-    /// The variables at a later time, on the same branch.
-    fn on_branch(&self, end: f64) -> Result<Vec<Dual<f64, K>>, HistoryError> {
-        if self.branch == Branch::Elastic || end <= self.time {
-            return Ok(self.z.clone());
+    fn constants(&self, time: f64) -> Vec<Dual<f64, K>> {
+        if !self.law.constants_change() {
+            return self.steady.clone();
         }
-        let rate = |time: f64, numbers: &[f64], rates: &mut [f64]| {
-            let z = unpacked::<K>(numbers);
-            let mut of_z = vec![Dual::<f64, K>::constant(0.0); z.len()];
-            self.law.rate(&self.motion.at(time), &z, self.branch, &mut of_z);
-            pack(&of_z, rates);
-        };
-        let mut numbers = vec![0.0; self.z.len() * (K + 1)];
-        pack(&self.z, &mut numbers);
-        let mut step = self.step.get();
-        let found = integrate(&rate, (self.time, end), &mut numbers, self.tolerance, &mut step);
-        self.step.set(step);
-        found.map_err(|stop| match stop {
-            Stop::StepTooSmall => HistoryError::Rough { time: self.time },
-            Stop::NotFinite => HistoryError::NotFinite { time: end },
-        })?;
-        Ok(unpacked(&numbers))
+        let mut constants = Vec::with_capacity(self.steady.len());
+        self.motion.constants(time, &mut constants);
+        constants
     }
 
-    /// The time up to `end` to which the branch lasts, the variables then, and whether the branch ends there.
-    fn to_end_of_branch(&self, end: f64) -> Result<(f64, Vec<Dual<f64, K>>, bool), HistoryError> {
-        let at_end = self.on_branch(end)?;
-        if self.margin(end, &at_end).value > 0.0 {
-            return Ok((end, at_end, false));
+    fn margin(&self, time: f64, z: &[f64], branch: Branch) -> f64 {
+        let at = values(&self.motion.at(time));
+        if self.law.constants_change() {
+            return self.law.margin(&at, &values_of(&self.constants(time)), z, branch);
         }
-        let (mut low, mut high, mut found) = (self.time, end, at_end);
-        // By halves: the margin may have a kink where a particle has flown.
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            let at_middle = self.on_branch(middle)?;
-            if self.margin(middle, &at_middle).value > 0.0 {
-                low = middle;
-            } else {
-                (high, found) = (middle, at_middle);
-            }
-        }
-        Ok((high, found, true))
-    }
-
-    /// Goes on to a time; tells the changes of the branch on the way.
-    fn advance(&mut self, end: f64, changes: &mut Vec<Change>) -> Result<(), HistoryError> {
-        while self.time < end {
-            let is_changed;
-            (self.time, self.z, is_changed) = self.to_end_of_branch(end)?;
-            if !is_changed {
-                return Ok(());
-            }
-            self.branch = match self.branch {
-                Branch::Elastic => {
-                    self.onset();
-                    Branch::Flowing
-                }
-                Branch::Flowing => Branch::Elastic,
-            };
-            changes.push(Change { time: self.time, branch: self.branch });
-        }
-        Ok(())
+        self.law.margin(&at, &self.steady_values, z, branch)
     }
 
     /// The slopes right after the onset of the flow: particles next to this one begin at another time,
     /// `t_y,J = -f_,J / f'`, so that `z_,J` jumps by `-z' t_y,J`.
-    fn onset(&mut self) {
-        let at = self.motion.at(self.time);
-        let margin = self.law.margin(&at, &self.z, Branch::Elastic);
+    fn onset(&self, time: f64, z: &mut [Dual<f64, K>]) {
+        let (at, constants) = (self.motion.at(time), self.constants(time));
+        let margin = self.law.margin(&at, &constants, z, Branch::Elastic);
         // The rate of the margin along the motion while the variables stay; it depends on F alone.
         let along = Kinematics {
             F: tensor(|i, j| Dual { value: at.F[i][j].value, slopes: [at.rate[i][j].value] }),
             rate: tensor(|i, j| Dual::constant(at.rate[i][j].value)),
         };
-        let at_rest: Vec<Dual<f64, 1>> = self.z.iter().map(|z| Dual::constant(z.value)).collect();
-        let [rate] = self.law.margin(&along, &at_rest, Branch::Elastic).slopes;
-        let mut rates = vec![Dual::<f64, K>::constant(0.0); self.z.len()];
-        self.law.rate(&at, &self.z, Branch::Flowing, &mut rates);
-        for (z, rate_of_z) in self.z.iter_mut().zip(rates) {
+        let at_rest = |numbers: &[Dual<f64, K>]| -> Vec<Dual<f64, 1>> {
+            numbers.iter().map(|z| Dual::constant(z.value)).collect()
+        };
+        let [rate] =
+            self.law.margin(&along, &at_rest(&constants), &at_rest(z), Branch::Elastic).slopes;
+        let mut rates = vec![Dual::<f64, K>::constant(0.0); z.len()];
+        self.law.rate(&at, &constants, z, Branch::Flowing, &mut rates);
+        for (z, rate_of_z) in z.iter_mut().zip(rates) {
             for k in 0..K {
                 z.slopes[k] += rate_of_z.value * margin.slopes[k] / rate;
             }
@@ -194,38 +168,394 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Particle<'_, L, M, K> {
     }
 }
 
+/// The root of a function that is positive at `low` and not at `high`, next to the last digit of the times: regula falsi with halved ends
+/// (Illinois), and halves now and then, since the function may have a kink or a jump.
+fn root(function: impl Fn(f64) -> f64, low: (f64, f64), high: (f64, f64)) -> f64 {
+    let ((mut low, mut at_low), (mut high, mut at_high)) = (low, high);
+    let mut side = 0;
+    for count in 0..200 {
+        if high - low <= 2.0 * f64::EPSILON * high.abs() || at_high == 0.0 {
+            break;
+        }
+        let mut next = (low * at_high - high * at_low) / (at_high - at_low);
+        if count % 3 == 2 || next.is_nan() || next <= low || next >= high {
+            next = 0.5 * (low + high);
+        }
+        if next <= low || next >= high {
+            break;
+        }
+        let value = function(next);
+        if value > 0.0 {
+            (low, at_low) = (next, value);
+            at_high *= if side == 1 { 0.5 } else { 1.0 };
+            side = 1;
+        } else {
+            (high, at_high) = (next, value);
+            at_low *= if side == -1 { 0.5 } else { 1.0 };
+            side = -1;
+        }
+    }
+    high
+}
+
+/// A particle on its way, and what it leaves behind.
+struct Way<'a, L, M, const K: usize> {
+    along: Along<'a, L, M, K>,
+    tolerance: f64,
+    times: &'a [f64],
+    time: f64,
+    branch: Branch,
+    z: Vec<Dual<f64, K>>,
+    /// The last step of the integrator, with which the next one begins.
+    step: f64,
+    found: Trajectory<K>,
+}
+
+impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
+    fn end(&self) -> f64 {
+        self.times.last().copied().unwrap_or(0.0)
+    }
+
+    /// The next time that has no state yet.
+    fn next_time(&self) -> Option<f64> {
+        self.times.get(self.found.states.len()).copied()
+    }
+
+    /// Keeps a state, and what there is to tell of it. Gives the margin.
+    fn keep(&mut self, time: f64, z: Vec<Dual<f64, K>>) -> f64 {
+        let law = self.along.law;
+        let mut margin = 1.0;
+        if law.has_branches() {
+            let at = values(&self.along.motion.at(time));
+            let changing;
+            let constants = if law.constants_change() {
+                changing = values_of(&self.along.constants(time));
+                &changing
+            } else {
+                &self.along.steady_values
+            };
+            let own = values_of(&z);
+            margin = law.margin(&at, constants, &own, self.branch);
+            if self.branch == Branch::Flowing {
+                self.found.least_margin = self.found.least_margin.min(margin);
+            }
+            let residuals = law.residuals(&at, constants, &own, self.branch);
+            self.found.residuals = self.found.residuals.max(residuals);
+        }
+        self.found.states.push(z);
+        margin
+    }
+
+    /// Goes through a time without flow. Gives whether flow begins, and whether from a point where the stress reaches the yield stress.
+    fn rest(&mut self) -> Option<bool> {
+        let z = values_of(&self.z);
+        let margin = |time: f64| self.along.margin(time, &z, Branch::Elastic);
+        let end = self.end();
+        let widest = (end / INTERVALS).max(f64::MIN_POSITIVE);
+        let mut next = self.found.states.len();
+        let mut before: Option<(f64, f64)> = None;
+        let mut last = (self.time, margin(self.time));
+        let mut begins = None;
+        while last.0 < end {
+            while next < self.times.len() && self.times[next] <= last.0 {
+                next += 1;
+            }
+            let to = self.times.get(next).copied().unwrap_or(end);
+            let parts = ((to - last.0) / widest).ceil().max(1.0);
+            let time = if parts <= 1.0 { to } else { last.0 + (to - last.0) / parts };
+            let mut now = (time, margin(time));
+            // The least value in between, if there is one.
+            if let Some(first) = before
+                && now.1 > 0.0
+                && last.1 <= first.1
+                && last.1 <= now.1
+                && let Some(lowest) = vertex(first, last, now)
+            {
+                let at_lowest = margin(lowest);
+                if at_lowest < -NOTHING {
+                    let low = if lowest > last.0 { last } else { first };
+                    begins = Some((root(margin, low, (lowest, at_lowest)), true));
+                    break;
+                }
+            }
+            if now.1 < -NOTHING {
+                // A point in between at which there is something left.
+                let mut low = last;
+                for halves in 1..=30 {
+                    if low.1 > NOTHING {
+                        break;
+                    }
+                    let middle = last.0 + (now.0 - last.0) * 0.5_f64.powi(halves);
+                    let at_middle = margin(middle);
+                    if at_middle > NOTHING {
+                        low = (middle, at_middle);
+                    } else if at_middle < -NOTHING {
+                        now = (middle, at_middle);
+                    }
+                }
+                begins = Some(if low.1 > NOTHING {
+                    (root(margin, low, now), true)
+                } else {
+                    (last.0, false)
+                });
+                break;
+            }
+            (before, last) = (Some(last), now);
+        }
+        let until = begins.map_or(end, |(time, _)| time);
+        while let Some(time) = self.next_time().filter(|time| *time <= until) {
+            self.keep(time, self.z.clone());
+        }
+        self.time = until;
+        begins.map(|(_, is_root)| is_root)
+    }
+
+    /// Goes through a time of flow. Gives whether it ends.
+    fn flow(&mut self) -> Result<bool, HistoryError> {
+        let end = self.end();
+        let Along { law, motion, .. } = self.along;
+        let branch = self.branch;
+        let steady = self.along.steady.clone();
+        let mut changing: Vec<Dual<f64, K>> = Vec::new();
+        let mut evaluations = 0;
+        let mut rate = |time: f64, z: &[Dual<f64, K>], rates: &mut [Dual<f64, K>]| {
+            evaluations += 1;
+            let at = motion.at(time);
+            if law.constants_change() {
+                changing.clear();
+                motion.constants(time, &mut changing);
+                law.rate(&at, &changing, z, branch, rates);
+            } else {
+                law.rate(&at, &steady, z, branch, rates);
+            }
+        };
+        let mut step = Step::new(self.z.clone());
+        let mut scales = step.scales([0.0; 2]);
+        // Slopes may be nothing but rounding; then no step is short enough for them.
+        let mut counts_slopes = true;
+        let mut rejected: Option<f64> = None;
+        let mut trials = 0;
+        step.begin(&mut rate, self.time);
+        if self.step <= 0.0 {
+            self.step = (end - self.time) / 32.0;
+        }
+        while self.time < end {
+            let rest = end - self.time;
+            // The last two steps share the rest, so that none of them is tiny.
+            let length = if rest <= self.step {
+                rest
+            } else if rest < 2.0 * self.step {
+                0.5 * rest
+            } else {
+                self.step
+            };
+            let Errors { of_values, of_slopes } =
+                step.go(&mut rate, length, self.tolerance, scales);
+            let mut error = if counts_slopes { of_values.max(of_slopes) } else { of_values };
+            if error > 1.0 || error.is_nan() {
+                if let Some(before) = rejected
+                    && of_values <= 1.0
+                    && of_slopes.is_finite()
+                    && of_slopes > 0.25 * before
+                {
+                    trials += 1;
+                    if trials >= 3 {
+                        counts_slopes = false;
+                    }
+                }
+                rejected = Some(of_slopes);
+                error = if error.is_finite() { error } else { f64::INFINITY };
+                self.step = length * factor(error).min(0.7);
+                if self.time + self.step <= self.time {
+                    return Err(if error.is_finite() {
+                        HistoryError::Rough { time: self.time }
+                    } else {
+                        HistoryError::NotFinite { time: self.time }
+                    });
+                }
+                continue;
+            }
+            let growth = if rejected.is_some() { 1.0 } else { 6.0 };
+            (rejected, trials) = (None, 0);
+            scales = step.scales(scales);
+            let stop = if length == rest { end } else { self.time + length };
+            step.finish(&mut rate);
+            // States within the step, and the margin there.
+            let mut last = (self.time, 1.0);
+            let mut ends: Option<((f64, f64), (f64, f64))> = None;
+            let mut is_sampled = !law.has_branches();
+            while let Some(time) = self.next_time().filter(|time| *time <= stop) {
+                let z = if time == self.time {
+                    step.from.clone()
+                } else if time == stop {
+                    step.to.clone()
+                } else {
+                    step.prepare(&mut rate);
+                    step.at(time)
+                };
+                let told = (self.found.least_margin, self.found.residuals);
+                let margin = self.keep(time, z);
+                is_sampled |= time < stop && time > self.time;
+                if margin <= 0.0 && time > self.time {
+                    // It was on another branch by then.
+                    self.found.states.pop();
+                    (self.found.least_margin, self.found.residuals) = told;
+                    ends = Some((last, (time, margin)));
+                    break;
+                }
+                last = (time, if time > self.time { margin } else { 1.0 });
+            }
+            if law.has_branches() && ends.is_none() {
+                let middle = 0.5 * (self.time + stop);
+                let mut samples = vec![stop];
+                if !is_sampled {
+                    samples.insert(0, middle);
+                    step.prepare(&mut rate);
+                }
+                for time in samples {
+                    let z = if time == stop { step.to.clone() } else { step.at(time) };
+                    let margin = self.along.margin(time, &values_of(&z), branch);
+                    if margin <= 0.0 {
+                        ends = Some((last, (time, margin)));
+                        break;
+                    }
+                    last = (time, margin);
+                }
+            }
+            if let Some((low, high)) = ends {
+                step.prepare(&mut rate);
+                let margin =
+                    |time: f64| self.along.margin(time, &values_of(&step.at(time)), branch);
+                let time = root(margin, low, high);
+                while let Some(next) = self.next_time().filter(|next| *next < time) {
+                    let z = step.at(next);
+                    self.keep(next, z);
+                }
+                // States at the root come by a step to it.
+                step.go(&mut rate, time - self.time, self.tolerance, scales);
+                self.z = step.to.clone();
+                self.time = time;
+                self.step = length;
+                self.found.evaluations += evaluations;
+                return Ok(true);
+            }
+            self.step = length * factor(error).min(growth);
+            self.time = stop;
+            step.advance(stop);
+        }
+        self.z = step.from.clone();
+        self.found.evaluations += evaluations;
+        Ok(false)
+    }
+
+    fn change(&mut self, branch: Branch) {
+        self.branch = branch;
+        let constants = values_of(&self.along.constants(self.time));
+        let smoothness = self.along.law.smoothness(&constants, &values_of(&self.z), branch);
+        self.found.changes.push(Change { time: self.time, branch, smoothness });
+    }
+
+    fn run(mut self) -> Result<Trajectory<K>, HistoryError> {
+        if !self.along.law.has_branches() && self.z.is_empty() {
+            self.found.states = vec![Vec::new(); self.times.len()];
+            return Ok(self.found);
+        }
+        while let Some(next) = self.next_time() {
+            if next <= self.time {
+                self.keep(next, self.z.clone());
+                continue;
+            }
+            match self.branch {
+                Branch::Elastic => {
+                    if let Some(is_root) = self.rest() {
+                        let is_start = self.time == 0.0;
+                        if is_start && !is_root {
+                            // It was about to flow from the start.
+                            self.branch = Branch::Flowing;
+                            continue;
+                        }
+                        self.change(Branch::Flowing);
+                        if is_root {
+                            self.along.onset(self.time, &mut self.z);
+                        }
+                    }
+                }
+                Branch::Flowing => {
+                    if self.flow()? {
+                        self.change(Branch::Elastic);
+                    }
+                }
+            }
+        }
+        Ok(self.found)
+    }
+}
+
 impl<const K: usize> Trajectory<K> {
-    /// Follows a particle from the time 0, where its variables are `start`, through ascending `times`, with the given relative tolerance of
-    /// the integrator.
+    /// Follows a particle from the time 0 through ascending `times`, with the given tolerance of the integrator's steps, relative to what
+    /// stresses [depend on](LawWithHistory::resolution): 1e-11 gives stresses and their divergence to about 1e-13. Variables begin as the
+    /// law has them.
     ///
     /// # Errors
     ///
-    /// [`HistoryError`] where times do not ascend, or the rates cannot be integrated.
+    /// [`HistoryError`] where times do not ascend, the body begins beyond its yield surface, or the rates cannot be integrated.
     pub fn new<L: LawWithHistory>(
         law: &L,
         motion: &impl Motion<K>,
-        start: &[f64],
         times: &[f64],
         tolerance: f64,
     ) -> Result<Self, HistoryError> {
-        let z: Vec<_> = start.iter().map(|&value| Dual::constant(value)).collect();
-        let branch = law.first_branch(&values(&motion.at(0.0)), start);
-        let mut particle =
-            Particle { law, motion, tolerance, branch, time: 0.0, z, step: Cell::new(0.0) };
-        let mut own = Self { states: Vec::new(), changes: Vec::new(), least_margin: f64::INFINITY };
-        for &time in times {
-            if time.is_nan() || time < particle.time {
-                return Err(HistoryError::Order { before: particle.time, after: time });
+        let mut before = 0.0;
+        for &after in times {
+            if after.is_nan() || after < before {
+                return Err(HistoryError::Order { before, after });
             }
-            particle.advance(time, &mut own.changes)?;
-            if particle.branch == Branch::Flowing {
-                let margin = particle.margin(time, &particle.z).value;
-                own.least_margin = own.least_margin.min(margin);
-            }
-            own.states.push(particle.z.clone());
+            before = after;
         }
-        Ok(own)
+        let along = Along::new(law, motion);
+        let z = law.initial(&along.steady);
+        let (first, start) = (values_of(&z), values(&motion.at(0.0)));
+        if let Some(number) = first.iter().find(|value| !value.is_finite()) {
+            let _ = number;
+            return Err(HistoryError::NotFinite { time: 0.0 });
+        }
+        let excess = law.excess(&start, &along.steady_values, &first);
+        if excess > ON_SURFACE {
+            return Err(HistoryError::BeyondYield { excess });
+        }
+        let branch = law.first_branch(&start, &along.steady_values, &first);
+        let found = Self {
+            states: Vec::with_capacity(times.len()),
+            changes: Vec::new(),
+            least_margin: f64::INFINITY,
+            residuals: Residuals::default(),
+            evaluations: 0,
+        };
+        let tolerance = tolerance * law.resolution(&along.steady_values);
+        let way = Way { along, tolerance, times, time: 0.0, branch, z, step: 0.0, found };
+        way.run()
     }
+
+    /// How smooth the body force is at the worst of the changes.
+    #[must_use]
+    pub fn smoothness(&self) -> Smoothness {
+        let all = self.changes.iter().map(|change| change.smoothness);
+        all.min().unwrap_or(Smoothness::Smooth)
+    }
+}
+
+/// Where a parabola through three points is lowest, if that is well between them and not much above zero.
+fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
+    let (left, right) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    let curvature = (right - left) / (c.0 - a.0);
+    if curvature.is_nan() || curvature <= 0.0 {
+        return None;
+    }
+    // The slope at the middle of the first interval is `left`.
+    let lowest = 0.5 * (a.0 + b.0) - 0.5 * left / curvature;
+    let is_inside = lowest > a.0 && lowest < c.0;
+    let height = b.1 - 0.25 * curvature * (c.0 - a.0).powi(2);
+    (is_inside && height <= 0.0).then_some(lowest)
 }
 
 /// The divergence of the first Piola-Kirchhoff stress of a particle, and the stress itself, from variables with slopes along the
@@ -233,9 +563,10 @@ impl<const K: usize> Trajectory<K> {
 pub fn divergence<L: LawWithHistory, const K: usize>(
     law: &L,
     at: &Kinematics<Dual<f64, K>>,
+    constants: &[Dual<f64, K>],
     z: &[Dual<f64, K>],
 ) -> ([f64; K], Tensor<f64>) {
-    let P = law.first_piola_kirchhoff(at, z);
+    let P = law.first_piola_kirchhoff(at, constants, z);
     let divergence =
         std::array::from_fn(|i| (0..K).map(|axis| P[i][axis].slopes[axis]).sum::<f64>());
     (divergence, P.map(|row| row.map(|entry| entry.value)))
