@@ -51,7 +51,7 @@ pub enum AnyLaw {
     /// Maxwell elements.
     Maxwell(Maxwell),
     /// A law that a specification states.
-    Stated(StatedHistory),
+    Stated(Box<StatedHistory>),
 }
 
 impl AnyLaw {
@@ -110,7 +110,7 @@ impl AnyLaw {
         if !(1..=3).contains(&dimension) {
             return Err(UnsupportedLaw::Dimension(dimension));
         }
-        Ok(Self::Stated(StatedHistory::new(law, dimension)?))
+        Ok(Self::Stated(Box::new(StatedHistory::new(law, dimension)?)))
     }
 }
 

@@ -140,7 +140,7 @@ const E5: &[(usize, f64)] = &[
 
 /// What the formula of order three takes from the weights of the step.
 const E3: &[(usize, f64)] =
-    &[(0, 0.244_094_488_188_976_38), (8, 0.733_846_688_281_611_9), (11, 0.022_058_823_529_411_766)];
+    &[(0, 0.244_094_488_188_976_4), (8, 0.733_846_688_281_611_9), (11, 0.022_058_823_529_411_766)];
 
 /// The last four coefficients of the interpolation.
 const D: [&[(usize, f64)]; 4] = [

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Values of several quantities at a position, at each of some times: `values[quantity][time]`.
 pub type Series = Vec<Vec<f64>>;
 
-/// Where a field is tabulated, and how finely.
+/// Where a field is tabulated, and how finely. There may be fewer coordinates than dimensions, as where a field depends on a radius alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid<const D: usize> {
     /// The range of each coordinate.
@@ -20,7 +20,7 @@ pub struct Grid<const D: usize> {
     /// Where pieces in time begin and end, ascending.
     pub knots: Vec<f64>,
     /// Polynomials along each coordinate.
-    pub in_space: usize,
+    pub in_space: [usize; D],
     /// Polynomials in time in each piece.
     pub in_time: usize,
 }
@@ -43,15 +43,28 @@ fn polynomials(x: f64, n: usize) -> Vec<f64> {
 }
 
 /// From values at the roots to coefficients.
-fn coefficients(values: &[f64]) -> Vec<f64> {
-    let n = values.len();
-    let of = |k: usize| {
-        let at = |j: usize| (PI * k as f64 * (j as f64 + 0.5) / n as f64).cos();
-        // The roots ascend, their angles descend.
-        let sum: f64 = values.iter().rev().enumerate().map(|(j, value)| value * at(j)).sum();
-        sum * if k == 0 { 1.0 } else { 2.0 } / n as f64
-    };
-    (0..n).map(of).collect()
+struct Transform {
+    n: usize,
+    /// Row by row.
+    matrix: Vec<f64>,
+}
+
+impl Transform {
+    fn new(n: usize) -> Self {
+        let entry = |k: usize, j: usize| {
+            // The roots ascend, their angles descend.
+            let angle = PI * k as f64 * ((n - 1 - j) as f64 + 0.5) / n as f64;
+            angle.cos() * if k == 0 { 1.0 } else { 2.0 } / n as f64
+        };
+        let matrix = (0..n * n).map(|place| entry(place / n, place % n)).collect();
+        Self { n, matrix }
+    }
+
+    fn coefficients(&self, values: &[f64]) -> impl Iterator<Item = f64> {
+        self.matrix
+            .chunks_exact(self.n)
+            .map(move |row| row.iter().zip(values).map(|(weight, value)| weight * value).sum())
+    }
 }
 
 /// Clenshaw's sum of a series at a place between -1 and 1.
@@ -84,12 +97,12 @@ impl<const D: usize> Grid<D> {
     }
 
     /// The coordinates of a node by its number, axis 0 fastest.
-    fn node(&self, number: usize, roots: &[f64]) -> [f64; D] {
+    fn node(&self, number: usize, roots: &[Vec<f64>; D]) -> [f64; D] {
         let mut rest = number;
         std::array::from_fn(|axis| {
             let [low, high] = self.range[axis];
-            let at = roots[rest % self.in_space];
-            rest /= self.in_space;
+            let at = roots[axis][rest % self.in_space[axis]];
+            rest /= self.in_space[axis];
             0.5 * (low + high) + 0.5 * (high - low) * at
         })
     }
@@ -125,8 +138,8 @@ impl<const D: usize> Table<D> {
         grid: Grid<D>,
         of: impl Fn([f64; D]) -> Result<Series, E> + Sync,
     ) -> Result<Self, E> {
-        let at = roots(grid.in_space);
-        let nodes = grid.in_space.pow(D as u32);
+        let at = grid.in_space.map(roots);
+        let nodes = grid.in_space.iter().product();
         let series: Vec<Result<Series, E>> =
             (0..nodes).into_par_iter().map(|number| of(grid.node(number, &at))).collect();
         let series = series.into_iter().collect::<Result<Vec<_>, E>>()?;
@@ -134,25 +147,26 @@ impl<const D: usize> Table<D> {
         let steps = grid.pieces() * grid.in_time;
         let mut columns = vec![vec![0.0; nodes]; quantities * steps];
         let mut largest = vec![0.0_f64; quantities];
+        let in_time = Transform::new(grid.in_time);
         for (node, of_node) in series.iter().enumerate() {
             for (quantity, values) in of_node.iter().enumerate() {
+                largest[quantity] = largest_of(values).max(largest[quantity]);
                 for (piece, values) in values.chunks_exact(grid.in_time).enumerate() {
-                    let most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-                    largest[quantity] = largest[quantity].max(most);
-                    for (k, c) in coefficients(values).into_iter().enumerate() {
+                    for (k, c) in in_time.coefficients(values).enumerate() {
                         columns[quantity * steps + piece * grid.in_time + k][node] = c;
                     }
                 }
             }
         }
-        columns.par_iter_mut().for_each(|column| transform::<D>(column, grid.in_space));
+        let along = grid.in_space.map(Transform::new);
+        columns.par_iter_mut().for_each(|column| transform(column, &along));
         Ok(Self { grid, quantities, coefficients: columns, largest })
     }
 
-    /// Tabulates quantities as finely as an error asks for, a share of each quantity's largest value. `of` gives their values at a
-    /// position, at ascending times. Pieces in time are halved where series at some positions are too short, then polynomials are added
-    /// in space. Gives the table, and the largest error that random positions and times show; it is above `tolerance` where the fields
-    /// are too rough for it.
+    /// Tabulates quantities as finely as an error asks for, a share of each quantity's largest value, and no finer. `of` gives their
+    /// values at a position, at ascending times. Pieces in time are halved where series at some positions are too short; polynomials in
+    /// space are counted along lines. Gives the table, and an error that random positions and times keep; it is above `tolerance` where
+    /// the fields are too rough for it.
     ///
     /// # Errors
     ///
@@ -163,36 +177,59 @@ impl<const D: usize> Table<D> {
         tolerance: f64,
         of: impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync,
     ) -> Result<(Self, f64), E> {
-        const IN_TIME: usize = 24;
-        const IN_SPACE: [usize; 6] = [8, 12, 16, 24, 32, 40];
-        const PROBES: u32 = 3 * 3;
-        let knots = knots::<D, E>(range, end, tolerance, IN_TIME, &of)?;
-        let grid = |in_space| Grid { range, knots: knots.clone(), in_space, in_time: IN_TIME };
-        let mut best = None;
-        for in_space in IN_SPACE {
-            let grid = grid(in_space);
-            let times = grid.times();
-            let table = Self::new(grid, |X| of(X, &times))?;
-            let is_fine = table.tails()[0] <= tolerance;
-            best = Some(table);
-            if is_fine {
+        const PROBES: u32 = 24;
+        const TIMES: u32 = 5;
+        const MOST_RAISES: usize = 2;
+        let (knots, in_time) = in_time(range, end, tolerance, &of)?;
+        let mut grid = Grid { range, knots, in_space: [1; D], in_time };
+        let mut times = grid.times();
+        for axis in 0..D {
+            grid.in_space[axis] = along_lines(range, axis, tolerance, &times, &of)?;
+        }
+        let mut table = Self::new(grid.clone(), |X| of(X, &times))?;
+        for _ in 0..MOST_RAISES {
+            let (tails, late) = table.all_tails();
+            // Rough fields do not become smooth by some more nodes.
+            let is_short = |tail: f64| tail > tolerance && tail < 1e3 * tolerance;
+            if !tails.iter().chain([&late]).any(|&tail| is_short(tail)) {
                 break;
             }
+            if is_short(late) {
+                grid.in_time += 2;
+                times = grid.times();
+            }
+            for (count, tail) in grid.in_space.iter_mut().zip(tails) {
+                *count += if is_short(tail) { 4 } else { 0 };
+            }
+            table = Self::new(grid.clone(), |X| of(X, &times))?;
         }
-        let Some(table) = best else { unreachable!("there are numbers of polynomials") };
-        let mut error = 0.0_f64;
-        for probe in 0..PROBES {
-            let X = place(&range, probe);
-            let share = |k: u32| fraction(0.37 + 0.618_033_988_75 * f64::from(3 * probe + k));
-            let mut times: Vec<f64> = (0..3).map(|k| end * share(k)).collect();
+        let probe = |probe: u32| -> Result<f64, E> {
+            let mut X = place(&range, probe);
+            if probe % 2 == 1 {
+                // Series are worst next to the ends of the ranges.
+                X = std::array::from_fn(|axis| {
+                    let [low, high] = range[axis];
+                    let share = (X[axis] - low) / (high - low);
+                    low + (high - low) * 0.5 * (1.0 - (PI * share).cos())
+                });
+            }
+            let share = |k: u32| fraction(0.37 + 0.618_033_988_75 * f64::from(TIMES * probe + k));
+            let mut times: Vec<f64> = (0..TIMES).map(|k| end * share(k)).collect();
             times.sort_by(f64::total_cmp);
             let (at, exact) = (table.at(&X), of(X, &times)?);
+            let mut error = 0.0_f64;
             for (quantity, exact) in exact.iter().enumerate() {
                 let largest = table.largest[quantity].max(f64::MIN_POSITIVE);
                 for (time, exact) in times.iter().zip(exact) {
                     error = error.max((at.value(quantity, *time) - exact).abs() / largest);
                 }
             }
+            Ok(error)
+        };
+        let errors: Vec<Result<f64, E>> = (0..PROBES).into_par_iter().map(probe).collect();
+        let mut error = table.tails().into_iter().sum::<f64>();
+        for found in errors {
+            error = error.max(2.0 * found?);
         }
         Ok((table, error))
     }
@@ -202,23 +239,35 @@ impl<const D: usize> Table<D> {
     pub fn at(&self, X: &[f64; D]) -> AtPoint {
         let Grid { range, ref knots, in_space, in_time } = self.grid;
         let along: [Vec<f64>; D] =
-            std::array::from_fn(|axis| polynomials(within(range[axis], X[axis]), in_space));
+            std::array::from_fn(|axis| polynomials(within(range[axis], X[axis]), in_space[axis]));
         let steps = self.grid.pieces() * in_time;
-        let contract = |column: &Vec<f64>| {
-            let mut rest = column.clone();
-            for polynomials in &along {
-                rest = rest
-                    .chunks_exact(in_space)
-                    .map(|row| row.iter().zip(polynomials).map(|(c, value)| c * value).sum())
-                    .collect();
+        let (mut work, mut next) = (Vec::new(), Vec::new());
+        let mut contract = |column: &Vec<f64>| {
+            // The slowest axis first: sums run along what is side by side.
+            let mut rest = column;
+            for polynomials in along.iter().rev() {
+                let stride = rest.len() / polynomials.len();
+                next.clear();
+                next.resize(stride, 0.0);
+                for (&factor, row) in polynomials.iter().zip(rest.chunks_exact(stride)) {
+                    next.iter_mut().zip(row).for_each(|(sum, c)| *sum += factor * c);
+                }
+                std::mem::swap(&mut work, &mut next);
+                rest = &work;
             }
             rest[0]
         };
-        let of_quantity = |quantity: usize| {
-            self.coefficients[quantity * steps..][..steps].iter().map(contract).collect()
+        let mut of_quantity = |quantity: usize| {
+            self.coefficients[quantity * steps..][..steps].iter().map(&mut contract).collect()
         };
-        let coefficients = (0..self.quantities).map(of_quantity).collect();
+        let coefficients = (0..self.quantities).map(&mut of_quantity).collect();
         AtPoint { knots: knots.clone(), in_time, coefficients }
+    }
+
+    /// Where it is tabulated.
+    #[must_use]
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
     }
 
     /// The largest value of a quantity at the nodes.
@@ -231,28 +280,38 @@ impl<const D: usize> Table<D> {
     /// value: how much the series leaves out, in space and in time.
     #[must_use]
     pub fn tails(&self) -> [f64; 2] {
+        let (in_space, in_time) = self.all_tails();
+        [in_space.into_iter().fold(0.0, f64::max), in_time]
+    }
+
+    /// As [`tails`](Self::tails), for each coordinate.
+    fn all_tails(&self) -> ([f64; D], f64) {
         let Grid { in_space, in_time, .. } = self.grid;
-        let pieces = self.grid.pieces();
-        let (mut in_the_last, mut late) = (0.0_f64, 0.0_f64);
+        let steps = self.grid.pieces() * in_time;
+        let (mut tails, mut late) = ([0.0_f64; D], 0.0_f64);
         for (number, column) in self.coefficients.iter().enumerate() {
-            let largest = self.largest[number / (pieces * in_time)].max(f64::MIN_POSITIVE);
+            let largest = self.largest[number / steps].max(f64::MIN_POSITIVE);
             let is_late = number % in_time + 2 >= in_time;
             for (node, c) in column.iter().enumerate() {
                 let share = c.abs() / largest;
                 let mut rest = node;
-                for _ in 0..D {
-                    if rest % in_space + 2 >= in_space {
-                        in_the_last = in_the_last.max(share);
+                for (tail, count) in tails.iter_mut().zip(in_space) {
+                    if rest % count + 2 >= count && count > 1 {
+                        *tail = tail.max(share);
                     }
-                    rest /= in_space;
+                    rest /= count;
                 }
                 if is_late {
                     late = late.max(share);
                 }
             }
         }
-        [in_the_last, late]
+        (tails, late)
     }
+}
+
+fn largest_of(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |most, value| most.max(value.abs()))
 }
 
 fn fraction(x: f64) -> f64 {
@@ -269,41 +328,74 @@ fn place<const D: usize>(range: &[[f64; 2]; D], number: u32) -> [f64; D] {
     })
 }
 
-/// Knots between which series of so many polynomials in time leave out less than a share of each quantity's largest value, at some positions.
-fn knots<const D: usize, E>(
+/// The largest of the coefficients from each number on, over the largest value.
+fn rests(values: &[f64], transform: &Transform, largest: f64) -> Vec<f64> {
+    let mut rests: Vec<f64> =
+        transform.coefficients(values).map(|c| c.abs() / largest.max(f64::MIN_POSITIVE)).collect();
+    for k in (1..rests.len()).rev() {
+        rests[k - 1] = rests[k - 1].max(rests[k]);
+    }
+    rests
+}
+
+/// The least number of polynomials from which on coefficients are below a share, with two of those, which are the series' tail; all where there are none.
+fn enough(rests: &[f64], tolerance: f64) -> usize {
+    let first = rests.iter().position(|rest| *rest <= tolerance);
+    first.map_or(rests.len(), |first| (first + 2).min(rests.len()))
+}
+
+/// Knots between which series of polynomials in time leave out less than a share of each quantity's largest value, at some positions, and
+/// the number of polynomials.
+fn in_time<const D: usize, E: Send>(
     range: [[f64; 2]; D],
     end: f64,
     tolerance: f64,
-    in_time: usize,
-    of: &impl Fn([f64; D], &[f64]) -> Result<Series, E>,
-) -> Result<Vec<f64>, E> {
-    const POSITIONS: u32 = 5;
-    const MOST_PIECES: usize = 64;
+    of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
+) -> Result<(Vec<f64>, usize), E> {
+    const POSITIONS: u32 = 8;
+    const MOST: usize = 24;
+    const LEAST: usize = 6;
+    const MOST_PIECES: usize = 32;
     let mut knots = vec![0.0, end];
+    let transform = Transform::new(MOST);
+    let mut worst_before = [f64::INFINITY; 2];
     loop {
-        let grid = Grid { range, knots: knots.clone(), in_space: 1, in_time };
+        let grid = Grid { range, knots: knots.clone(), in_space: [1; D], in_time: MOST };
         let times = grid.times();
-        let mut is_rough = vec![false; grid.pieces()];
-        for number in 0..POSITIONS {
-            for values in of(place(&range, number), &times)? {
-                let largest =
-                    values.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
-                for (piece, values) in values.chunks_exact(in_time).enumerate() {
-                    let tail = coefficients(values)
-                        .iter()
-                        .rev()
-                        .take(2)
-                        .fold(0.0_f64, |most, c| most.max(c.abs()));
-                    is_rough[piece] |= tail > tolerance * largest;
+        let samples: Vec<Result<Series, E>> = (0..POSITIONS)
+            .into_par_iter()
+            .map(|number| of(place(&range, number), &times))
+            .collect();
+        let samples = samples.into_iter().collect::<Result<Vec<Series>, E>>()?;
+        let quantities = samples.first().map_or(0, Vec::len);
+        let mut largest = vec![0.0_f64; quantities];
+        for sample in &samples {
+            for (largest, values) in largest.iter_mut().zip(sample) {
+                *largest = largest.max(largest_of(values));
+            }
+        }
+        let mut of_pieces = vec![vec![0.0_f64; MOST]; grid.pieces()];
+        for sample in &samples {
+            for (&largest, values) in largest.iter().zip(sample) {
+                for (own, values) in of_pieces.iter_mut().zip(values.chunks_exact(MOST)) {
+                    for (own, rest) in own.iter_mut().zip(rests(values, &transform, largest)) {
+                        *own = own.max(rest);
+                    }
                 }
             }
         }
-        if !is_rough.contains(&true) || knots.len() > MOST_PIECES {
-            return Ok(knots);
+        let is_rough = |rests: &Vec<f64>| rests[MOST - 2] > tolerance;
+        let worst = of_pieces.iter().fold(0.0_f64, |most, rests| most.max(rests[MOST - 2]));
+        // Halves do not help where fields are not smooth.
+        let stalls = worst > 0.25 * worst_before[0];
+        worst_before = [worst_before[1], worst];
+        if !of_pieces.iter().any(is_rough) || knots.len() > MOST_PIECES || stalls {
+            let counts = of_pieces.iter().map(|rests| enough(rests, tolerance)).max();
+            return Ok((knots, counts.unwrap_or(MOST).clamp(LEAST, MOST)));
         }
         let mut finer = vec![knots[0]];
-        for (piece, ends) in knots.windows(2).enumerate() {
-            if is_rough[piece] {
+        for (rests, ends) in of_pieces.iter().zip(knots.windows(2)) {
+            if is_rough(rests) {
                 finer.push(0.5 * (ends[0] + ends[1]));
             }
             finer.push(ends[1]);
@@ -312,13 +404,67 @@ fn knots<const D: usize, E>(
     }
 }
 
+/// The number of polynomials along an axis after which series leave out less than a share of each quantity's largest value, along some lines.
+fn along_lines<const D: usize, E: Send>(
+    range: [[f64; 2]; D],
+    axis: usize,
+    tolerance: f64,
+    times: &[f64],
+    of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
+) -> Result<usize, E> {
+    const LINES: u32 = 3;
+    const MOST: [usize; 3] = [16, 28, 40];
+    const LEAST: usize = 4;
+    /// What a field that is not smooth has.
+    const ROUGH: usize = 24;
+    let mut rough = 1.0;
+    for count in MOST {
+        let (at, transform) = (roots(count), Transform::new(count));
+        let [low, high] = range[axis];
+        let samples: Vec<Result<Series, E>> = (0..LINES as usize * count)
+            .into_par_iter()
+            .map(|number| {
+                let mut X = place(&range, 31 + (number / count) as u32);
+                X[axis] = 0.5 * (low + high) + 0.5 * (high - low) * at[number % count];
+                of(X, times)
+            })
+            .collect();
+        let samples = samples.into_iter().collect::<Result<Vec<Series>, E>>()?;
+        let quantities = samples.first().map_or(0, Vec::len);
+        let mut needed = LEAST;
+        rough = 0.0;
+        for quantity in 0..quantities {
+            let largest = samples.iter().map(|sample| largest_of(&sample[quantity]));
+            let largest = largest.fold(0.0_f64, f64::max);
+            for line in samples.chunks_exact(count) {
+                for time in 0..times.len() {
+                    let values: Vec<f64> =
+                        line.iter().map(|sample| sample[quantity][time]).collect();
+                    let rests = rests(&values, &transform, largest);
+                    needed = needed.max(enough(&rests, tolerance));
+                    rough = f64::max(rough, rests[count - 2]);
+                }
+            }
+        }
+        if rough <= tolerance {
+            return Ok(needed);
+        }
+    }
+    let most = MOST[MOST.len() - 1];
+    Ok(if rough < 1e-6 { most } else { ROUGH })
+}
+
 /// From values at the nodes to coefficients, along each axis.
-fn transform<const D: usize>(column: &mut [f64], n: usize) {
+fn transform<const D: usize>(column: &mut [f64], along: &[Transform; D]) {
     let mut stride = 1;
-    for _ in 0..D {
+    for transform in along {
+        let n = transform.n;
+        let mut line = vec![0.0; n];
         for start in (0..column.len()).filter(|k| k / stride % n == 0) {
-            let line: Vec<f64> = (0..n).map(|k| column[start + k * stride]).collect();
-            for (k, c) in coefficients(&line).into_iter().enumerate() {
+            for (k, value) in line.iter_mut().enumerate() {
+                *value = column[start + k * stride];
+            }
+            for (k, c) in transform.coefficients(&line).enumerate() {
                 column[start + k * stride] = c;
             }
         }
@@ -348,7 +494,7 @@ mod tests {
             let grid = Grid {
                 range: [[0.5, 2.0], [-1.0, 1.0]],
                 knots: vec![0.0, 1.5, 3.0],
-                in_space,
+                in_space: [in_space; 2],
                 in_time,
             };
             let times = grid.times();
@@ -374,5 +520,42 @@ mod tests {
         let coarse = table(5, 16).tails();
         assert!(coarse[0] > 1e-4 && coarse[1] < 1e-12);
         assert!(table(18, 5).tails()[1] > 1e-5);
+    }
+
+    /// The error told holds at random places and times, in one to three coordinates, and grids are no finer than it takes.
+    fn told_error_holds<const D: usize>(
+        field: impl Fn([f64; D], f64) -> f64 + Sync,
+        most: f64,
+        counts: [usize; 2],
+    ) {
+        let range = [[0.5, 2.0]; D];
+        let of = |X: [f64; D], times: &[f64]| {
+            Ok::<_, ()>(vec![times.iter().map(|&t| field(X, t)).collect::<Vec<f64>>()])
+        };
+        let (table, told) = Table::fine(range, 3.0, 1e-12, of).unwrap();
+        assert!(told <= most, "{told:e}");
+        let Grid { in_space, in_time, ref knots, .. } = table.grid;
+        let [in_all, in_each] = counts;
+        assert!(in_time * (knots.len() - 1) <= in_all, "{in_time} {knots:?}");
+        assert!(in_space.iter().all(|count| *count <= in_each), "{in_space:?}");
+        for k in 0..200_u32 {
+            let X = std::array::from_fn(|axis| {
+                0.5 + 1.5 * fraction((0.37 + 0.21 * axis as f64) * f64::from(k))
+            });
+            let t = 3.0 * fraction(0.618 * f64::from(k));
+            let off = (table.at(&X).value(0, t) - field(X, t)).abs() / table.largest(0);
+            assert!(off <= told, "{X:?} {t}: {off:e}, told {told:e}");
+        }
+    }
+
+    #[test]
+    fn told_errors_hold() {
+        told_error_holds(|[x], t| (x * t).sin() + x, 1e-11, [48, 24]);
+        told_error_holds(|[x, y], t| (x * y + t).sin() + y * y, 1e-11, [48, 24]);
+        told_error_holds(|[x, y, z], t| (x * y + t).sin() + y * z, 1e-11, [48, 24]);
+        // One axis asks for more than the others.
+        told_error_holds(|[x, y], t| (8.0 * x).sin() * t + y, 1e-11, [24, 32]);
+        // A kink: the error is told.
+        told_error_holds(|[x, y], t| (x - 0.3 * t - 0.6).abs() + y, 0.1, [800, 24]);
     }
 }

@@ -460,7 +460,7 @@ fn fields(X: [f64; 2], times: &[f64]) -> Result<Vec<Vec<f64>>, HistoryError> {
 #[test]
 fn a_table_has_the_fields_of_trajectories_at_all_positions_and_times() {
     let (table, told) = Table::fine([[0.0, 1.0]; 2], 1.0, 1e-12, fields).unwrap();
-    println!("told {told:e}, tails {:?}", table.tails());
+    println!("told {told:e}, tails {:?}, {:?}", table.tails(), table.grid());
     assert!(told < 1e-11, "{told:e}");
     for k in 0..12 {
         let X = [(0.17 + 0.618 * f64::from(k)).fract(), (0.53 + 0.755 * f64::from(k)).fract()];

@@ -1,4 +1,6 @@
-//! Laws and motions that tests share.
+//! Laws and motions that tests share; not every file of tests has need of all.
+
+#![allow(dead_code)]
 
 use mmsmith_history::{AnyLaw, Dual, ElasticPart, Flow, Kinematics, Maxwell, Number, Tensor};
 use nalgebra::Matrix3;
