@@ -237,31 +237,60 @@ impl<const D: usize> Table<D> {
     /// The fields at a position.
     #[must_use]
     pub fn at(&self, X: &[f64; D]) -> AtPoint {
+        self.at_some(std::slice::from_ref(X)).swap_remove(0)
+    }
+
+    /// The fields at many positions. Those in a row that share their last coordinates, as points of a lattice do, share sums.
+    #[must_use]
+    pub fn at_all(&self, points: &[[f64; D]]) -> Vec<AtPoint> {
+        const CHUNK: usize = 256;
+        let chunks: Vec<Vec<AtPoint>> =
+            points.par_chunks(CHUNK).map(|chunk| self.at_some(chunk)).collect();
+        chunks.into_iter().flatten().collect()
+    }
+
+    fn at_some(&self, points: &[[f64; D]]) -> Vec<AtPoint> {
         let Grid { range, ref knots, in_space, in_time } = self.grid;
-        let along: [Vec<f64>; D] =
-            std::array::from_fn(|axis| polynomials(within(range[axis], X[axis]), in_space[axis]));
         let steps = self.grid.pieces() * in_time;
-        let (mut work, mut next) = (Vec::new(), Vec::new());
-        let mut contract = |column: &Vec<f64>| {
-            // The slowest axis first: sums run along what is side by side.
-            let mut rest = column;
-            for polynomials in along.iter().rev() {
-                let stride = rest.len() / polynomials.len();
-                next.clear();
-                next.resize(stride, 0.0);
-                for (&factor, row) in polynomials.iter().zip(rest.chunks_exact(stride)) {
-                    next.iter_mut().zip(row).for_each(|(sum, c)| *sum += factor * c);
+        // The axis from which on, downwards, sums differ from those of the point before, and the polynomials of the point.
+        let mut before: Option<&[f64; D]> = None;
+        let of_point = |X| {
+            let first = match before.replace(X) {
+                None => D,
+                Some(before) => (0..D).rev().find(|&k| before[k] != X[k]).map_or(1, |k| k + 1),
+            };
+            let along: [Vec<f64>; D] = std::array::from_fn(|axis| {
+                polynomials(within(range[axis], X[axis]), in_space[axis])
+            });
+            (first, along)
+        };
+        let plan: Vec<(usize, [Vec<f64>; D])> = points.iter().map(of_point).collect();
+        let empty = || AtPoint {
+            knots: knots.clone(),
+            in_time,
+            coefficients: vec![vec![0.0; steps]; self.quantities],
+        };
+        let mut all: Vec<AtPoint> = points.iter().map(|_| empty()).collect();
+        // Sums over the axes from each on.
+        let mut sums: [Vec<f64>; D] = std::array::from_fn(|_| Vec::new());
+        for (number, column) in self.coefficients.iter().enumerate() {
+            for ((first, along), point) in plan.iter().zip(&mut all) {
+                // The slowest axis first: sums run along what is side by side.
+                for axis in (0..*first).rev() {
+                    let (lower, upper) = sums.split_at_mut(axis + 1);
+                    let rest = upper.first().unwrap_or(column);
+                    let own = &mut lower[axis];
+                    let stride = rest.len() / in_space[axis];
+                    own.clear();
+                    own.resize(stride, 0.0);
+                    for (&factor, row) in along[axis].iter().zip(rest.chunks_exact(stride)) {
+                        own.iter_mut().zip(row).for_each(|(sum, c)| *sum += factor * c);
+                    }
                 }
-                std::mem::swap(&mut work, &mut next);
-                rest = &work;
+                point.coefficients[number / steps][number % steps] = sums[0][0];
             }
-            rest[0]
-        };
-        let mut of_quantity = |quantity: usize| {
-            self.coefficients[quantity * steps..][..steps].iter().map(&mut contract).collect()
-        };
-        let coefficients = (0..self.quantities).map(&mut of_quantity).collect();
-        AtPoint { knots: knots.clone(), in_time, coefficients }
+        }
+        all
     }
 
     /// Where it is tabulated.
@@ -545,6 +574,14 @@ mod tests {
             let t = 3.0 * fraction(0.618 * f64::from(k));
             let off = (table.at(&X).value(0, t) - field(X, t)).abs() / table.largest(0);
             assert!(off <= told, "{X:?} {t}: {off:e}, told {told:e}");
+        }
+        // Points of a lattice share sums, and have the same bits.
+        let lattice = |k: usize| -> [f64; D] {
+            std::array::from_fn(|axis| 0.6 + 0.3 * (k / 4_usize.pow(axis as u32) % 4) as f64)
+        };
+        let points: Vec<[f64; D]> = (0..4_usize.pow(D as u32)).map(lattice).collect();
+        for (point, X) in table.at_all(&points).into_iter().zip(&points) {
+            assert_eq!(point, table.at(X));
         }
     }
 

@@ -57,7 +57,7 @@ fn constant_rates_have_the_angle_of_krieg_and_krieg() {
             (F, F * Matrix3::from_diagonal(&(direction * speed)))
         });
         let times: Vec<f64> = times(8).iter().map(|t| 0.4 * t).collect();
-        let found = Trajectory::new(&law, &motion, &times, 1e-14).unwrap();
+        let found = Trajectory::new(&law, &motion, &times, 1e-15).unwrap();
         assert!(found.changes.is_empty());
         let mut worst = 0.0_f64;
         for (&t, z) in times.iter().zip(&found.states) {
@@ -426,7 +426,7 @@ fn linear_elements_answer_harmonic_strains_by_their_closed_form() {
         dF[(0, 1)] = amplitude * w * (w * t).cos();
         (F, dF)
     });
-    let found = Trajectory::new(&law, &motion, &times(20), 1e-14).unwrap();
+    let found = Trajectory::new(&law, &motion, &times(20), 1e-15).unwrap();
     let mut worst = 0.0_f64;
     for (t, z) in times(20).into_iter().zip(&found.states) {
         let mut shear = MU * amplitude * (w * t).sin();
@@ -574,6 +574,59 @@ fn rates_of_the_plastic_part_of_the_deformation_give_the_same() {
     }
     println!("by F^p: {worst:e}");
     assert!(worst < 1e-11, "{worst:e}");
+}
+
+/// Where slopes are nothing but rounding no step is short enough for them, and none has to be.
+#[test]
+fn slopes_that_are_rounding_are_no_hindrance() {
+    let (law, constants) = flow(2, 500.0, 1.0, true);
+    let clean = block([0.37, 0.61], &constants);
+    let noisy = |t: f64| {
+        let mut at = clean.at(t);
+        for (k, entry) in at.F.iter_mut().flatten().enumerate() {
+            let noise = ((1e9 + k as f64) * (1.0 + t)).sin();
+            entry.slopes = [1e-17 * noise, -1e-17 * noise];
+        }
+        at.rate.iter_mut().flatten().for_each(|entry| entry.slopes = [0.0; 2]);
+        at
+    };
+    let found = Trajectory::new(&law, &(noisy, clean.1.clone()), &times(5), 1e-13).unwrap();
+    let smooth = Trajectory::new(&law, &clean, &times(5), 1e-13).unwrap();
+    assert!(found.evaluations < 3 * smooth.evaluations, "{}", found.evaluations);
+    for (found, smooth) in found.states.iter().zip(&smooth.states) {
+        for (found, smooth) in found.iter().zip(smooth) {
+            assert!((found.value - smooth.value).abs() < 1e-14);
+            assert!(found.slopes.iter().all(|slope| slope.abs() < 1e-12));
+        }
+    }
+}
+
+/// All exponents of hardening and of rates can be followed through an onset.
+#[test]
+fn onsets_of_all_exponents_are_passed() {
+    for exponent in [0.2, 0.35, 0.6, 0.8, 0.95] {
+        let (law, constants) = flow(2, 80.0, exponent, false);
+        let motion = block([0.37, 0.61], &constants);
+        let found = Trajectory::new(&law, &motion, &times(20), 1e-12).unwrap();
+        println!("exponent {exponent}: {} evaluations", found.evaluations);
+        assert_eq!(found.changes.len(), 1);
+        assert!(found.residuals.yield_condition < 1e-11, "{exponent}: {:?}", found.residuals);
+    }
+    for exponent in [1.0, 1.5, 4.0, 10.0] {
+        let law = Flow { dimension: 2, has_overstress: true, is_on_yield: false };
+        let (_, mut constants) = flow(2, 80.0, 0.5, false);
+        constants.extend([100.0, exponent, 0.2]);
+        let motion = block([0.37, 0.61], &constants);
+        let found = Trajectory::new(&law, &motion, &times(20), 1e-12).unwrap();
+        println!("rate exponent {exponent}: {} evaluations", found.evaluations);
+        assert_eq!(found.changes.len(), 1);
+    }
+    // Faster than any step.
+    let law = Flow { dimension: 2, has_overstress: true, is_on_yield: false };
+    let (_, mut constants) = flow(2, 80.0, 1.0, false);
+    constants.extend([100.0, 1.0, 1e-9]);
+    let error = Trajectory::new(&law, &block([0.37, 0.61], &constants), &[1.0], 1e-12).unwrap_err();
+    assert!(matches!(error, HistoryError::Stiff { .. }), "{error}");
 }
 
 #[test]
