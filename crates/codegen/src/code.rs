@@ -98,7 +98,7 @@ impl<'a> Code<'a> {
             .map(|(name, component)| format!("u_{name} = {}", spec.graph.print(*component)))
             .collect();
         lines.extend(spec.rotation.map(|rotation| rotation.formula(&spec.graph)));
-        lines.extend(spec.material.formulas(&spec.graph));
+        lines.extend(spec.law_formulas());
         lines
     }
 }

@@ -6,19 +6,22 @@
 //! faster.
 
 mod arrays;
+mod history;
 mod lattice;
 mod staged;
 
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
 
+use history::{Chart, Histories, HistoryProblem, Prepared};
 use lattice::LatticeStages;
 use mmsmith_expr::{Program, Scalar, Slot};
+use mmsmith_history::HistoryError;
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
-    AnySolution, BodyForceAtPoints, Boundary, Condition, Domain, Fields, Lattice, Law,
-    ParameterError, Real, Solution, StateAtPoints, Surface,
+    AnySolution, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields, HistoryReport,
+    Lattice, Law, ParameterError, PlainPoints, Real, Solution, StateAtPoints, StateRun, Surface,
 };
-use mmsmith_spec::{self as spec, DeriveError, Spec};
+use mmsmith_spec::{self as spec, Coordinates, DeriveError, Spec};
 use mmsmith_stage::{FieldName, Measures, Sides, Staged};
 use staged::PointStages;
 use thiserror::Error;
@@ -32,6 +35,9 @@ pub enum InterpretError {
     /// A parameter value is not admissible.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// The history of the law's internal variables cannot be formed.
+    #[error(transparent)]
+    History(#[from] HistoryProblem),
 }
 
 /// The solution that `spec` describes, with the defaults of its parameters but for `overrides`.
@@ -70,7 +76,7 @@ pub fn interpret_staged<'a>(
     staged: &Staged,
     overrides: impl IntoIterator<Item = (&'a str, f64)>,
 ) -> Result<AnySolution<f64>, InterpretError> {
-    in_double(spec, staged, resolve(spec, overrides)?)
+    of_doubles(spec, staged, resolve(spec, overrides)?)
 }
 
 /// As [`interpret_staged`], for solvers in single precision: all is evaluated in it, as generated code does.
@@ -87,7 +93,7 @@ pub fn interpret_staged_single<'a>(
 }
 
 /// Not generic, so that [`Interpreted`] is compiled in this crate, and not in each that calls it.
-fn in_double(
+fn of_doubles(
     spec: &Spec,
     staged: &Staged,
     values: Vec<f64>,
@@ -95,7 +101,7 @@ fn in_double(
     build(spec, staged, values)
 }
 
-/// Not generic, as [`in_double`].
+/// Not generic, as [`of_doubles`].
 fn in_single(
     spec: &Spec,
     staged: &Staged,
@@ -178,6 +184,8 @@ struct Interpreted<T: Interpretable, const D: usize> {
     density_here: Option<Program>,
     wave_speed: T,
     period: T,
+    /// Where the law has internal variables: then the programs of stress and body force are empty.
+    history: Option<Histories<D>>,
 }
 
 impl<T: Interpretable, const D: usize> Interpreted<T, D> {
@@ -211,7 +219,22 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             }
         };
         let field = |name: FieldName| part(staged.field(name));
+        let law = staged.constants.law.clone().map(constant);
+        let density = constant(staged.constants.density);
+        let density_here = staged.density_here.map(|density| part(&[density]));
+        let history = match &staged.history {
+            None => None,
+            Some(history) => Some(Histories::new(
+                &law.clone().map(Real::to_f64),
+                history,
+                parameters.iter().map(|value| Real::to_f64(*value)).collect(),
+                Chart::of(&domain).ok_or(HistoryProblem::Shape)?,
+                spec.coordinates == Coordinates::Cartesian,
+                (Real::to_f64(density), density_here.clone()),
+            )?),
+        };
         Ok(Interpreted {
+            history,
             displacement: field(FieldName::Displacement),
             velocity: field(FieldName::Velocity),
             acceleration: field(FieldName::Acceleration),
@@ -235,9 +258,9 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             domain,
             boundaries: spec.boundaries.iter().map(boundary).collect(),
             cell_length: constant(staged.constants.cell_length),
-            law: staged.constants.law.clone().map(constant),
-            density: constant(staged.constants.density),
-            density_here: staged.density_here.map(|density| part(&[density])),
+            law,
+            density,
+            density_here,
             wave_speed: constant(staged.constants.wave_speed),
             period: constant(staged.constants.period),
             parameters,
@@ -304,10 +327,16 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     }
 
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
+        if let Some(history) = &self.history {
+            return stress_of(&history.response(in_double(X), t.to_f64()));
+        }
         self.matrix(&self.first_piola_kirchhoff, X, t)
     }
 
     fn body_force(&self, X: &SVector<T, D>, t: T) -> SVector<T, D> {
+        if let Some(history) = &self.history {
+            return force_of(&history.response(in_double(X), t.to_f64()));
+        }
         self.vector(&self.body_force, X, t)
     }
 
@@ -320,6 +349,12 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         X: &[SVector<T, D>],
         lattice: Option<Lattice<T, D>>,
     ) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
+        if let Some(history) = &self.history {
+            return match self.prepared(history, X) {
+                Some(points) => Box::new(points),
+                None => Box::new(PlainPoints { solution: self, X: X.to_vec() }),
+            };
+        }
         if let (Some(stages), Some(lattice)) = (&self.lattice_stages, lattice) {
             return Box::new(stages.at(lattice, &self.parameters, self));
         }
@@ -327,15 +362,62 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     }
 
     fn state_at(&self, X: &[SVector<T, D>]) -> Box<dyn StateAtPoints<T, D> + '_> {
-        Box::new(self.state_stages.at(X, &self.parameters))
+        let motion = self.state_stages.at(X, &self.parameters);
+        if let Some(history) = &self.history {
+            return match self.prepared(history, X) {
+                Some(points) => Box::new(StateWithHistory { motion, points }),
+                None => Box::new(PlainPoints { solution: self, X: X.to_vec() }),
+            };
+        }
+        Box::new(motion)
     }
 
     fn traction(&self, surface: Surface, X: &SVector<T, D>, t: T) -> Option<SVector<T, D>> {
+        if self.history.is_some() {
+            let normal = self.domain.normal(surface, X)?;
+            return Some(self.first_piola_kirchhoff(X, t) * normal);
+        }
         let (_, program) = self.tractions.iter().find(|(known, _)| *known == surface)?;
         Some(self.vector(program, X, t))
     }
 
+    fn internal_variables(&self) -> Vec<String> {
+        self.history.as_ref().map_or_else(Vec::new, |history| history.names.clone())
+    }
+
+    fn internal(&self, X: &SVector<T, D>, t: T) -> Vec<T> {
+        let Some(history) = &self.history else { return Vec::new() };
+        match history.response(in_double(X), t.to_f64()) {
+            Ok(response) => response.internal.into_iter().map(T::nearest).collect(),
+            Err(_) => vec![T::nearest(f64::NAN); history.names.len()],
+        }
+    }
+
+    fn history(&self, X: &[SVector<T, D>], end: T) -> Result<Option<HistoryReport>, String> {
+        let Some(history) = &self.history else { return Ok(None) };
+        let X: Vec<[f64; D]> = X.iter().map(in_double).collect();
+        history.report(&X, end.to_f64()).map(Some).map_err(|error| error.to_string())
+    }
+
+    fn prepare_until(&self, end: T) -> Result<(), String> {
+        let Some(history) = &self.history else { return Ok(()) };
+        history.tables_until(end.to_f64()).map(|_| ()).map_err(|error| error.to_string())
+    }
+
     fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D> {
+        if let Some(history) = &self.history {
+            let response = history.response(in_double(X), t.to_f64());
+            return Fields {
+                P: stress_of(&response),
+                b: force_of(&response),
+                u: self.displacement(X, t),
+                v: self.velocity(X, t),
+                a: self.acceleration(X, t),
+                H: self.displacement_gradient(X, t),
+                F: self.deformation_gradient(X, t),
+                J: self.jacobian(X, t),
+            };
+        }
         Fields {
             u: self.displacement(X, t),
             v: self.velocity(X, t),
@@ -384,5 +466,100 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn period(&self) -> T {
         self.period
+    }
+}
+
+/// A place in double precision.
+fn in_double<T: Real, const D: usize>(X: &SVector<T, D>) -> [f64; D] {
+    std::array::from_fn(|i| X[i].to_f64())
+}
+
+/// The stress, not a number where a history could not be followed.
+fn stress_of<T: Real, const D: usize>(
+    response: &Result<history::Response<D>, HistoryError>,
+) -> SMatrix<T, D, D> {
+    SMatrix::from_fn(|i, j| {
+        T::nearest(response.as_ref().map_or(f64::NAN, |response| response.P[i][j]))
+    })
+}
+
+/// The body force, not a number where a history could not be followed.
+fn force_of<T: Real, const D: usize>(
+    response: &Result<history::Response<D>, HistoryError>,
+) -> SVector<T, D> {
+    SVector::from_fn(|i, _| {
+        T::nearest(response.as_ref().map_or(f64::NAN, |response| response.b[i]))
+    })
+}
+
+impl<T: Interpretable, const D: usize> Interpreted<T, D> {
+    /// Series of the fields at points, until the time that tables were prepared for, or for a period; none where histories cannot be
+    /// followed.
+    fn prepared<'a>(
+        &'a self,
+        history: &'a Histories<D>,
+        X: &[SVector<T, D>],
+    ) -> Option<Prepared<'a, D>> {
+        let tables = match history.tables() {
+            Some(tables) => tables,
+            None => history.tables_until(self.period.to_f64()).ok()?,
+        };
+        let X: Vec<[f64; D]> = X.iter().map(in_double).collect();
+        Some(Prepared::new(history, &tables, &X))
+    }
+}
+
+impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, D> {
+    fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
+        for (n, b) in (first..).zip(b) {
+            let own = self.body_force(n, t.to_f64());
+            *b = SVector::from_fn(|i, _| T::nearest(own[i]));
+        }
+    }
+
+    fn of_time(&self, t: T, values: &mut Vec<T>) {
+        values.push(t);
+    }
+
+    fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
+        for (n, b) in points.iter().zip(b) {
+            let own = self.body_force(*n as usize, time[0].to_f64());
+            *b = SVector::from_fn(|i, _| T::nearest(own[i]));
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        self.bytes()
+    }
+}
+
+/// The exact state at points, the stress from their histories.
+struct StateWithHistory<'a, T: Interpretable, const D: usize> {
+    motion: staged::Points<'a, T, 2>,
+    points: Prepared<'a, D>,
+}
+
+impl<T: Interpretable, const D: usize> StateAtPoints<T, D> for StateWithHistory<'_, T, D> {
+    fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
+        self.motion.evaluate(t, velocity_time, first, runs);
+        let last = self.points.len().saturating_sub(1);
+        for (block, run) in (first..).zip(runs) {
+            for n in 0..BLOCK {
+                let P = self.points.stress((block * BLOCK + n).min(last), t.to_f64());
+                for (i, row) in P.iter().enumerate() {
+                    for (j, value) in row.iter().enumerate() {
+                        run.P[i][j][n] = T::nearest(*value);
+                    }
+                }
+            }
+        }
+    }
+
+    fn bytes_per_point(&self) -> usize {
+        StateAtPoints::<T, D>::bytes_per_point(&self.motion) + self.points.bytes()
     }
 }

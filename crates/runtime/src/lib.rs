@@ -14,6 +14,7 @@
 //! the deformation is plane strain. All components are Cartesian.
 
 mod domain;
+mod history;
 mod lattice;
 mod parameters;
 mod real;
@@ -21,6 +22,7 @@ mod solution;
 mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
+pub use history::{HistoryReport, Smoothness};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 /// Functions that the standard library lacks, which [`Real::apply`] takes.
 pub use libm;
@@ -36,6 +38,6 @@ pub use parameters::{Description, Parameter, ParameterError};
 pub use real::Real;
 pub use solution::{AnySolution, Fields, Solution};
 pub use staged::{
-    BLOCK, BodyForceAtPoints, BodyForceStages, StagedPoints, StagedStates, State, StateAtPoints,
-    StateRun, StateStages,
+    BLOCK, BodyForceAtPoints, BodyForceStages, PlainPoints, StagedPoints, StagedStates, State,
+    StateAtPoints, StateRun, StateStages,
 };

@@ -3,8 +3,8 @@
 use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
 use crate::{
-    BLOCK, BodyForceAtPoints, Boundary, Domain, Lattice, Law, Real, StateAtPoints, StateRun,
-    Surface,
+    BLOCK, BodyForceAtPoints, Boundary, Domain, HistoryReport, Lattice, Law, Real, StateAtPoints,
+    StateRun, Surface,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -91,6 +91,14 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     }
     /// All fields at once.
     fn fields(&self, X: &SVector<T, D>, t: T) -> Fields<T, D>;
+    /// How the histories of internal variables go at some places until a time; none for elastic laws.
+    ///
+    /// # Errors
+    ///
+    /// The reason where a history cannot be followed.
+    fn history(&self, _X: &[SVector<T, D>], _end: T) -> Result<Option<HistoryReport>, String> {
+        Ok(None)
+    }
 
     /// The body's shape in the reference configuration.
     fn domain(&self) -> Domain<T, D>;

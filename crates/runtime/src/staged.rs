@@ -550,9 +550,11 @@ where
 }
 
 /// The positions of points, for solutions that keep no other values.
-pub(crate) struct PlainPoints<'a, S: ?Sized, T, const D: usize> {
-    pub(crate) solution: &'a S,
-    pub(crate) X: Vec<SVector<T, D>>,
+pub struct PlainPoints<'a, S: ?Sized, T, const D: usize> {
+    /// The solution.
+    pub solution: &'a S,
+    /// The points.
+    pub X: Vec<SVector<T, D>>,
 }
 
 impl<S, T: Real, const D: usize> BodyForceAtPoints<T, D> for PlainPoints<'_, S, T, D>

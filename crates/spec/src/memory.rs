@@ -1,8 +1,8 @@
 //! Laws that remember, or depend on more than the deformation: given fields, flow, Maxwell elements, internal variables.
 
-use crate::Diagnostic;
 use crate::document::{Document, FlowTable, Text};
 use crate::spec::{Law, Reader};
+use crate::{Diagnostic, Spec};
 use mmsmith_expr::{Derivatives, Expr, Graph, Node, Rational};
 use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress};
 use std::collections::BTreeMap;
@@ -278,4 +278,69 @@ fn hardening(graph: &mut Graph, expr: Expr, alpha: Expr) -> Option<[Expr; 3]> {
     let again = graph.add(yield_stress, again);
     let difference = graph.sub(again, expr);
     graph.vanishes(difference).then_some([yield_stress, modulus, exponent])
+}
+
+impl Spec {
+    /// The law, what it remembers, and the fields that it uses, in lines for people.
+    #[must_use]
+    pub fn law_formulas(&self) -> Vec<String> {
+        let print = |expr: Expr| self.graph.print(expr);
+        let mut lines = self.material.formulas(&self.graph);
+        match &self.memory {
+            None => {}
+            Some(Memory::Flow(flow)) => {
+                let Flow { yield_stress, modulus, exponent, overstress, is_on_yield } = flow;
+                let hardening = match *modulus == Graph::ZERO {
+                    true => String::new(),
+                    false => format!(" + {} alpha^({})", print(*modulus), print(*exponent)),
+                };
+                lines.push("flow: F = F^e F^p, the law of F^e; G = (F^p^T F^p)^-1, n = s/|s| with s = dev tau, G' = -2 gamma' F^-1 n F G, \
+                            alpha' = sqrt(2/3) gamma'".into());
+                lines.push(format!(
+                    "f = |s| - sqrt(2/3) k, k = {}{hardening}",
+                    print(*yield_stress)
+                ));
+                lines.push(match overstress {
+                    None => "gamma' >= 0, f <= 0, gamma' f = 0".into(),
+                    Some(Overstress { drag, exponent, time }) => format!(
+                        "gamma' = <f/drag>^m / time, drag = {}, m = {}, time = {}",
+                        print(*drag),
+                        print(*exponent),
+                        print(*time)
+                    ),
+                });
+                lines.push(match (is_on_yield, self.dimension) {
+                    (false, _) => "start: F^p = I, alpha = 0".into(),
+                    (true, 1) => "start on the yield surface: F^p = diag(1/l, sqrt(l), sqrt(l)), ln l = k/(3 mu), alpha = 0".into(),
+                    (true, _) => "start on the yield surface: F^p = diag(1/l, l, 1), ln l = k/(2 sqrt(3) mu), alpha = 0".into(),
+                });
+            }
+            Some(Memory::Maxwell(elements)) => {
+                let is_linear =
+                    matches!(self.material, Law::Library(Material::LinearElastic { .. }));
+                lines.push(match is_linear {
+                    true => "Maxwell elements: s = dev sigma, sigma = vol sigma + (1 - sum g) s + sum Q, Q' + Q/tau = g s'".into(),
+                    false => "Maxwell elements: S = S_vol + (1 - sum g) S_iso + sum Q, Q' + Q/tau = g S_iso'".into(),
+                });
+                for (k, Element { share, time }) in elements.iter().enumerate() {
+                    let (g, tau) = (print(*share), print(*time));
+                    lines.push(format!(
+                        "element {}: g = {g}, tau = {tau}, Q = 0 at the start",
+                        k + 1
+                    ));
+                }
+            }
+        }
+        for InternalVariable { name, rate, initial } in &self.internal {
+            lines.push(format!(
+                "{name}' = {}, {name} = {} at the start",
+                print(*rate),
+                print(*initial)
+            ));
+        }
+        for Given { name, value, .. } in &self.given {
+            lines.push(format!("given: {name} = {}", print(*value)));
+        }
+        lines
+    }
 }

@@ -23,5 +23,5 @@ mod staged;
 pub use block::{Block, Operand, Stage};
 pub use field::{Field, FieldName, Shape};
 pub use staged::{
-    BodyForceOperations, Constants, Lattice, Measures, Sides, Staged, Stages, Traction,
+    BodyForceOperations, Constants, History, Lattice, Measures, Sides, Staged, Stages, Traction,
 };

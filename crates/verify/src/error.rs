@@ -35,6 +35,12 @@ pub enum CaseError {
         /// The number of steps.
         steps: f64,
     },
+    /// The history of internal variables of the law cannot be followed.
+    #[error("the history of the law's internal variables: {reason}")]
+    History {
+        /// Why.
+        reason: String,
+    },
     /// The solution of the body force and the exact one differ in dimension, or have one that is not known here.
     #[error(
         "the solutions of both precisions must have one, two or three dimensions, and the same"

@@ -5,6 +5,7 @@ use crate::points::outside;
 use mmsmith_runtime::{AnySolution, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// All fields at a point; vectors as lists, matrices as lists of rows.
@@ -26,12 +27,15 @@ pub struct FieldRow {
     pub P: Vec<Vec<f64>>,
     /// Body force per unit mass.
     pub b: Vec<f64>,
+    /// Internal variables of the law by their names, in Cartesian components. Written where there are any.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub internal: BTreeMap<String, f64>,
     /// Whether `X` lies outside the body, where the fields are those of the same formulas. Written where it is true.
     #[serde(skip_serializing_if = "is_false")]
     pub outside: bool,
     /// The fields that have entries which are no finite numbers, and are written as null. Written where there are any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub not_finite: Vec<&'static str>,
+    pub not_finite: Vec<String>,
 }
 
 fn is_false(value: &bool) -> bool {
@@ -44,11 +48,11 @@ const OUTSIDE: f64 = 1e-12;
 impl FieldRow {
     /// Each field's letter, the shape of its value at a point, and its entries row by row.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, Vec<usize>, Vec<f64>); 8] {
+    pub fn named(&self) -> Vec<(&str, Vec<usize>, Vec<f64>)> {
         let vector = |list: &[f64]| (vec![list.len()], list.to_vec());
         let matrix = |rows: &[Vec<f64>]| (vec![rows.len(); 2], rows.concat());
         let named = |name, (shape, values)| (name, shape, values);
-        [
+        let mut all = vec![
             named("u", vector(&self.u)),
             named("v", vector(&self.v)),
             named("a", vector(&self.a)),
@@ -57,7 +61,10 @@ impl FieldRow {
             named("J", (Vec::new(), vec![self.J])),
             named("P", matrix(&self.P)),
             named("b", vector(&self.b)),
-        ]
+        ];
+        let internal = self.internal.iter();
+        all.extend(internal.map(|(name, value)| (name.as_str(), Vec::new(), vec![*value])));
+        all
     }
 }
 
@@ -90,7 +97,10 @@ fn evaluate_in<const D: usize>(
         X.try_into().map_err(|_| WrongLength { given: X.len(), dimension: D })?;
     let X = SVector::from(position);
     let Fields { u, v, a, H, F, J, P, b } = solution.fields(&X, t);
+    let names = solution.internal_variables();
+    let values = if names.is_empty() { Vec::new() } else { solution.internal(&X, t) };
     let mut row = FieldRow {
+        internal: names.into_iter().zip(values).collect(),
         u: list(&u),
         v: list(&v),
         a: list(&a),
@@ -104,8 +114,8 @@ fn evaluate_in<const D: usize>(
     };
     let bad = |values: &[f64]| !values.iter().all(|value| value.is_finite());
     let fields = row.named();
-    row.not_finite =
-        fields.iter().filter(|(.., values)| bad(values)).map(|(name, ..)| *name).collect();
+    let not_finite = fields.iter().filter(|(.., values)| bad(values));
+    row.not_finite = not_finite.map(|(name, ..)| (*name).to_owned()).collect();
     Ok(row)
 }
 

@@ -65,6 +65,9 @@ where
         let scene = Scene::new(exact, case, end)?;
         let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
         let steps = Steps::new(case.cfl, end, waves)?;
+        let history = |reason| CaseError::History { reason };
+        exact.prepare_until(end).map_err(history)?;
+        model.prepare_until(T::nearest(end)).map_err(history)?;
         if let Scheme::Updated(updated) = &case.scheme {
             updated::admit(&scene, updated)?;
         }

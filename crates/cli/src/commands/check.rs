@@ -1,6 +1,6 @@
 //! `mms check`: is the field code right?
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use mmsmith_claims::{
     Equality, Outcome, Published, Report, SurfaceFinding, surfaces as judge_surfaces,
 };
@@ -8,17 +8,21 @@ use mmsmith_expr::nearest_f64;
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
     BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
+    history_of,
 };
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-use super::{blind, inversion};
+use super::{blind, history, inversion};
 use crate::arguments::CheckOptions;
 use crate::json::Output;
 use crate::library::{Subject, names};
 use crate::number;
 use crate::table::{self, Table};
 use crate::terminal;
+
+/// The particles whose histories are followed to tell where the body flows.
+const HISTORIES: usize = 200;
 
 pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     if options.thorough {
@@ -48,13 +52,20 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         let reports = solutions.iter().map(|solution| check_fields(solution, points));
         let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
+        let history =
+            history_of(&selection.build()?, HISTORIES).map_err(|reason| anyhow!("{reason}"))?;
         let blind = blind::measure(selection)?;
         let inverted = inversion::measure(selection)?;
         let all_passed = report.passed() && claims.hold();
         let table = table(&report);
         let findings = text(name, all_passed, &report, parameters, &claims, &table);
         let told = inverted.as_ref().map(|told| format!("  {}\n", told.text()));
-        terminal::say(&format!("{findings}{}{}\n", told.unwrap_or_default(), blind::text(&blind)))?;
+        let history_told = history.as_ref().map(history::text).unwrap_or_default();
+        terminal::say(&format!(
+            "{findings}{history_told}{}{}\n",
+            told.unwrap_or_default(),
+            blind::text(&blind)
+        ))?;
         tables.push(table);
         passed &= all_passed;
         results.push(json!({
@@ -65,6 +76,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "findings": report.findings,
             "not_periodic": report.not_periodic,
             "blind_spots": blind,
+            "history": history.as_ref().map(history::document),
             "inverted": inverted,
             "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
             "cross_checks": claims.listings.iter().map(Comparison::document).collect::<Vec<_>>(),

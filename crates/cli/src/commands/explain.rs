@@ -160,7 +160,7 @@ fn text(
             }
         }
     }
-    for line in spec.material.formulas(&spec.graph) {
+    for line in spec.law_formulas() {
         text += &format!("  {line}\n");
     }
     text += &format!("  density = {}\n", print(spec.density));

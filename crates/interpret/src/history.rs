@@ -1,0 +1,528 @@
+//! Stress, body force and internal variables of laws with memory, from the history of each particle.
+
+use mmsmith_expr::Program;
+use mmsmith_history::{
+    AnyLaw, AtPoint, Dual, HistoryError, Kinematics, LawWithHistory, Motion, Number, Smoothness,
+    Table, Tensor, Trajectory, UnsupportedLaw, divergence,
+};
+use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness as Told};
+use mmsmith_stage::History;
+use rayon::prelude::*;
+use std::sync::{Arc, RwLock};
+
+/// The relative tolerance of trajectories.
+const TOLERANCE: f64 = 1e-13;
+/// What a table may leave out, as a share of each quantity's largest value.
+const TABLE_TOLERANCE: f64 = 1e-12;
+
+/// The shape of the body as tables have it: the range of each coordinate, and the way from these to the place.
+#[derive(Clone, Debug)]
+pub(crate) enum Chart<const D: usize> {
+    /// A box in Cartesian coordinates.
+    Box { lower: [f64; D], upper: [f64; D] },
+    /// A body between two radii.
+    Annulus { inner: f64, outer: f64 },
+}
+
+/// Why histories cannot be formed.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum HistoryProblem {
+    /// The law has none.
+    #[error(transparent)]
+    Law(#[from] UnsupportedLaw),
+    /// Tables are of boxes and of bodies between two radii.
+    #[error("there are no tables of histories in a body of this shape")]
+    Shape,
+    /// A name in the law without a value.
+    #[error(
+        "the law has no value for '{name}': in [internal] and [given] positions are Cartesian, X, Y and Z"
+    )]
+    NoValue {
+        /// The name.
+        name: String,
+    },
+}
+
+impl<const D: usize> Chart<D> {
+    pub(crate) fn of<T: Real>(domain: &Domain<T, D>) -> Option<Self> {
+        Some(match domain {
+            Domain::Annulus { inner, outer } => {
+                Self::Annulus { inner: inner.to_f64(), outer: outer.to_f64() }
+            }
+            Domain::Box { lower, upper } => Self::Box {
+                lower: std::array::from_fn(|i| lower[i].to_f64()),
+                upper: std::array::from_fn(|i| upper[i].to_f64()),
+            },
+            _ => return None,
+        })
+    }
+
+    fn range(&self, axis: usize) -> [f64; 2] {
+        use std::f64::consts::{PI, TAU};
+        match self {
+            Self::Box { lower, upper } => [lower[axis], upper[axis]],
+            Self::Annulus { inner, outer } => match (axis, D) {
+                (0, _) => [*inner, *outer],
+                (1, 3) => [0.0, PI],
+                _ => [0.0, TAU],
+            },
+        }
+    }
+
+    /// The place of coordinates.
+    fn place(&self, q: [f64; D]) -> [f64; D] {
+        match self {
+            Self::Box { .. } => q,
+            Self::Annulus { .. } => match D {
+                1 => q,
+                2 => std::array::from_fn(|i| q[0] * [q[1].cos(), q[1].sin()][i]),
+                _ => std::array::from_fn(|i| {
+                    let (sine, cosine) = q[1].sin_cos();
+                    q[0] * [sine * q[2].cos(), sine * q[2].sin(), cosine][i]
+                }),
+            },
+        }
+    }
+
+    /// The coordinates of a place.
+    fn coordinates(&self, X: &[f64; D]) -> [f64; D] {
+        use std::f64::consts::TAU;
+        match self {
+            Self::Box { .. } => *X,
+            Self::Annulus { .. } => {
+                let norm = |of: &[f64]| of.iter().fold(0.0, |norm: f64, x| norm.hypot(*x));
+                let around = if D > 1 { X[1].atan2(X[0]).rem_euclid(TAU) } else { 0.0 };
+                match D {
+                    1 => *X,
+                    2 => std::array::from_fn(|i| [norm(X), around][i]),
+                    _ => {
+                        let down = norm(&X[..2]).atan2(X[2]);
+                        std::array::from_fn(|i| [norm(X), down, around][i])
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The stress of a particle, what follows from it, and its internal variables; in Cartesian components.
+#[derive(Clone, Debug)]
+pub(crate) struct Response<const D: usize> {
+    pub(crate) P: [[f64; D]; D],
+    pub(crate) b: [f64; D],
+    pub(crate) internal: Vec<f64>,
+}
+
+/// The law of a solution, and the motion that its histories follow.
+pub(crate) struct Histories<const D: usize> {
+    law: AnyLaw,
+    /// The names of the internal variables as the solver's law has them.
+    pub(crate) names: Vec<String>,
+    /// Constants of the law, each a number or a coordinate.
+    constants: Vec<Constant>,
+    motion: Program,
+    inertia: Program,
+    parameters: Vec<f64>,
+    density: f64,
+    density_here: Option<Program>,
+    chart: Chart<D>,
+    /// The coordinates of the chart that fields depend on.
+    axes: Vec<usize>,
+    tables: RwLock<Option<Arc<Tables<D>>>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Constant {
+    Number(f64),
+    Coordinate(usize),
+    Time,
+}
+
+/// A particle that stays at its place.
+struct Particle<'a, const D: usize> {
+    histories: &'a Histories<D>,
+    X: [f64; D],
+    /// Cartesian components of the unit vectors of its frame, `[i][a]`.
+    frame: [[f64; D]; D],
+}
+
+impl<const D: usize> Particle<'_, D> {
+    /// Coordinates, time and parameters, as programs have them.
+    fn inputs(&self, t: f64) -> Vec<f64> {
+        self.X.iter().copied().chain([t]).chain(self.histories.parameters.iter().copied()).collect()
+    }
+
+    fn kinematics(&self, time: f64) -> Kinematics<Dual<f64, D>> {
+        let values = self.histories.motion.evaluate_in(&self.inputs(time));
+        let entry = |block: usize, i: usize, j: usize| values[block * D * D + i * D + j];
+        // F, dF/dt, then the slopes of either.
+        let tensor = |block: usize, first_slope: usize| -> Tensor<Dual<f64, D>> {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| match i < D && j < D {
+                    true => Dual {
+                        value: entry(block, i, j),
+                        slopes: std::array::from_fn(|J| entry(first_slope + J, i, j)),
+                    },
+                    false => Dual::constant(if i == j && block == 0 { 1.0 } else { 0.0 }),
+                })
+            })
+        };
+        Kinematics { F: tensor(0, 2), rate: tensor(1, 2 + D) }
+    }
+
+    fn all_constants(&self, time: f64) -> Vec<Dual<f64, D>> {
+        let of = |constant: &Constant| match *constant {
+            Constant::Number(value) => Dual::constant(value),
+            Constant::Time => Dual::constant(time),
+            Constant::Coordinate(axis) => {
+                Dual { value: self.X[axis], slopes: std::array::from_fn(|J| self.frame[axis][J]) }
+            }
+        };
+        self.histories.constants.iter().map(of).collect()
+    }
+}
+
+impl<const D: usize> Motion<D> for Particle<'_, D> {
+    fn at(&self, time: f64) -> Kinematics<Dual<f64, D>> {
+        self.kinematics(time)
+    }
+
+    fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, D>>) {
+        constants.extend(self.all_constants(time));
+    }
+}
+
+impl<const D: usize> Histories<D> {
+    /// Of a law that has a history.
+    pub(crate) fn new(
+        law: &Law<f64>,
+        history: &History,
+        parameters: Vec<f64>,
+        chart: Chart<D>,
+        is_cartesian: bool,
+        (density, density_here): (f64, Option<Program>),
+    ) -> Result<Self, HistoryProblem> {
+        let any = AnyLaw::new(law, D)?;
+        let known: Vec<(String, f64)> = match law {
+            Law::WithMemory(law) => law.named_values(),
+            Law::Stated(stated) => stated.constants.clone(),
+            Law::Library(_) => Vec::new(),
+        };
+        let constants = any
+            .constants()
+            .iter()
+            .map(|name| match known.iter().find(|(own, _)| own == name) {
+                Some((_, value)) => Ok(Constant::Number(*value)),
+                None => match ["X", "Y", "Z"].iter().position(|axis| axis == name) {
+                    Some(axis) if axis < D => Ok(Constant::Coordinate(axis)),
+                    None if name == "t" => Ok(Constant::Time),
+                    _ => Err(HistoryProblem::NoValue { name: name.clone() }),
+                },
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let uses_places = constants.iter().any(|c| matches!(c, Constant::Coordinate(_)));
+        // Coordinates of the specification that nothing depends on are those of the chart, or none is left out.
+        let fits = match chart {
+            Chart::Box { .. } => is_cartesian,
+            Chart::Annulus { .. } => !is_cartesian,
+        };
+        let is_used = |axis: &usize| {
+            !fits || uses_places || density_here.is_some() || history.coordinates[*axis]
+        };
+        let axes: Vec<usize> = (0..D).filter(is_used).collect();
+        let names = any.observable_names();
+        let (motion, inertia) = (history.motion.clone(), history.inertia.clone());
+        Ok(Self {
+            law: any,
+            names,
+            constants,
+            motion,
+            inertia,
+            parameters,
+            density,
+            density_here,
+            chart,
+            axes: if axes.is_empty() { vec![0] } else { axes },
+            tables: RwLock::new(None),
+        })
+    }
+
+    fn particle(&self, X: [f64; D]) -> Particle<'_, D> {
+        let mut particle = Particle { histories: self, X, frame: [[0.0; D]; D] };
+        let values = self.inertia.evaluate_in(&particle.inputs(0.0));
+        particle.frame = std::array::from_fn(|i| std::array::from_fn(|a| values[D + i * D + a]));
+        particle
+    }
+
+    fn density_at(&self, particle: &Particle<'_, D>) -> f64 {
+        let here = self.density_here.as_ref();
+        here.map_or(self.density, |program| program.evaluate_in(&particle.inputs(0.0))[0])
+    }
+
+    /// Stress, body force and internal variables in the frame of a particle at some times, quantity by quantity.
+    fn in_frame(&self, X: [f64; D], times: &[f64]) -> Result<Vec<Vec<f64>>, HistoryError> {
+        let particle = self.particle(X);
+        let trajectory = Trajectory::<D>::new(&self.law, &particle, times, TOLERANCE)?;
+        let density = self.density_at(&particle);
+        let mut all = vec![Vec::with_capacity(times.len()); D * D + D + self.names.len()];
+        for (&time, z) in times.iter().zip(&trajectory.states) {
+            let constants = particle.all_constants(time);
+            let (div, P) = divergence(&self.law, &particle.kinematics(time), &constants, z);
+            let a = self.inertia.evaluate_in(&particle.inputs(time));
+            let stresses = (0..D * D).map(|k| P[k / D][k % D]);
+            let force = (0..D).map(|i| a[i] - div[i] / density);
+            let of_constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+            let of_z: Vec<f64> = z.iter().map(|z| z.value).collect();
+            let internal = self.law.observables(&of_constants, &of_z);
+            for (own, value) in all.iter_mut().zip(force.chain(stresses).chain(internal)) {
+                own.push(value);
+            }
+        }
+        Ok(all)
+    }
+
+    /// From the frame of a particle to Cartesian components; `values` as [`in_frame`](Self::in_frame) orders them.
+    fn turned(&self, X: [f64; D], values: &[f64]) -> Response<D> {
+        let Q = self.particle(X).frame;
+        let (force, rest) = values.split_at(D);
+        let (stress, internal) = rest.split_at(D * D);
+        Response {
+            b: std::array::from_fn(|i| (0..D).map(|a| Q[i][a] * force[a]).sum()),
+            P: std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let terms = (0..D * D).map(|k| Q[i][k / D] * stress[k] * Q[j][k % D]);
+                    terms.sum()
+                })
+            }),
+            internal: turn_tensors(&self.names, &Q, internal),
+        }
+    }
+
+    /// At one place and time, by the trajectory of this particle.
+    pub(crate) fn response(&self, X: [f64; D], t: f64) -> Result<Response<D>, HistoryError> {
+        let all = self.in_frame(X, &[t])?;
+        let values: Vec<f64> = all.iter().map(|values| values[0]).collect();
+        Ok(self.turned(X, &values))
+    }
+
+    /// How the histories of some particles go until a time.
+    pub(crate) fn report(
+        &self,
+        places: &[[f64; D]],
+        end: f64,
+    ) -> Result<HistoryReport, HistoryError> {
+        let times: Vec<f64> = (1..=32).map(|k| end * f64::from(k) / 32.0).collect();
+        let follow = |X: &[f64; D]| {
+            let particle = self.particle(*X);
+            Trajectory::<D>::new(&self.law, &particle, &times, TOLERANCE)
+        };
+        let all: Vec<_> = places.par_iter().map(follow).collect();
+        let mut report = HistoryReport {
+            table_error: self.tables_until(end)?.error,
+            least_margin: f64::INFINITY,
+            particles: places.len(),
+            always: 0,
+            onsets: 0,
+            unloadings: 0,
+            smoothness: Told::Smooth,
+            yield_condition: 0.0,
+            volume: 0.0,
+        };
+        for trajectory in all {
+            let trajectory = trajectory?;
+            let begins = |branch| trajectory.changes.iter().any(|change| change.branch == branch);
+            let flows = trajectory.least_margin.is_finite();
+            report.least_margin = report.least_margin.min(trajectory.least_margin);
+            report.always += usize::from(flows && trajectory.changes.is_empty());
+            report.onsets += usize::from(begins(mmsmith_history::Branch::Flowing));
+            report.unloadings += usize::from(begins(mmsmith_history::Branch::Elastic));
+            report.smoothness = report.smoothness.min(match trajectory.smoothness() {
+                Smoothness::Jump => Told::Jump,
+                Smoothness::Kink => Told::Kink,
+                Smoothness::Smooth => Told::Smooth,
+            });
+            report.yield_condition =
+                report.yield_condition.max(trajectory.residuals.yield_condition);
+            report.volume = report.volume.max(trajectory.residuals.volume);
+        }
+        Ok(report)
+    }
+
+    /// Tables of all fields until a time, made where there are none yet.
+    pub(crate) fn tables_until(&self, end: f64) -> Result<Arc<Tables<D>>, HistoryError> {
+        let known = || self.tables.read().ok().and_then(|tables| tables.clone());
+        if let Some(tables) = known().filter(|tables| tables.end >= end) {
+            return Ok(tables);
+        }
+        let tables = Arc::new(Tables::new(self, end)?);
+        if let Ok(mut own) = self.tables.write() {
+            *own = Some(Arc::clone(&tables));
+        }
+        Ok(tables)
+    }
+
+    /// The tables that there are.
+    pub(crate) fn tables(&self) -> Option<Arc<Tables<D>>> {
+        self.tables.read().ok().and_then(|tables| tables.clone())
+    }
+}
+
+/// Turns the symmetric tensors among internal variables, six names with the indices 11, 22, 33, 12, 13, 23, from a frame to Cartesian axes.
+fn turn_tensors<const D: usize>(names: &[String], Q: &[[f64; D]; D], values: &[f64]) -> Vec<f64> {
+    const INDICES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+    let rotation = |i: usize, a: usize| match i < D && a < D {
+        true => Q[i][a],
+        false => f64::from(u8::from(i == a)),
+    };
+    let mut turned = values.to_vec();
+    for first in 0..names.len().saturating_sub(5) {
+        let is_tensor = INDICES.iter().enumerate().all(|(k, (i, j))| {
+            let indices = format!("{}{}", i + 1, j + 1);
+            let stem = |name: &String| name.strip_suffix(&indices).map(str::to_owned);
+            stem(&names[first + k]).is_some()
+                && stem(&names[first + k]) == names[first].strip_suffix("11").map(str::to_owned)
+        });
+        if !is_tensor {
+            continue;
+        }
+        let entry = |a: usize, b: usize| {
+            let (a, b) = (a.min(b), a.max(b));
+            let place = INDICES.iter().position(|pair| *pair == (a, b)).unwrap_or(0);
+            values[first + place]
+        };
+        for (k, &(i, j)) in INDICES.iter().enumerate() {
+            turned[first + k] =
+                (0..9).map(|m| rotation(i, m / 3) * entry(m / 3, m % 3) * rotation(j, m % 3)).sum();
+        }
+    }
+    turned
+}
+
+/// Fields of a body in the frames of its particles, as tables over the coordinates that they depend on.
+pub(crate) struct Tables<const D: usize> {
+    table: OverAxes,
+    end: f64,
+    /// The largest error that random places and times showed, as a share of each quantity's largest value.
+    pub(crate) error: f64,
+}
+
+enum OverAxes {
+    One(Table<1>),
+    Two(Table<2>),
+    Three(Table<3>),
+}
+
+impl<const D: usize> Tables<D> {
+    fn new(histories: &Histories<D>, end: f64) -> Result<Self, HistoryError> {
+        match histories.axes.len() {
+            1 => Self::over::<1>(histories, end, OverAxes::One),
+            2 => Self::over::<2>(histories, end, OverAxes::Two),
+            _ => Self::over::<3>(histories, end, OverAxes::Three),
+        }
+    }
+
+    fn over<const K: usize>(
+        histories: &Histories<D>,
+        end: f64,
+        any: impl Fn(Table<K>) -> OverAxes,
+    ) -> Result<Self, HistoryError> {
+        let Histories { chart, axes, .. } = histories;
+        let range = std::array::from_fn(|k| chart.range(axes[k]));
+        let of = |own: [f64; K], times: &[f64]| {
+            // Nothing depends on the other coordinates.
+            let mut q = std::array::from_fn(|axis| {
+                let [low, high] = chart.range(axis);
+                low + 0.37 * (high - low)
+            });
+            axes.iter().zip(own).for_each(|(&axis, own)| q[axis] = own);
+            histories.in_frame(chart.place(q), times)
+        };
+        let (table, error) = Table::<K>::fine(range, end, TABLE_TOLERANCE, of)?;
+        Ok(Self { table: any(table), end, error })
+    }
+
+    /// The series of a place.
+    fn at(&self, histories: &Histories<D>, X: &[f64; D]) -> AtPoint {
+        let q = histories.chart.coordinates(X);
+        let of = |k: usize| q[histories.axes[k]];
+        match &self.table {
+            OverAxes::One(table) => table.at(&[of(0)]),
+            OverAxes::Two(table) => table.at(&[of(0), of(1)]),
+            OverAxes::Three(table) => table.at(&[of(0), of(1), of(2)]),
+        }
+    }
+}
+
+/// Series of the fields of particles that stay at their places.
+pub(crate) struct Prepared<'a, const D: usize> {
+    histories: &'a Histories<D>,
+    end: f64,
+    particles: Vec<PreparedParticle<D>>,
+}
+
+struct PreparedParticle<const D: usize> {
+    X: [f64; D],
+    frame: [[f64; D]; D],
+    series: AtPoint,
+}
+
+impl<'a, const D: usize> Prepared<'a, D> {
+    pub(crate) fn new(histories: &'a Histories<D>, tables: &Tables<D>, X: &[[f64; D]]) -> Self {
+        let prepare = |X: &[f64; D]| PreparedParticle {
+            X: *X,
+            frame: histories.particle(*X).frame,
+            series: tables.at(histories, X),
+        };
+        Self { histories, end: tables.end, particles: X.par_iter().map(prepare).collect() }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.particles.len()
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.particles.first().map_or(0, |_particle| size_of::<PreparedParticle<D>>())
+    }
+
+    /// Whether the tables have this time; later ones take a trajectory each.
+    fn has(&self, t: f64) -> bool {
+        t <= self.end * (1.0 + 1e-12)
+    }
+
+    pub(crate) fn body_force(&self, n: usize, t: f64) -> [f64; D] {
+        let PreparedParticle { X, frame, series } = &self.particles[n];
+        if !self.has(t) {
+            return self.histories.response(*X, t).map_or([f64::NAN; D], |response| response.b);
+        }
+        let own: [f64; D] = std::array::from_fn(|a| series.value(a, t));
+        std::array::from_fn(|i| (0..D).map(|a| frame[i][a] * own[a]).sum())
+    }
+
+    pub(crate) fn stress(&self, n: usize, t: f64) -> [[f64; D]; D] {
+        let PreparedParticle { X, frame: Q, series } = &self.particles[n];
+        if !self.has(t) {
+            let nan = [[f64::NAN; D]; D];
+            return self.histories.response(*X, t).map_or(nan, |response| response.P);
+        }
+        let own = |a: usize, b: usize| series.value(D + a * D + b, t);
+        let values: [[f64; D]; D] = std::array::from_fn(|a| std::array::from_fn(|b| own(a, b)));
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                (0..D * D).map(|k| Q[i][k / D] * values[k / D][k % D] * Q[j][k % D]).sum()
+            })
+        })
+    }
+
+    pub(crate) fn internal(&self, n: usize, t: f64) -> Vec<f64> {
+        let PreparedParticle { X, frame, series } = &self.particles[n];
+        let names = &self.histories.names;
+        if !self.has(t) {
+            let nan = vec![f64::NAN; names.len()];
+            return self.histories.response(*X, t).map_or(nan, |response| response.internal);
+        }
+        let first = D + D * D;
+        let own: Vec<f64> =
+            (first..first + names.len()).map(|quantity| series.value(quantity, t)).collect();
+        turn_tensors(names, frame, &own)
+    }
+}
