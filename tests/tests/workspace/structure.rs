@@ -1,4 +1,5 @@
-//! The modules of each crate use each other in one direction: each can be read after those that it uses.
+//! The modules of each crate use each other in one direction: each can be read after those that it uses. And what the manifests say
+//! about tests is so.
 
 #![allow(clippy::unwrap_used)]
 
@@ -251,4 +252,65 @@ fn doc_comments_name_their_subject_first() {
         let is_there = found.iter().any(|(f, t)| f == file && t.starts_with(text));
         assert!(is_there, "no exception is needed any more: {file}: {text}");
     }
+}
+
+/// Whether Rust's tools would find something to run in a line of documentation that opens a block.
+fn opens_an_example(line: &str) -> bool {
+    let comment = ["///", "//!"].iter().find_map(|mark| line.trim_start().strip_prefix(mark));
+    comment.is_some_and(|text| {
+        text.trim_start().strip_prefix("```").is_some_and(|language| language != "text")
+    })
+}
+
+/// The text of all files of a folder, without the lines that close blocks of documentation.
+fn text_of(folder: &Path, text: &mut String) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            text_of(&path, text);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let mut is_in_block = false;
+            for line in std::fs::read_to_string(&path).unwrap().lines() {
+                let is_fence =
+                    ["/// ```", "//! ```"].iter().any(|m| line.trim_start().starts_with(m));
+                if !(is_fence && is_in_block) {
+                    *text += line;
+                    text.push('\n');
+                }
+                is_in_block ^= is_fence;
+            }
+        }
+    }
+}
+
+/// A library without tests is not compiled for them, one without examples is not searched for any; and none has tests that never run.
+#[test]
+fn manifests_say_which_libraries_have_tests_and_examples() {
+    let root = workspace();
+    let crates = std::fs::read_dir(root.join("crates")).unwrap().map(|e| e.unwrap().path());
+    let mut without = [0, 0];
+    for package in crates.chain([root.join("tests")]) {
+        let manifest = std::fs::read_to_string(package.join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = toml::from_str(&manifest).unwrap();
+        let says = |key: &str| {
+            let said = manifest.get("lib").and_then(|lib| lib.get(key));
+            said.is_none_or(|value| value.as_bool().unwrap())
+        };
+        let mut text = String::new();
+        text_of(&package.join("src"), &mut text);
+        let has_tests = text.lines().any(|line| line.trim_start().starts_with("#[test]"));
+        let has_examples = text.contains("cfg(doctest)") || text.lines().any(opens_an_example);
+        for (k, (key, has)) in
+            [("test", has_tests), ("doctest", has_examples)].into_iter().enumerate()
+        {
+            let shown = package.display();
+            assert_eq!(
+                says(key),
+                has,
+                "{shown}/Cargo.toml: `{key} = false` in [lib] is for a library without"
+            );
+            without[k] += usize::from(!has);
+        }
+    }
+    assert!(without.into_iter().all(|count| count > 5), "{without:?}");
 }
