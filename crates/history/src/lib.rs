@@ -32,6 +32,6 @@ pub use law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
 pub use maxwell::{ElasticPart, Maxwell};
 pub use number::{Dual, Number};
 pub use stated::{StatedHistory, StatedHistoryError};
-pub use table::{AtPoint, Grid, Series, Table};
+pub use table::{AtPoint, AtTime, Grid, Series, Table};
 pub use tensor::{Tensor, determinant, identity};
 pub use trajectory::{Change, HistoryError, Motion, Trajectory, divergence};

@@ -501,12 +501,42 @@ fn transform<const D: usize>(column: &mut [f64], along: &[Transform; D]) {
     }
 }
 
+/// Where a time is among the pieces of series, and the polynomials there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtTime {
+    /// The piece.
+    pub piece: usize,
+    /// The values of the polynomials, by which a series' coefficients of this piece are multiplied.
+    pub polynomials: Vec<f64>,
+}
+
+impl<const D: usize> Grid<D> {
+    /// The polynomials at a time.
+    #[must_use]
+    pub fn at_time(&self, time: f64) -> AtTime {
+        let piece = piece_of(&self.knots, time);
+        let x = within([self.knots[piece], self.knots[piece + 1]], time);
+        AtTime { piece, polynomials: polynomials(x, self.in_time) }
+    }
+}
+
+/// The piece that has a time; those before and after all are in the first and in the last.
+fn piece_of(knots: &[f64], time: f64) -> usize {
+    let last = knots.len().saturating_sub(2);
+    knots.partition_point(|knot| *knot <= time).saturating_sub(1).min(last)
+}
+
 impl AtPoint {
+    /// The coefficients of a quantity, piece by piece.
+    #[must_use]
+    pub fn coefficients(&self, quantity: usize) -> &[f64] {
+        &self.coefficients[quantity]
+    }
+
     /// A quantity at a time.
     #[must_use]
     pub fn value(&self, quantity: usize, time: f64) -> f64 {
-        let last = self.knots.len().saturating_sub(2);
-        let piece = self.knots.partition_point(|knot| *knot <= time).saturating_sub(1).min(last);
+        let piece = piece_of(&self.knots, time);
         let x = within([self.knots[piece], self.knots[piece + 1]], time);
         sum(&self.coefficients[quantity][piece * self.in_time..][..self.in_time], x)
     }

@@ -2,8 +2,8 @@
 
 use mmsmith_expr::Program;
 use mmsmith_history::{
-    AnyLaw, AtPoint, Dual, HistoryError, Kinematics, LawWithHistory, Motion, Number, Smoothness,
-    Table, Tensor, Trajectory, UnsupportedLaw, divergence,
+    AnyLaw, AtPoint, AtTime, Dual, HistoryError, Kinematics, LawWithHistory, Motion, Number,
+    Smoothness, Table, Tensor, Trajectory, UnsupportedLaw, divergence,
 };
 use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness as Told};
 use mmsmith_stage::History;
@@ -441,39 +441,108 @@ impl<const D: usize> Tables<D> {
         Ok(Self { table: any(table), end, error })
     }
 
-    /// The series of a place.
-    fn at(&self, histories: &Histories<D>, X: &[f64; D]) -> AtPoint {
-        let q = histories.chart.coordinates(X);
-        let of = |k: usize| q[histories.axes[k]];
+    /// The series of places.
+    fn at_all(&self, histories: &Histories<D>, X: &[[f64; D]]) -> Vec<AtPoint> {
+        let q: Vec<[f64; D]> = X.iter().map(|X| histories.chart.coordinates(X)).collect();
+        fn own<const K: usize, const D: usize>(axes: &[usize], q: &[[f64; D]]) -> Vec<[f64; K]> {
+            q.iter().map(|q| std::array::from_fn(|k| q[axes[k]])).collect()
+        }
+        let axes = &histories.axes;
         match &self.table {
-            OverAxes::One(table) => table.at(&[of(0)]),
-            OverAxes::Two(table) => table.at(&[of(0), of(1)]),
-            OverAxes::Three(table) => table.at(&[of(0), of(1), of(2)]),
+            OverAxes::One(table) => table.at_all(&own(axes, &q)),
+            OverAxes::Two(table) => table.at_all(&own(axes, &q)),
+            OverAxes::Three(table) => table.at_all(&own(axes, &q)),
+        }
+    }
+
+    /// The polynomials at a time.
+    fn at_time(&self, t: f64) -> AtTime {
+        match &self.table {
+            OverAxes::One(table) => table.grid().at_time(t),
+            OverAxes::Two(table) => table.grid().at_time(t),
+            OverAxes::Three(table) => table.grid().at_time(t),
         }
     }
 }
 
-/// Series of the fields of particles that stay at their places.
-pub(crate) struct Prepared<'a, const D: usize> {
-    histories: &'a Histories<D>,
-    end: f64,
-    particles: Vec<PreparedParticle<D>>,
+/// A field, or several, by their place among the quantities of tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantities {
+    BodyForce,
+    Stress,
+    Internal,
 }
 
-struct PreparedParticle<const D: usize> {
+/// Series of fields of particles that stay at their places.
+pub(crate) struct Prepared<'a, const D: usize> {
+    histories: &'a Histories<D>,
+    tables: Arc<Tables<D>>,
+    /// How many fields there are.
+    count: usize,
+    /// Coefficients of a series of one piece, with zeros up to a multiple of [`SIDE_BY_SIDE`].
+    padded: usize,
+    pieces: usize,
+    /// For each particle, piece and field the coefficients.
+    coefficients: Vec<f64>,
+    particles: Vec<Place<D>>,
+}
+
+/// A particle.
+struct Place<const D: usize> {
     X: [f64; D],
+    /// `[i][a]`: Cartesian component `i` of the unit vector `a` of its frame.
     frame: [[f64; D]; D],
-    series: AtPoint,
+}
+
+/// Terms of a series that are summed side by side.
+const SIDE_BY_SIDE: usize = 4;
+/// Particles whose series are formed at a time.
+const CHUNK: usize = 1024;
+
+/// The polynomials at a time, for [`Prepared`].
+pub(crate) struct Moment {
+    t: f64,
+    piece: usize,
+    polynomials: Vec<f64>,
 }
 
 impl<'a, const D: usize> Prepared<'a, D> {
-    pub(crate) fn new(histories: &'a Histories<D>, tables: &Tables<D>, X: &[[f64; D]]) -> Self {
-        let prepare = |X: &[f64; D]| PreparedParticle {
-            X: *X,
-            frame: histories.particle(*X).frame,
-            series: tables.at(histories, X),
+    pub(crate) fn new(
+        histories: &'a Histories<D>,
+        tables: Arc<Tables<D>>,
+        quantities: Quantities,
+        X: &[[f64; D]],
+    ) -> Self {
+        let range = match quantities {
+            Quantities::BodyForce => 0..D,
+            Quantities::Stress => D..D + D * D,
+            Quantities::Internal => D + D * D..D + D * D + histories.names.len(),
         };
-        Self { histories, end: tables.end, particles: X.par_iter().map(prepare).collect() }
+        let place = |X: &[f64; D]| Place { X: *X, frame: histories.particle(*X).frame };
+        let in_time = tables.at_time(0.0).polynomials.len().max(1);
+        let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
+        let (mut pieces, mut coefficients) = (1, Vec::new());
+        for X in X.chunks(CHUNK) {
+            for series in tables.at_all(histories, X) {
+                pieces = series.coefficients(range.start).len() / in_time;
+                for piece in 0..pieces {
+                    for quantity in range.clone() {
+                        let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
+                        coefficients.extend_from_slice(own);
+                        coefficients.resize(coefficients.len() + padded - in_time, 0.0);
+                    }
+                }
+            }
+        }
+        Self {
+            histories,
+            count: range.len(),
+            padded,
+            pieces,
+            coefficients,
+            particles: X.par_iter().map(place).collect(),
+            tables,
+        }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -481,30 +550,54 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.particles.first().map_or(0, |_particle| size_of::<PreparedParticle<D>>())
+        size_of::<Place<D>>() + 8 * self.pieces * self.count * self.padded
+    }
+
+    /// What all particles need of a time.
+    pub(crate) fn moment(&self, t: f64) -> Moment {
+        let AtTime { piece, mut polynomials } = self.tables.at_time(t);
+        polynomials.resize(self.padded, 0.0);
+        Moment { t, piece, polynomials }
+    }
+
+    /// Field `k` of particle `n` in its frame.
+    #[inline]
+    fn value(&self, n: usize, k: usize, moment: &Moment) -> f64 {
+        let first = ((n * self.pieces + moment.piece) * self.count + k) * self.padded;
+        let own = &self.coefficients[first..][..self.padded];
+        let mut sums = [0.0; SIDE_BY_SIDE];
+        let terms = own.chunks_exact(SIDE_BY_SIDE);
+        for (c, p) in terms.zip(moment.polynomials.chunks_exact(SIDE_BY_SIDE)) {
+            for m in 0..SIDE_BY_SIDE {
+                sums[m] += c[m] * p[m];
+            }
+        }
+        (sums[0] + sums[1]) + (sums[2] + sums[3])
     }
 
     /// Whether the tables have this time; later ones take a trajectory each.
     fn has(&self, t: f64) -> bool {
-        t <= self.end * (1.0 + 1e-12)
+        t <= self.tables.end * (1.0 + 1e-12)
     }
 
-    pub(crate) fn body_force(&self, n: usize, t: f64) -> [f64; D] {
-        let PreparedParticle { X, frame, series } = &self.particles[n];
-        if !self.has(t) {
-            return self.histories.response(*X, t).map_or([f64::NAN; D], |response| response.b);
+    #[inline]
+    pub(crate) fn body_force(&self, n: usize, moment: &Moment) -> [f64; D] {
+        let Place { X, frame } = &self.particles[n];
+        if !self.has(moment.t) {
+            let found = self.histories.response(*X, moment.t);
+            return found.map_or([f64::NAN; D], |response| response.b);
         }
-        let own: [f64; D] = std::array::from_fn(|a| series.value(a, t));
+        let own: [f64; D] = std::array::from_fn(|a| self.value(n, a, moment));
         std::array::from_fn(|i| (0..D).map(|a| frame[i][a] * own[a]).sum())
     }
 
-    pub(crate) fn stress(&self, n: usize, t: f64) -> [[f64; D]; D] {
-        let PreparedParticle { X, frame: Q, series } = &self.particles[n];
-        if !self.has(t) {
+    pub(crate) fn stress(&self, n: usize, moment: &Moment) -> [[f64; D]; D] {
+        let Place { X, frame: Q } = &self.particles[n];
+        if !self.has(moment.t) {
             let nan = [[f64::NAN; D]; D];
-            return self.histories.response(*X, t).map_or(nan, |response| response.P);
+            return self.histories.response(*X, moment.t).map_or(nan, |response| response.P);
         }
-        let own = |a: usize, b: usize| series.value(D + a * D + b, t);
+        let own = |a: usize, b: usize| self.value(n, a * D + b, moment);
         let values: [[f64; D]; D] = std::array::from_fn(|a| std::array::from_fn(|b| own(a, b)));
         std::array::from_fn(|i| {
             std::array::from_fn(|j| {
@@ -513,16 +606,15 @@ impl<'a, const D: usize> Prepared<'a, D> {
         })
     }
 
-    pub(crate) fn internal(&self, n: usize, t: f64) -> Vec<f64> {
-        let PreparedParticle { X, frame, series } = &self.particles[n];
+    pub(crate) fn internal(&self, n: usize, moment: &Moment) -> Vec<f64> {
+        let Place { X, frame } = &self.particles[n];
         let names = &self.histories.names;
-        if !self.has(t) {
+        if !self.has(moment.t) {
             let nan = vec![f64::NAN; names.len()];
-            return self.histories.response(*X, t).map_or(nan, |response| response.internal);
+            let found = self.histories.response(*X, moment.t);
+            return found.map_or(nan, |response| response.internal);
         }
-        let first = D + D * D;
-        let own: Vec<f64> =
-            (first..first + names.len()).map(|quantity| series.value(quantity, t)).collect();
+        let own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
         turn_tensors(names, frame, &own)
     }
 }

@@ -12,7 +12,7 @@ mod staged;
 
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
 
-use history::{Chart, Histories, HistoryProblem, Prepared};
+use history::{Chart, Histories, HistoryProblem, Prepared, Quantities};
 use lattice::LatticeStages;
 use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_history::HistoryError;
@@ -350,7 +350,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         lattice: Option<Lattice<T, D>>,
     ) -> Box<dyn BodyForceAtPoints<T, D> + '_> {
         if let Some(history) = &self.history {
-            return match self.prepared(history, X) {
+            return match self.prepared(history, Quantities::BodyForce, X) {
                 Some(points) => Box::new(points),
                 None => Box::new(PlainPoints { solution: self, X: X.to_vec() }),
             };
@@ -364,7 +364,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     fn state_at(&self, X: &[SVector<T, D>]) -> Box<dyn StateAtPoints<T, D> + '_> {
         let motion = self.state_stages.at(X, &self.parameters);
         if let Some(history) = &self.history {
-            return match self.prepared(history, X) {
+            return match self.prepared(history, Quantities::Stress, X) {
                 Some(points) => Box::new(StateWithHistory { motion, points }),
                 None => Box::new(PlainPoints { solution: self, X: X.to_vec() }),
             };
@@ -498,6 +498,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
     fn prepared<'a>(
         &'a self,
         history: &'a Histories<D>,
+        quantities: Quantities,
         X: &[SVector<T, D>],
     ) -> Option<Prepared<'a, D>> {
         let tables = match history.tables() {
@@ -505,14 +506,15 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             None => history.tables_until(self.period.to_f64()).ok()?,
         };
         let X: Vec<[f64; D]> = X.iter().map(in_double).collect();
-        Some(Prepared::new(history, &tables, &X))
+        Some(Prepared::new(history, tables, quantities, &X))
     }
 }
 
 impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, D> {
     fn evaluate(&self, t: T, first: usize, b: &mut [SVector<T, D>]) {
+        let moment = self.moment(t.to_f64());
         for (n, b) in (first..).zip(b) {
-            let own = self.body_force(n, t.to_f64());
+            let own = self.body_force(n, &moment);
             *b = SVector::from_fn(|i, _| T::nearest(own[i]));
         }
     }
@@ -522,8 +524,10 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, 
     }
 
     fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
+        let &[t] = time else { panic!("one value of the time is needed, not {}", time.len()) };
+        let moment = self.moment(t.to_f64());
         for (n, b) in points.iter().zip(b) {
-            let own = self.body_force(*n as usize, time[0].to_f64());
+            let own = self.body_force(*n as usize, &moment);
             *b = SVector::from_fn(|i, _| T::nearest(own[i]));
         }
     }
@@ -547,9 +551,10 @@ impl<T: Interpretable, const D: usize> StateAtPoints<T, D> for StateWithHistory<
     fn evaluate(&self, t: T, velocity_time: T, first: usize, runs: &mut [StateRun<T, D>]) {
         self.motion.evaluate(t, velocity_time, first, runs);
         let last = self.points.len().saturating_sub(1);
+        let moment = self.points.moment(t.to_f64());
         for (block, run) in (first..).zip(runs) {
             for n in 0..BLOCK {
-                let P = self.points.stress((block * BLOCK + n).min(last), t.to_f64());
+                let P = self.points.stress((block * BLOCK + n).min(last), &moment);
                 for (i, row) in P.iter().enumerate() {
                     for (j, value) in row.iter().enumerate() {
                         run.P[i][j][n] = T::nearest(*value);
