@@ -10,7 +10,10 @@
 //! The body force that makes the motion exact is `b = a - Div P(F, z) / rho0`, by the chain rule. One generic function of a
 //! [`LawWithHistory`] gives rates and, by [`Dual`] numbers, their slopes. A host needs nothing but `b`: no source in its return map.
 //!
-//! [`Trajectory`] follows one particle. A [`Table`] has the fields of a body, from trajectories at Chebyshev nodes. The solver's own laws are written by hand in `mmsmith-laws` and share no formula with these.
+//! [`AnyLaw`] is a law of the vocabulary: flow by von Mises with and without regard to the rate, Maxwell elements, or texts of a
+//! specification. [`Trajectory`] follows one particle through beginnings and ends of its flow. A [`Table`] has the fields of a body, from
+//! trajectories at Chebyshev nodes; where fields are too rough for it, as behind the front of a flow, [`AtPoint::fine`] has the series of one
+//! particle. The solver's own laws are written by hand in `mmsmith-laws` and share no formula with these.
 
 #![allow(non_snake_case)]
 

@@ -117,6 +117,8 @@ pub struct Table<const D: usize> {
     coefficients: Vec<Vec<f64>>,
     /// The largest value of each quantity at the nodes.
     largest: Vec<f64>,
+    /// What errors of each quantity are a share of.
+    scales: Vec<f64>,
 }
 
 /// The fields at one position, as series in time.
@@ -160,13 +162,11 @@ impl<const D: usize> Table<D> {
         }
         let along = grid.in_space.map(Transform::new);
         columns.par_iter_mut().for_each(|column| transform(column, &along));
-        Ok(Self { grid, quantities, coefficients: columns, largest })
+        let scales = largest.clone();
+        Ok(Self { grid, quantities, coefficients: columns, largest, scales })
     }
 
-    /// Tabulates quantities as finely as an error asks for, a share of each quantity's largest value, and no finer. `of` gives their
-    /// values at a position, at ascending times. Pieces in time are halved where series at some positions are too short; polynomials in
-    /// space are counted along lines. Gives the table, and an error that random positions and times keep; it is above `tolerance` where
-    /// the fields are too rough for it.
+    /// As [`fine_by_kinds`](Self::fine_by_kinds), with each quantity a kind of its own.
     ///
     /// # Errors
     ///
@@ -177,16 +177,41 @@ impl<const D: usize> Table<D> {
         tolerance: f64,
         of: impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync,
     ) -> Result<(Self, f64), E> {
+        Self::fine_by_kinds(range, end, tolerance, &[], of)
+    }
+
+    /// Tabulates quantities as finely as an error asks for, and no finer. Errors are shares of the largest value of the quantity's kind:
+    /// quantities of the same number in `kinds`, as components of one tensor, are of one kind; those that it does not number have a kind
+    /// of their own. A kind that is nothing but rounding counts for nothing. `of` gives the values at a position, at ascending times.
+    /// Pieces in time are halved where series at some positions are too short; polynomials in space are counted along lines.
+    ///
+    /// Gives the table, and an error that random positions and times keep; it is above `tolerance` where the fields are too rough for it.
+    ///
+    /// # Errors
+    ///
+    /// The first error of `of`.
+    pub fn fine_by_kinds<E: Send>(
+        range: [[f64; 2]; D],
+        end: f64,
+        tolerance: f64,
+        kinds: &[usize],
+        of: impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync,
+    ) -> Result<(Self, f64), E> {
         const PROBES: u32 = 24;
         const TIMES: u32 = 5;
         const MOST_RAISES: usize = 2;
-        let (knots, in_time) = in_time(range, end, tolerance, &of)?;
+        let (knots, in_time, kinds) = in_time(range, end, tolerance, kinds, &of)?;
         let mut grid = Grid { range, knots, in_space: [1; D], in_time };
         let mut times = grid.times();
         for axis in 0..D {
-            grid.in_space[axis] = along_lines(range, axis, tolerance, &times, &of)?;
+            grid.in_space[axis] = along_lines(range, axis, tolerance, &times, &kinds, &of)?;
         }
-        let mut table = Self::new(grid.clone(), |X| of(X, &times))?;
+        let new = |grid: &Grid<D>, times: &[f64]| {
+            let mut table = Self::new(grid.clone(), |X| of(X, times))?;
+            table.scales = kinds.scales(&table.largest);
+            Ok(table)
+        };
+        let mut table = new(&grid, &times)?;
         for _ in 0..MOST_RAISES {
             let (tails, late) = table.all_tails();
             // Rough fields do not become smooth by some more nodes.
@@ -201,7 +226,7 @@ impl<const D: usize> Table<D> {
             for (count, tail) in grid.in_space.iter_mut().zip(tails) {
                 *count += if is_short(tail) { 4 } else { 0 };
             }
-            table = Self::new(grid.clone(), |X| of(X, &times))?;
+            table = new(&grid, &times)?;
         }
         let probe = |probe: u32| -> Result<f64, E> {
             let mut X = place(&range, probe);
@@ -219,7 +244,7 @@ impl<const D: usize> Table<D> {
             let (at, exact) = (table.at(&X), of(X, &times)?);
             let mut error = 0.0_f64;
             for (quantity, exact) in exact.iter().enumerate() {
-                let largest = table.largest[quantity].max(f64::MIN_POSITIVE);
+                let largest = table.scales[quantity].max(f64::MIN_POSITIVE);
                 for (time, exact) in times.iter().zip(exact) {
                     error = error.max((at.value(quantity, *time) - exact).abs() / largest);
                 }
@@ -319,7 +344,7 @@ impl<const D: usize> Table<D> {
         let steps = self.grid.pieces() * in_time;
         let (mut tails, mut late) = ([0.0_f64; D], 0.0_f64);
         for (number, column) in self.coefficients.iter().enumerate() {
-            let largest = self.largest[number / steps].max(f64::MIN_POSITIVE);
+            let largest = self.scales[number / steps].max(f64::MIN_POSITIVE);
             let is_late = number % in_time + 2 >= in_time;
             for (node, c) in column.iter().enumerate() {
                 let share = c.abs() / largest;
@@ -337,6 +362,77 @@ impl<const D: usize> Table<D> {
         }
         (tails, late)
     }
+}
+
+/// Kinds of quantities.
+#[derive(Clone)]
+struct Kinds {
+    /// The kind of each quantity.
+    of: Vec<usize>,
+    /// For each quantity whether its kind is nothing but rounding.
+    is_rounding: Vec<bool>,
+}
+
+impl Kinds {
+    /// From samples of series at some positions.
+    fn new(kinds: &[usize], samples: &[Series], transform: &Transform) -> Self {
+        /// Series whose later half is this share of the largest coefficient do not fall.
+        const FLAT: f64 = 0.2;
+        /// And beside other quantities they are this small.
+        const SMALL: f64 = 1e-11;
+        let quantities = samples.first().map_or(0, Vec::len);
+        let others = kinds.iter().max().map_or(0, |most| most + 1);
+        let own = |quantity: usize| others + quantity;
+        let of: Vec<usize> = (0..quantities)
+            .map(|quantity| kinds.get(quantity).copied().unwrap_or_else(|| own(quantity)))
+            .collect();
+        let mut all = Self { is_rounding: vec![false; quantities], of };
+        let largest = all.scales(&largest_in(samples));
+        let most = largest_of(&largest);
+        let mut halves = vec![[0.0_f64; 2]; quantities];
+        for sample in samples {
+            for (halves, values) in halves.iter_mut().zip(sample) {
+                let pieces = values.chunks_exact(transform.n);
+                let all = pieces.flat_map(|own| transform.coefficients(own).enumerate());
+                for (k, c) in all {
+                    let half = &mut halves[usize::from(2 * k >= transform.n)];
+                    *half = half.max(c.abs());
+                }
+            }
+        }
+        let early = all.scales(&halves.iter().map(|half| half[0]).collect::<Vec<_>>());
+        let late = all.scales(&halves.iter().map(|half| half[1]).collect::<Vec<_>>());
+        all.is_rounding = (0..quantities)
+            .map(|quantity| {
+                let is_flat = late[quantity] > FLAT * early[quantity].max(late[quantity]);
+                is_flat && largest[quantity] < SMALL * most
+            })
+            .collect();
+        all
+    }
+
+    /// What errors of each quantity are a share of, from its largest values.
+    fn scales(&self, largest: &[f64]) -> Vec<f64> {
+        let of = |quantity: usize| {
+            if self.is_rounding[quantity] {
+                return f64::INFINITY;
+            }
+            let same = largest.iter().zip(&self.of).filter(|pair| *pair.1 == self.of[quantity]);
+            same.fold(0.0, |most: f64, pair| most.max(*pair.0))
+        };
+        (0..largest.len()).map(of).collect()
+    }
+}
+
+/// The largest value of each quantity.
+fn largest_in(samples: &[Series]) -> Vec<f64> {
+    let mut largest = vec![0.0_f64; samples.first().map_or(0, Vec::len)];
+    for sample in samples {
+        for (largest, values) in largest.iter_mut().zip(sample) {
+            *largest = largest.max(largest_of(values));
+        }
+    }
+    largest
 }
 
 fn largest_of(values: &[f64]) -> f64 {
@@ -374,13 +470,14 @@ fn enough(rests: &[f64], tolerance: f64) -> usize {
 }
 
 /// Knots between which series of polynomials in time leave out less than a share of each quantity's largest value, at some positions, and
-/// the number of polynomials.
+/// the number of polynomials; and the kinds of the quantities.
 fn in_time<const D: usize, E: Send>(
     range: [[f64; 2]; D],
     end: f64,
     tolerance: f64,
+    kinds: &[usize],
     of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
-) -> Result<(Vec<f64>, usize), E> {
+) -> Result<(Vec<f64>, usize, Kinds), E> {
     const POSITIONS: u32 = 8;
     const MOST: usize = 24;
     const LEAST: usize = 6;
@@ -388,6 +485,7 @@ fn in_time<const D: usize, E: Send>(
     let mut knots = vec![0.0, end];
     let transform = Transform::new(MOST);
     let mut worst_before = [f64::INFINITY; 2];
+    let mut known: Option<Kinds> = None;
     loop {
         let grid = Grid { range, knots: knots.clone(), in_space: [1; D], in_time: MOST };
         let times = grid.times();
@@ -396,13 +494,9 @@ fn in_time<const D: usize, E: Send>(
             .map(|number| of(place(&range, number), &times))
             .collect();
         let samples = samples.into_iter().collect::<Result<Vec<Series>, E>>()?;
-        let quantities = samples.first().map_or(0, Vec::len);
-        let mut largest = vec![0.0_f64; quantities];
-        for sample in &samples {
-            for (largest, values) in largest.iter_mut().zip(sample) {
-                *largest = largest.max(largest_of(values));
-            }
-        }
+        // By the whole, in one piece.
+        let kinds = known.get_or_insert_with(|| Kinds::new(kinds, &samples, &transform));
+        let largest = kinds.scales(&largest_in(&samples));
         let mut of_pieces = vec![vec![0.0_f64; MOST]; grid.pieces()];
         for sample in &samples {
             for (&largest, values) in largest.iter().zip(sample) {
@@ -420,7 +514,8 @@ fn in_time<const D: usize, E: Send>(
         worst_before = [worst_before[1], worst];
         if !of_pieces.iter().any(is_rough) || knots.len() > MOST_PIECES || stalls {
             let counts = of_pieces.iter().map(|rests| enough(rests, tolerance)).max();
-            return Ok((knots, counts.unwrap_or(MOST).clamp(LEAST, MOST)));
+            let kinds = kinds.clone();
+            return Ok((knots, counts.unwrap_or(MOST).clamp(LEAST, MOST), kinds));
         }
         let mut finer = vec![knots[0]];
         for (rests, ends) in of_pieces.iter().zip(knots.windows(2)) {
@@ -439,6 +534,7 @@ fn along_lines<const D: usize, E: Send>(
     axis: usize,
     tolerance: f64,
     times: &[f64],
+    kinds: &Kinds,
     of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
 ) -> Result<usize, E> {
     const LINES: u32 = 3;
@@ -462,9 +558,9 @@ fn along_lines<const D: usize, E: Send>(
         let quantities = samples.first().map_or(0, Vec::len);
         let mut needed = LEAST;
         rough = 0.0;
+        let largest = kinds.scales(&largest_in(&samples));
         for quantity in 0..quantities {
-            let largest = samples.iter().map(|sample| largest_of(&sample[quantity]));
-            let largest = largest.fold(0.0_f64, f64::max);
+            let largest = largest[quantity];
             for line in samples.chunks_exact(count) {
                 for time in 0..times.len() {
                     let values: Vec<f64> =
@@ -531,6 +627,55 @@ impl AtPoint {
     #[must_use]
     pub fn coefficients(&self, quantity: usize) -> &[f64] {
         &self.coefficients[quantity]
+    }
+
+    /// The fields at one position by their own series, for fields that no table has well: where particles begin to flow, each at its own
+    /// time, fields are smooth in time but for the changes, which `breaks` tells. `of` gives the values at ascending times, none of them a
+    /// break. Errors are as in [`Table::fine_by_kinds`]; gives the largest tail as well.
+    ///
+    /// # Errors
+    ///
+    /// The first error of `of`.
+    pub fn fine<E>(
+        end: f64,
+        breaks: &[f64],
+        tolerance: f64,
+        kinds: &[usize],
+        of: impl Fn(&[f64]) -> Result<Series, E>,
+    ) -> Result<(Self, f64), E> {
+        const MOST: usize = 20;
+        const MOST_PIECES: usize = 64;
+        let transform = Transform::new(MOST);
+        let inside = breaks.iter().copied().filter(|time| *time > 0.0 && *time < end);
+        let mut knots: Vec<f64> = [0.0].into_iter().chain(inside).chain([end]).collect();
+        let mut known: Option<Kinds> = None;
+        loop {
+            let grid = Grid::<0> { range: [], knots: knots.clone(), in_space: [], in_time: MOST };
+            let samples = [of(&grid.times())?];
+            let kinds = known.get_or_insert_with(|| Kinds::new(kinds, &samples, &transform));
+            let largest = kinds.scales(&largest_in(&samples));
+            let mut tails = vec![0.0_f64; grid.pieces()];
+            let mut coefficients = Vec::with_capacity(largest.len());
+            for (values, &largest) in samples[0].iter().zip(&largest) {
+                for (tail, values) in tails.iter_mut().zip(values.chunks_exact(MOST)) {
+                    *tail = tail.max(rests(values, &transform, largest)[MOST - 2]);
+                }
+                let pieces = values.chunks_exact(MOST);
+                coefficients.push(pieces.flat_map(|own| transform.coefficients(own)).collect());
+            }
+            let tail = largest_of(&tails);
+            if tail <= tolerance || knots.len() > MOST_PIECES {
+                return Ok((Self { knots, in_time: MOST, coefficients }, tail));
+            }
+            let mut finer = vec![knots[0]];
+            for (tail, ends) in tails.iter().zip(knots.windows(2)) {
+                if *tail > tolerance {
+                    finer.push(0.5 * (ends[0] + ends[1]));
+                }
+                finer.push(ends[1]);
+            }
+            knots = finer;
+        }
     }
 
     /// A quantity at a time.
@@ -624,5 +769,29 @@ mod tests {
         told_error_holds(|[x, y], t| (8.0 * x).sin() * t + y, 1e-11, [24, 32]);
         // A kink: the error is told.
         told_error_holds(|[x, y], t| (x - 0.3 * t - 0.6).abs() + y, 0.1, [800, 24]);
+    }
+
+    /// Components that are small beside others of their tensor, or nothing but rounding, ask for no more polynomials.
+    #[test]
+    fn rounding_is_not_tabulated_finely() {
+        let noise = |x: f64| (1e9 * x).sin();
+        let of = |[x, y]: [f64; 2], times: &[f64]| {
+            let of = |field: &dyn Fn(f64) -> f64| times.iter().map(|&t| field(t)).collect();
+            Ok::<_, ()>(vec![
+                of(&|t| 1e3 * (x * y + t).sin()),
+                of(&|t| 1e-9 * (x + t).cos() + 1e-13 * noise(x + y + t)),
+                of(&|t| 1e-13 * noise(x * y + t)),
+                of(&|_| 0.0),
+                of(&|t| 1e-3 * (x + y * t)),
+            ])
+        };
+        let (table, told) = Table::fine_by_kinds([[0.0, 1.0]; 2], 1.0, 1e-12, &[0, 0], of).unwrap();
+        assert!(told < 3e-12, "{told:e}");
+        let Grid { in_space, in_time, ref knots, .. } = table.grid;
+        assert!(in_space.iter().all(|count| *count < 18), "{in_space:?}");
+        assert!(in_time * (knots.len() - 1) <= 24, "{in_time} {knots:?}");
+        // Of a kind of its own the second has no more digits.
+        let (_, told) = Table::fine([[0.0, 1.0]; 2], 1.0, 1e-12, of).unwrap();
+        assert!(told > 1e-6, "{told:e}");
     }
 }

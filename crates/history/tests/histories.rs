@@ -6,8 +6,8 @@ mod bodies;
 
 use bodies::{BULK, MU, YIELD, along, block, creep, elements, flow, number, times};
 use mmsmith_history::{
-    AnyLaw, Branch, Dual, ElasticPart, Flow, HistoryError, Kinematics, LawWithHistory, Maxwell,
-    Motion, Number, Smoothness, Table, Tensor, Trajectory, divergence,
+    AnyLaw, AtPoint, Branch, Dual, ElasticPart, Flow, HistoryError, Kinematics, LawWithHistory,
+    Maxwell, Motion, Number, Smoothness, Table, Tensor, Trajectory, divergence,
 };
 use mmsmith_laws::{BLOCK, Increment, LawWithMemory, Plastic, ReturnMap};
 use mmsmith_vocabulary::Volumetric;
@@ -239,6 +239,78 @@ fn unloading_is_elastic_and_flow_goes_on_behind_it() {
         if count == 100 {
             let alphas: Vec<f64> = found.states.iter().map(|z| z[4].value).collect();
             assert!(alphas.is_sorted() && alphas[99] > 2.0 * alphas[24]);
+        }
+    }
+}
+
+/// A shear that swings, by another size and phase at each position.
+fn swings(X: [f64; 2]) -> impl Fn(f64) -> Kinematics<Dual<f64, 2>> + Sync {
+    move |t: f64| {
+        let (x, y) = (number(X[0], [1.0, 0.0]), number(X[1], [0.0, 1.0]));
+        let size = (x.times(0.3) + Dual::constant(1.0)).times(0.02);
+        let (phase, phase_of_y) = (7.0 * t + 0.4 * y.value, y.slopes.map(|slope| 0.4 * slope));
+        let sine = number(phase.sin(), phase_of_y.map(|s| s * phase.cos()));
+        let cosine = number(phase.cos(), phase_of_y.map(|s| -s * phase.sin()));
+        let start = number((0.4 * y.value).sin(), phase_of_y.map(|s| s * (0.4 * y.value).cos()));
+        let zero = Dual::constant(0.0);
+        let one = Dual::constant(1.0);
+        let F = [[one, size * (sine - start), zero], [zero, one, zero], [zero, zero, one]];
+        let mut rate = [[zero; 3]; 3];
+        rate[0][1] = size * cosine.times(7.0);
+        Kinematics { F, rate }
+    }
+}
+
+/// Slopes go on through the end of flow and its next beginning, and series of one particle have all digits between these.
+#[test]
+fn slopes_and_series_hold_through_all_changes() {
+    for overstress in [None, Some([40.0, 2.0, 0.3])] {
+        let (_, mut constants) = flow(2, 500.0, 1.0, false);
+        constants.extend(overstress.into_iter().flatten());
+        let law = Flow { dimension: 2, has_overstress: overstress.is_some(), is_on_yield: false };
+        let steady: Vec<Dual<f64, 2>> = constants.iter().map(|&c| Dual::constant(c)).collect();
+        let at = |X: [f64; 2], times: &[f64]| {
+            Trajectory::new(&law, &(swings(X), steady.clone()), times, 1e-13).unwrap()
+        };
+        let (X, h) = ([0.37, 0.61], 1e-5);
+        let own = at(X, &times(12));
+        assert!(own.changes.len() >= 3, "{:?}", own.changes);
+        for axis in 0..2 {
+            let shifted = |by: f64| {
+                at(std::array::from_fn(|a| X[a] + if a == axis { by } else { 0.0 }), &times(12))
+            };
+            let (above, below) = (shifted(h), shifted(-h));
+            for (k, z) in own.states.iter().enumerate() {
+                for (n, z) in z.iter().enumerate() {
+                    let difference =
+                        (above.states[k][n].value - below.states[k][n].value) / (2.0 * h);
+                    let off = (z.slopes[axis] - difference).abs();
+                    assert!(off < 1e-8, "{axis} {k} {n}: {} {difference}", z.slopes[axis]);
+                }
+            }
+        }
+        let breaks: Vec<f64> = own.changes.iter().map(|change| change.time).collect();
+        let of = |times: &[f64]| {
+            let motion = (swings(X), steady.clone());
+            let found = at(X, times);
+            let of = |(&t, z): (&f64, &Vec<Dual<f64, 2>>)| {
+                let ([x, y], _) = divergence(&law, &motion.at(t), &steady, z);
+                [x, y, z[4].value]
+            };
+            let rows: Vec<[f64; 3]> = times.iter().zip(&found.states).map(of).collect();
+            let of = |quantity: usize| rows.iter().map(|row| row[quantity]).collect();
+            Ok::<_, HistoryError>((0..3).map(of).collect())
+        };
+        let (series, told) = AtPoint::fine(1.0, &breaks, 1e-12, &[0, 0], of).unwrap();
+        assert!(told <= 1e-12);
+        let times: Vec<f64> = (1..40).map(|k| f64::from(k) / 40.0).collect();
+        let exact = of(&times).unwrap();
+        let most = exact[..2].iter().flatten().fold(0.0_f64, |most, value| most.max(value.abs()));
+        for (quantity, scale) in [(0, most), (1, most), (2, 0.1)] {
+            for (&t, exact) in times.iter().zip(&exact[quantity]) {
+                let off = (series.value(quantity, t) - exact).abs() / scale;
+                assert!(off < 1e-11, "{quantity} {t}: {off:e}");
+            }
         }
     }
 }
