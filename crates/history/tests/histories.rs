@@ -9,7 +9,6 @@ use mmsmith_history::{
     AnyLaw, AtPoint, Branch, Dual, ElasticPart, Flow, HistoryError, Kinematics, LawWithHistory,
     Maxwell, Motion, Number, Smoothness, Table, Tensor, Trajectory, divergence,
 };
-use mmsmith_laws::{BLOCK, Increment, LawWithMemory, Plastic, ReturnMap};
 use mmsmith_vocabulary::Volumetric;
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -543,53 +542,6 @@ fn a_table_has_the_fields_of_trajectories_at_all_positions_and_times() {
             for (t, exact) in times.into_iter().zip(exact) {
                 let off = (at.value(quantity, t) - exact).abs() / table.largest(quantity);
                 assert!(off < 1e-11, "{X:?} {t} {quantity}: {off:e}");
-            }
-        }
-    }
-}
-
-/// The solver's law at the end of a block's motion in so many steps: `G` and the plastic strain.
-fn by_return_maps(hardening: [f64; 2], map: ReturnMap, X: [f64; 2], steps: usize) -> [f64; 7] {
-    let [modulus, exponent] = hardening;
-    let lambda = BULK - 2.0 * MU / 3.0;
-    let law_of_solver = Plastic { lambda, mu: MU, yield_stress: YIELD, modulus, exponent, map };
-    let (law, constants) = flow(2, modulus, exponent, true);
-    let motion = block(X, &constants);
-    let F = |t: f64| {
-        let at = motion.at(t);
-        [0, 1].map(|i| [0, 1].map(|j| [at.F[i][j].value; BLOCK]))
-    };
-    let start = law.observables(&constants, &law.initial(&constants));
-    let names = LawWithMemory::<f64, 2>::variables(&law_of_solver);
-    assert!(names.iter().map(|q| &q.name).eq(&law.observable_names()));
-    let mut q: Vec<[f64; BLOCK]> = start.iter().map(|&value| [value; BLOCK]).collect();
-    for step in 0..steps {
-        let [start, end] = [step, step + 1].map(|k| F(k as f64 / steps as f64));
-        let increment = Increment { start: &start, end: &end, time: 1.0 / steps as f64 };
-        law_of_solver.evolve(&increment, &mut q);
-    }
-    std::array::from_fn(|k| q[k][0])
-}
-
-/// Return maps share no formula with the rate equations.
-#[test]
-fn return_maps_of_the_solver_have_their_orders() {
-    for [modulus, exponent] in [[500.0, 1.0], [80.0, 1.0 / 3.0]] {
-        let X = [0.37, 0.61];
-        let (law, constants) = flow(2, modulus, exponent, true);
-        let motion = block(X, &constants);
-        let exact = Trajectory::new(&law, &motion, &[1.0], 1e-14).unwrap();
-        let exact = law.observables(&motion.1, &exact.states[0]);
-        assert!(exact[6].value > 0.05, "{exact:?}");
-        for (map, order) in [(ReturnMap::Exponential, 1.0), (ReturnMap::Midpoint, 2.0)] {
-            let error = |steps: usize| {
-                let found = by_return_maps([modulus, exponent], map, X, steps);
-                found.iter().zip(&exact).map(|(a, b)| (a - b.value).abs()).fold(0.0, f64::max)
-            };
-            let errors = [200, 400, 800].map(error);
-            for pair in errors.windows(2) {
-                let found = (pair[0] / pair[1]).log2();
-                assert!((found - order).abs() < 0.15, "{modulus} {map:?}: {errors:?} {found}");
             }
         }
     }

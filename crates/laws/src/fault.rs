@@ -121,6 +121,22 @@ pub enum Fault {
     StatedFactor,
     /// A law that the specification states: the first normal stress with the opposite sign.
     StatedSign,
+    /// Flow by von Mises: the size of the deviator held against the yield stress without the root of two thirds.
+    YieldRootDropped,
+    /// Flow by von Mises: softening instead of hardening.
+    HardeningSign,
+    /// Flow by von Mises: the plastic strain is never advanced.
+    PlasticStrainStays,
+    /// Flow by von Mises, in the plane and on a line: the elastic strain out of the plane left out.
+    AcrossDropped,
+    /// Laws with memory: the stress of the elastic part alone, for the whole deformation.
+    ElasticPartAlone,
+    /// Maxwell elements: all relax in half of their time.
+    RelaxationTime,
+    /// Maxwell elements: stresses that decay, and take up no change of shape.
+    ShareDropped,
+    /// A law that the specification states: internal variables advance by a thousandth too little.
+    RateOff,
 }
 
 /// A fault in a law of the library, as what it makes of constants.

@@ -7,7 +7,7 @@ use mmsmith_lanes::tensor::{product, real};
 use mmsmith_vocabulary::{Material, Moduli, Term};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
-use super::memory::{AtRest, InternalVariable, LawWithMemory, set};
+use super::memory::{Frozen, InternalVariable, LawWithMemory, set};
 use super::{BLOCK, SIDE_BY_SIDE, Stressed, jacobian};
 
 /// The stress of a law that the caller brings, for particles in blocks.
@@ -74,12 +74,21 @@ impl<T, const D: usize> Law<T, D> {
 /// Every function takes the deformation gradient F and returns `None` where it is not a deformation: J <= 0, or an entry that is
 /// not finite.
 impl<T: Stressed<D>, const D: usize> Law<T, D> {
+    /// The law of a particle with these internal variables, as they are; an elastic law is itself.
+    #[must_use]
+    pub fn with_variables(&self, q: &[T]) -> Self {
+        match self {
+            Self::WithMemory(law) => Self::from_constitutive(Frozen::new(law.clone(), q)),
+            elastic => elastic.clone(),
+        }
+    }
+
     /// `work` with a law that is not one of the library.
     fn of_caller<R>(&self, work: impl FnOnce(&dyn ConstitutiveLaw<T, D>) -> R) -> Option<R> {
         match self {
             Self::Library(_) => None,
             Self::Own(law) => Some(work(law.as_ref())),
-            Self::WithMemory(law) => Some(work(&AtRest(law.as_ref()))),
+            Self::WithMemory(law) => Some(work(&Frozen::at_rest(law.clone()))),
         }
     }
 
@@ -206,14 +215,21 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
             let F = SMatrix::identity() + H * (step * real(times));
             self.first_piola_kirchhoff(&F).unwrap_or_else(|| SMatrix::repeat(real(f64::NAN)))
         };
-        (P(1.0) * real::<T>(4.0) - P(2.0)) / (step * real(2.0))
+        let change = P(1.0) * real::<T>(4.0) - P(2.0);
+        // A body with memory may be under stress at rest.
+        let at_rest = match self {
+            Self::WithMemory(_) => P(0.0) * real::<T>(3.0),
+            Self::Library(_) | Self::Own(_) => SMatrix::zeros(),
+        };
+        (change - at_rest) / (step * real(2.0))
     }
 
     /// The Lame constants at small strain, where the law is isotropic and tells them.
     pub fn lame_constants(&self) -> Option<(T, T)> {
         match self {
             Self::Library(material) => material.moduli().map(values),
-            Self::Own(_) | Self::WithMemory(_) => None,
+            Self::WithMemory(law) => law.elastic()?.moduli().map(values),
+            Self::Own(_) => None,
         }
     }
 
@@ -222,6 +238,11 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     pub fn p_wave_modulus(&self) -> T {
         if let Some((lambda, mu)) = self.lame_constants() {
             return lambda + mu * real(2.0);
+        }
+        if let Self::WithMemory(law) = self
+            && let Some(elastic) = law.elastic()
+        {
+            return Self::Library(elastic).p_wave_modulus();
         }
         let moduli = (0..D).flat_map(|i| [(i, T::one()), (i, -T::one())]).map(|(i, sign)| {
             let mut H = SMatrix::zeros();

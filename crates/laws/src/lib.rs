@@ -26,6 +26,7 @@ mod printed_energies;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
+mod viscoelastic;
 mod volumetric;
 mod yeoh;
 
@@ -38,7 +39,7 @@ pub use law::{ConstitutiveLaw, Law, LawCheck};
 #[doc(hidden)]
 pub use memory::BlockWithMemory;
 pub use memory::{Increment, InternalVariable, LawWithMemory};
-pub use mmsmith_vocabulary::{Material, Volumetric};
+pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volumetric, WithMemory};
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub use plastic::{Plastic, ReturnMap};
@@ -105,6 +106,26 @@ macro_rules! with_law {
             }
         }
     };
+}
+
+/// The law of an elastic law of the library with memory, with the return map that flow takes; `None` where that elastic law has no memory
+/// of this kind: flow is of Hencky's law, elements are of isochoric laws and of linear elasticity.
+#[must_use]
+pub fn with_memory<T: Stressed<D> + Stressed<3>, const D: usize>(
+    law: WithMemory<T>,
+    map: ReturnMap,
+) -> Option<Law<T, D>> {
+    match (law.memory, law.elastic) {
+        (Memory::Flow(flow), Material::Hencky { lambda, mu }) => {
+            let [lambda, mu] = [lambda, mu].map(nalgebra::convert_unchecked::<T, f64>);
+            let flow = flow.map(nalgebra::convert_unchecked::<T, f64>);
+            Some(Law::with_memory(Plastic::new(lambda, mu, flow, map)))
+        }
+        (Memory::Flow(_), _) => None,
+        (Memory::Maxwell(elements), elastic) => {
+            viscoelastic::Viscoelastic::new(elastic, elements).map(Law::with_memory)
+        }
+    }
 }
 
 /// Particles in a block: as many as keep all of it in the first-level cache.

@@ -1,12 +1,16 @@
 //! Laws with memory: the stress depends on internal variables, which follow the deformation in time.
 
 use std::fmt;
+use std::sync::Arc;
 
-use nalgebra::SMatrix;
+use mmsmith_lanes::tensor::{determinant, inverse_transpose, product, real};
+use mmsmith_vocabulary::Material;
+use nalgebra::{Matrix3, RealField, SMatrix, SVector};
 
 use crate::{BLOCK, ConstitutiveLaw, jacobian};
-use mmsmith_lanes::tensor::real;
-use nalgebra::RealField;
+
+/// The entries of a symmetric tensor in the order of internal variables.
+pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// An internal variable of a law.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,17 +51,119 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
 
     /// Advances the internal variables by an increment.
     fn evolve(&self, increment: &Increment<'_, T, D>, q: &mut [[T; BLOCK]]);
+
+    /// The internal variables of a particle at time zero, from its reference position. Default: those at rest.
+    fn initial(&self, _X: &SVector<T, D>) -> Vec<T>
+    where
+        T: RealField + Copy,
+    {
+        self.variables().iter().map(|variable| real(variable.at_rest)).collect()
+    }
+
+    /// Tells a law whose stress depends on the rate of the deformation gradient what that is for a particle at time zero. Default: laws
+    /// without rates.
+    fn start_at_rate(&self, _rate: &SMatrix<T, D, D>, _q: &mut [T]) {}
+
+    /// Kirchhoff stresses, `tau = P F^T`. Default: from first Piola-Kirchhoff stresses.
+    fn kirchhoff(
+        &self,
+        F: &[[[T; BLOCK]; D]; D],
+        q: &[[T; BLOCK]],
+        tau: &mut [[[T; BLOCK]; D]; D],
+    ) where
+        T: RealField + Copy,
+    {
+        self.first_piola_kirchhoff(F, q, tau);
+        for n in 0..BLOCK {
+            let stress = product(&of_particle(tau, n), &of_particle(F, n).transpose());
+            set_stress(tau, n, &stress);
+        }
+    }
+
+    /// The normal Kirchhoff stress of a particle along the axes that F leaves out, where the stretch is one; `None` where it is not known.
+    fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>, _q: &[T]) -> Option<T> {
+        None
+    }
+
+    /// The elastic law that it responds to sudden changes with, where that is one of the library: waves run by it. Default: unknown.
+    fn elastic(&self) -> Option<Material<T>> {
+        None
+    }
 }
 
-/// A law with memory whose variables stay at rest: its response to sudden changes, by which waves run.
-#[derive(Debug)]
-pub(crate) struct AtRest<'a, T, const D: usize>(pub(crate) &'a dyn LawWithMemory<T, D>);
+/// A tensor of particle `n`.
+#[inline(always)]
+pub(crate) fn of_particle<T: RealField + Copy, const D: usize>(
+    all: &[[[T; BLOCK]; D]; D],
+    n: usize,
+) -> SMatrix<T, D, D> {
+    SMatrix::from_fn(|i, j| all[i][j][n])
+}
 
-impl<T: RealField + Copy, const D: usize> ConstitutiveLaw<T, D> for AtRest<'_, T, D> {
+/// Sets a tensor of particle `n`.
+#[inline(always)]
+pub(crate) fn set_stress<T: RealField + Copy, const D: usize>(
+    all: &mut [[[T; BLOCK]; D]; D],
+    n: usize,
+    stress: &SMatrix<T, D, D>,
+) {
+    for i in 0..D {
+        for j in 0..D {
+            all[i][j][n] = stress[(i, j)];
+        }
+    }
+}
+
+/// Kirchhoff stresses to first Piola-Kirchhoff stresses.
+pub(crate) fn pull_back<T: RealField + Copy, const D: usize>(
+    F: &[[[T; BLOCK]; D]; D],
+    stress: &mut [[[T; BLOCK]; D]; D],
+) {
+    for n in 0..BLOCK {
+        let F = of_particle(F, n);
+        let P = product(&of_particle(stress, n), &inverse_transpose(&F, determinant(&F)));
+        set_stress(stress, n, &P);
+    }
+}
+
+/// The deformation gradient of particle `n` in three dimensions, with the identity out of the plane.
+pub(crate) fn in_space<T: RealField + Copy, const D: usize>(
+    F: &[[[T; BLOCK]; D]; D],
+    n: usize,
+) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| match i < D && j < D {
+        true => nalgebra::convert_unchecked(F[i][j][n]),
+        false if i == j => 1.0,
+        false => 0.0,
+    })
+}
+
+/// A law with memory whose variables stay as they are: its response to sudden changes.
+#[derive(Clone, Debug)]
+pub(crate) struct Frozen<T, const D: usize> {
+    law: Arc<dyn LawWithMemory<T, D>>,
+    q: Vec<[T; BLOCK]>,
+}
+
+impl<T: RealField + Copy, const D: usize> Frozen<T, D> {
+    pub(crate) fn new(law: Arc<dyn LawWithMemory<T, D>>, q: &[T]) -> Self {
+        Self { law, q: q.iter().map(|&value| [value; BLOCK]).collect() }
+    }
+
+    pub(crate) fn at_rest(law: Arc<dyn LawWithMemory<T, D>>) -> Self {
+        let at_rest: Vec<T> = law.variables().iter().map(|q| real(q.at_rest)).collect();
+        Self::new(law, &at_rest)
+    }
+}
+
+impl<T: RealField + Copy, const D: usize> ConstitutiveLaw<T, D> for Frozen<T, D> {
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]) {
-        let at_rest = self.0.variables();
-        let q: Vec<[T; BLOCK]> = at_rest.iter().map(|q| [real(q.at_rest); BLOCK]).collect();
-        self.0.first_piola_kirchhoff(F, &q, P);
+        self.law.first_piola_kirchhoff(F, &self.q, P);
+    }
+
+    fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+        let q: Vec<T> = self.q.iter().map(|column| column[0]).collect();
+        self.law.kirchhoff_across(F, &q)
     }
 }
 
@@ -91,22 +197,41 @@ impl<T: RealField + Copy, const D: usize> BlockWithMemory<T, D> {
         }
     }
 
-    /// The stresses of particles, and whether their F is a deformation; not a number where it is none.
-    pub fn stresses(
+    /// The Kirchhoff stresses of particles; not a number where F is no deformation.
+    pub fn kirchhoff(
         &mut self,
         law: &dyn LawWithMemory<T, D>,
         F: &[SMatrix<T, D, D>],
         q: &[T],
+    ) -> impl Fn(usize) -> SMatrix<T, D, D> {
+        self.compute(F, q, |F, q, stress| law.kirchhoff(F, q, stress))
+    }
+
+    /// The first Piola-Kirchhoff stresses of particles; not a number where F is no deformation.
+    pub fn first_piola_kirchhoff(
+        &mut self,
+        law: &dyn LawWithMemory<T, D>,
+        F: &[SMatrix<T, D, D>],
+        q: &[T],
+    ) -> impl Fn(usize) -> SMatrix<T, D, D> {
+        self.compute(F, q, |F, q, stress| law.first_piola_kirchhoff(F, q, stress))
+    }
+
+    fn compute(
+        &mut self,
+        F: &[SMatrix<T, D, D>],
+        q: &[T],
+        stresses: impl FnOnce(&[[[T; BLOCK]; D]; D], &[[T; BLOCK]], &mut [[[T; BLOCK]; D]; D]),
     ) -> impl Fn(usize) -> SMatrix<T, D, D> {
         self.take(q);
         let mut is_deformation = [true; BLOCK];
         for (n, F) in F.iter().enumerate() {
             is_deformation[n] = set(&mut self.F, n, F);
         }
-        law.first_piola_kirchhoff(&self.F, &self.q, &mut self.P);
+        stresses(&self.F, &self.q, &mut self.P);
         let P = &self.P;
         move |n| match is_deformation[n] {
-            true => SMatrix::from_fn(|i, j| P[i][j][n]),
+            true => of_particle(P, n),
             false => SMatrix::repeat(real(f64::NAN)),
         }
     }

@@ -1,24 +1,35 @@
-//! Plastic flow by von Mises, by return maps: logarithmic elastic strains, isotropic hardening.
+//! Plastic and viscous flow by von Mises, by return maps: logarithmic elastic strains, isotropic hardening, Perzyna's overstress.
 //!
 //! The internal variables are `G = (F^p^T F^p)^-1` and the equivalent plastic strain `alpha`. A step from `F_n` to `F` tries an elastic
-//! one, `b = F G_n F^T`, and returns to the yield surface along the deviator of the stress:
+//! one, `b = F G_n F^T`, and returns along the deviator of the stress:
 //!
 //! ```text
-//! e = ln(b)/2,  s = 2 mu dev e,  n = s/|s|;   e <- e - D n,   |s| - 2 mu D = sqrt(2/3) k(alpha_n + sqrt(2/3) D)
+//! e = ln(b)/2,  s = 2 mu dev e,  n = s/|s|;   e <- e - D n,   |s| - 2 mu D = sqrt(2/3) k(alpha_n + sqrt(2/3) D) + drag (D time/dt)^(1/m)
 //! ```
 //!
-//! This is backward Euler for the multiplier and the exponential map for the flow, of first order in the step. The midpoint rule takes the
-//! direction of the flow from half a step, and is of second order.
+//! without the last term where flow does not depend on its rate. This is backward Euler for the multiplier and the exponential map for the
+//! flow, of first order in the step. The midpoint rule takes the direction of the flow from half a step, and is of second order; so is the
+//! multiplier of a rate, which it takes from there as well.
 //!
 //! Source: J. C. Simo, "Algorithms for static and dynamic multiplicative plasticity that preserve the classical return mapping schemes of
-//! the infinitesimal theory", CMAME 99 (1992) 61-112; M. Ortiz and E. P. Popov, IJNME 21 (1985) 1561-1576, for the midpoint rule.
+//! the infinitesimal theory", CMAME 99 (1992) 61-112; M. Ortiz and E. P. Popov, IJNME 21 (1985) 1561-1576, for the midpoint rule;
+//! P. Perzyna, Adv. Appl. Mech. 9 (1966) 243-377.
 
-use nalgebra::{Matrix3, RealField, SymmetricEigen, Vector3};
+mod multiplier;
+mod plane;
+mod space;
+
+use mmsmith_lanes::simd::{Loop, Vectors, dispatch};
+use mmsmith_vocabulary::{Flow, Material};
+use nalgebra::{Matrix3, RealField, SMatrix};
 
 use crate::BLOCK;
-use crate::memory::{Increment, InternalVariable, LawWithMemory};
+use crate::fault::{Fault, Planted};
+use crate::memory::{ENTRIES, Increment, InternalVariable, LawWithMemory, in_space};
+use multiplier::Yield;
+use plane::{Elastic, F2, Sym};
 
-/// How a step finds the direction of the flow.
+/// How a step of a flow finds its direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReturnMap {
     /// At its end: first order.
@@ -28,190 +39,247 @@ pub enum ReturnMap {
     Midpoint,
 }
 
-/// Plastic flow by von Mises, with the yield stress `yield_stress + modulus alpha^exponent`.
+/// Flow by von Mises of a body with Hencky's elastic law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plastic {
-    /// Lamé's first parameter, a pressure.
-    pub lambda: f64,
-    /// The shear modulus, a pressure.
-    pub mu: f64,
-    /// The yield stress of the virgin material.
-    pub yield_stress: f64,
-    /// The modulus of the hardening, a stress.
-    pub modulus: f64,
-    /// The exponent of the hardening; 1 is linear.
-    pub exponent: f64,
-    /// How a step finds the direction of the flow.
-    pub map: ReturnMap,
+    lambda: f64,
+    law: Yield,
+    map: ReturnMap,
 }
-
-/// The entries of `G` in the order of the variables.
-const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-
-/// A symmetric tensor by its principal values and directions.
-struct Principal {
-    values: Vector3<f64>,
-    directions: Matrix3<f64>,
-}
-
-impl Principal {
-    fn of(b: Matrix3<f64>) -> Self {
-        let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(b);
-        Self { values: eigenvalues, directions: eigenvectors }
-    }
-
-    fn tensor(&self, values: Vector3<f64>) -> Matrix3<f64> {
-        self.directions * Matrix3::from_diagonal(&values) * self.directions.transpose()
-    }
-}
-
-fn deviator(e: Vector3<f64>) -> Vector3<f64> {
-    e.add_scalar(-e.mean())
-}
-
-/// `sqrt(2/3)`.
-const ROOT: f64 = 0.816_496_580_927_726;
 
 impl Plastic {
-    fn allowed(&self, alpha: f64) -> f64 {
-        ROOT * (self.yield_stress + self.modulus * alpha.max(0.0).powf(self.exponent))
+    /// With Lame's constants of the elastic part, which are pressures.
+    #[must_use]
+    pub fn new(lambda: f64, mu: f64, flow: Flow<f64>, map: ReturnMap) -> Self {
+        Self { lambda, law: Yield { mu, flow, planted: Planted::here() }, map }
     }
 
-    /// The multiplier by which the size of the deviator `size - 2 mu D` is the allowed one; zero where it is below.
-    ///
-    /// The residual falls with `D`, and so does its root lie between zero and the multiplier without hardening.
-    fn multiplier(&self, size: f64, alpha: f64) -> f64 {
-        let residual = |D: f64| size - 2.0 * self.mu * D - self.allowed(alpha + ROOT * D);
-        if residual(0.0) <= 0.0 {
-            return 0.0;
+    /// `G` at the start: the identity, or that of the elastic stretch that brings the body onto the yield surface.
+    fn start(&self, dimension: usize) -> [f64; 3] {
+        let Yield { mu, flow, .. } = self.law;
+        if !flow.is_on_yield {
+            return [1.0; 3];
         }
-        root(residual, (size - self.allowed(alpha)) / (2.0 * self.mu))
+        // Logarithms of elastic stretches along the axes, for which the size of 2 mu e is sqrt(2/3) times the yield stress.
+        let along: [f64; 3] = match dimension {
+            1 => [1.0, -0.5, -0.5].map(|part| part * flow.yield_stress / (3.0 * mu)),
+            _ => [1.0, -1.0, 0.0].map(|part| part * flow.yield_stress / (2.0 * 3.0_f64.sqrt() * mu)),
+        };
+        along.map(|e| (2.0 * e).exp())
     }
 
-    /// `G` and `alpha` after a step that ends at `F`.
-    fn exponential(&self, F: &Matrix3<f64>, G: &Matrix3<f64>, alpha: f64) -> (Matrix3<f64>, f64) {
-        let trial = Principal::of(F * G * F.transpose());
-        let e = trial.values.map(|value| 0.5 * value.ln());
-        let s = deviator(e) * (2.0 * self.mu);
-        let size = s.norm();
-        let D = self.multiplier(size, alpha);
-        if D == 0.0 {
-            return (*G, alpha);
+    /// `G` as stresses take it.
+    #[inline(always)]
+    fn of_stress(&self, G: Sym) -> Sym {
+        if self.law.planted.is(Fault::ElasticPartAlone) {
+            return Sym { a: [1.0; 2], shear: 0.0, across: 1.0 };
         }
-        let e = e - s * (D / size);
-        let b = trial.tensor(e.map(|e| (2.0 * e).exp()));
-        (pull_back(F, &b), alpha + ROOT * D)
+        let across = if self.law.planted.is(Fault::AcrossDropped) { 1.0 } else { G.across };
+        Sym { across, ..G }
     }
 
-    /// As [`exponential`](Self::exponential), with the direction of the flow at the middle of the step from `start`:
-    /// `G = exp(-2 D F_m^-1 n_m F_m) G_n`.
-    fn midpoint(
+    fn evolve_in_space<T: RealField + Copy, const D: usize>(
         &self,
-        start: &Matrix3<f64>,
-        F: &Matrix3<f64>,
-        G: &Matrix3<f64>,
-        alpha: f64,
-    ) -> (Matrix3<f64>, f64) {
-        let size_of = |G: &Matrix3<f64>| {
-            let e = Principal::of(F * G * F.transpose()).values.map(|value| 0.5 * value.ln());
-            2.0 * self.mu * deviator(e).norm()
-        };
-        if size_of(G) <= self.allowed(alpha) {
-            return (*G, alpha);
-        }
-        let middle = (start + F) * 0.5;
-        let (at_middle, _) = self.exponential(&middle, G, alpha);
-        let principal = Principal::of(middle * at_middle * middle.transpose());
-        let s = deviator(principal.values.map(f64::ln));
-        let n = s / s.norm();
-        let Some(inverse) = middle.try_inverse() else { return (*G, alpha) };
-        let after = |D: f64| {
-            let flow = principal.tensor(n.map(|n| (-2.0 * D * n).exp()));
-            let after = inverse * flow * middle * G;
-            (after + after.transpose()) * 0.5
-        };
-        let residual = |D: f64| size_of(&after(D)) - self.allowed(alpha + ROOT * D);
-        let D = root(residual, (size_of(G) - self.allowed(alpha)) / (2.0 * self.mu));
-        (after(D), alpha + ROOT * D)
-    }
-}
-
-/// `F^-1 b F^-T`, symmetric.
-fn pull_back(F: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
-    // F has a positive determinant.
-    let inverse = F.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
-    let G = inverse * b * inverse.transpose();
-    (G + G.transpose()) * 0.5
-}
-
-/// The root of a falling function that is positive at zero and about zero at `high`, by regula falsi with halved ends (Illinois).
-fn root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
-    let (mut low, mut at_low) = (0.0, function(0.0));
-    let (mut high, mut at_high) = (high, function(high));
-    // The direction of the flow may have turned within the step.
-    for _ in 0..8 {
-        if at_high <= 0.0 {
-            break;
-        }
-        (low, at_low) = (high, at_high);
-        high *= 2.0;
-        at_high = function(high);
-    }
-    let mut side = 0;
-    for _ in 0..100 {
-        if high - low <= 4.0 * f64::EPSILON * high.abs() || at_high == 0.0 {
-            break;
-        }
-        let next = (low * at_high - high * at_low) / (at_high - at_low);
-        if !(next > low && next < high) {
-            break;
-        }
-        let value = function(next);
-        if value > 0.0 {
-            (low, at_low) = (next, value);
-            if side == 1 {
-                at_high *= 0.5;
+        increment: &Increment<'_, T, D>,
+        q: &mut [[T; BLOCK]],
+    ) {
+        let Self { law, map, .. } = self;
+        let time = double(increment.time);
+        for n in 0..BLOCK {
+            let (G, alpha) = (in_rows(q, n), double(q[6][n]));
+            let end = in_space(increment.end, n);
+            let (G, multiplier) = match map {
+                ReturnMap::Exponential => space::exponential(law, &end, (&G, alpha), time),
+                // An elastic step needs no search.
+                ReturnMap::Midpoint
+                    if law.flow.overstress.is_none()
+                        && !law.flows(space::size(law, &end, &G), alpha) =>
+                {
+                    continue;
+                }
+                ReturnMap::Midpoint => {
+                    let start = in_space(increment.start, n);
+                    space::midpoint(law, &start, &end, (&G, alpha), time)
+                }
+            };
+            if multiplier > 0.0 {
+                for (&(i, j), column) in ENTRIES.iter().zip(&mut *q) {
+                    column[n] = nalgebra::convert(G[(i, j)]);
+                }
+                q[6][n] = nalgebra::convert(law.advanced(alpha, multiplier));
             }
-            side = 1;
-        } else {
-            (high, at_high) = (next, value);
-            if side == -1 {
-                at_low *= 0.5;
-            }
-            side = -1;
         }
     }
-    if at_low.abs() < at_high.abs() { low } else { high }
+
+    fn evolve_in_plane<T: RealField + Copy, const D: usize>(
+        &self,
+        increment: &Increment<'_, T, D>,
+        q: &mut [[T; BLOCK]],
+    ) {
+        let Self { law, map, .. } = *self;
+        let Increment { start, end, time } = *increment;
+        let time = double(time);
+        let mut elastic = [Elastic::AT_REST; BLOCK];
+        dispatch(Trials { F: end, q, planted: law.planted, elastic: &mut elastic });
+        for (n, elastic) in elastic.iter().enumerate() {
+            let (size, alpha) = (law.mu * elastic.size(), double(q[6][n]));
+            if !law.flows(size, alpha) && (map == ReturnMap::Exponential || law.flow.overstress.is_none()) {
+                continue;
+            }
+            let (G, F) = (in_plane(q, n), row(end, n));
+            let (G, multiplier) = match map {
+                ReturnMap::Exponential => {
+                    let multiplier = law.multiplier(size, alpha, time);
+                    let kept = 1.0 - 2.0 * law.mu * multiplier / size;
+                    (plane::returned(&F, &G, elastic, kept), multiplier)
+                }
+                ReturnMap::Midpoint => {
+                    plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time)
+                }
+            };
+            if multiplier > 0.0 {
+                let Sym { a: [g11, g22], shear, across } = G;
+                for (column, value) in [(0, g11), (1, g22), (2, across), (3, shear)] {
+                    q[column][n] = nalgebra::convert(value);
+                }
+                q[6][n] = nalgebra::convert(law.advanced(alpha, multiplier));
+            }
+        }
+    }
 }
 
-/// The deformation gradient of particle `n` in three dimensions, with the identity out of the plane.
-fn in_space<T: RealField + Copy, const D: usize>(
-    F: &[[[T; BLOCK]; D]; D],
-    n: usize,
-) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, j| match i < D && j < D {
-        true => nalgebra::convert_unchecked(F[i][j][n]),
+#[inline(always)]
+fn double<T: RealField + Copy>(value: T) -> f64 {
+    nalgebra::convert_unchecked(value)
+}
+
+/// The deformation gradient of particle `n`, with the identity along the second axis on a line.
+#[inline(always)]
+fn row<T: RealField + Copy, const D: usize>(F: &[[[T; BLOCK]; D]; D], n: usize) -> F2 {
+    let entry = |i: usize, j: usize| match i < D && j < D {
+        true => double(F[i][j][n]),
         false if i == j => 1.0,
         false => 0.0,
-    })
+    };
+    [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
 }
 
-fn variables<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> (Matrix3<f64>, f64) {
+#[inline(always)]
+fn in_plane<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Sym {
+    Sym {
+        a: [double(q[0][n]), double(q[1][n])],
+        shear: double(q[3][n]),
+        across: double(q[2][n]),
+    }
+}
+
+fn in_rows<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Matrix3<f64> {
     let mut G = Matrix3::zeros();
     for (&(i, j), column) in ENTRIES.iter().zip(q) {
-        let value = nalgebra::convert_unchecked(column[n]);
+        let value = double(column[n]);
         (G[(i, j)], G[(j, i)]) = (value, value);
     }
-    (G, nalgebra::convert_unchecked(q[6][n]))
+    G
+}
+
+/// Elastic deformations of a block in the plane.
+struct Trials<'a, T, const D: usize> {
+    F: &'a [[[T; BLOCK]; D]; D],
+    q: &'a [[T; BLOCK]],
+    planted: Planted,
+    elastic: &'a mut [Elastic; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for Trials<'_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { F, q, planted, elastic } = self;
+        let [g11, g22, g33, g12, ..] = q else { return };
+        for n in 0..BLOCK {
+            let across = if planted.is(Fault::AcrossDropped) { 1.0 } else { double(g33[n]) };
+            let G = Sym { a: [double(g11[n]), double(g22[n])], shear: double(g12[n]), across };
+            elastic[n] = Elastic::new(&row(F, n), &G);
+        }
+    }
+}
+
+/// Kirchhoff stresses of a block in the plane.
+struct Stresses<'a, T, const D: usize> {
+    law: &'a Plastic,
+    F: &'a [[[T; BLOCK]; D]; D],
+    q: &'a [[T; BLOCK]],
+    tau: &'a mut [[[T; BLOCK]; D]; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for Stresses<'_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { law, F, q, tau } = self;
+        let [g11, g22, g33, g12, ..] = q else { return };
+        for n in 0..BLOCK {
+            let G = Sym {
+                a: [double(g11[n]), double(g22[n])],
+                shear: double(g12[n]),
+                across: double(g33[n]),
+            };
+            let elastic = Elastic::new(&row(F, n), &law.of_stress(G));
+            let Sym { a, shear, .. } = elastic.kirchhoff(law.lambda, law.law.mu);
+            for i in 0..D {
+                for j in 0..D {
+                    tau[i][j][n] = nalgebra::convert(if i == j { a[i] } else { shear });
+                }
+            }
+        }
+    }
 }
 
 impl<T: RealField + Copy, const D: usize> LawWithMemory<T, D> for Plastic {
     fn variables(&self) -> Vec<InternalVariable> {
+        let start = self.start(D);
         let of_G = ENTRIES.iter().map(|&(i, j)| InternalVariable {
             name: format!("G{}{}", i + 1, j + 1),
-            at_rest: if i == j { 1.0 } else { 0.0 },
+            at_rest: if i == j { start[i] } else { 0.0 },
         });
         of_G.chain([InternalVariable { name: "alpha".into(), at_rest: 0.0 }]).collect()
+    }
+
+    fn elastic(&self) -> Option<Material<T>> {
+        let [lambda, mu] = [self.lambda, self.law.mu].map(nalgebra::convert);
+        Some(Material::Hencky { lambda, mu })
+    }
+
+    fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
+        if D > 2 {
+            return None;
+        }
+        let block = std::array::from_fn(|i| std::array::from_fn(|j| [F[(i, j)]; BLOCK]));
+        let q: Vec<[T; BLOCK]> = q.iter().map(|&value| [value; BLOCK]).collect();
+        let elastic = Elastic::new(&row::<T, D>(&block, 0), &self.of_stress(in_plane(&q, 0)));
+        Some(nalgebra::convert(elastic.kirchhoff(self.lambda, self.law.mu).across))
+    }
+
+    fn kirchhoff(
+        &self,
+        F: &[[[T; BLOCK]; D]; D],
+        q: &[[T; BLOCK]],
+        tau: &mut [[[T; BLOCK]; D]; D],
+    ) {
+        if D < 3 {
+            dispatch(Stresses { law: self, F, q, tau });
+            return;
+        }
+        for n in 0..BLOCK {
+            let G = match self.law.planted.is(Fault::ElasticPartAlone) {
+                true => Matrix3::identity(),
+                false => in_rows(q, n),
+            };
+            let stress = space::kirchhoff(&in_space(F, n), &G, self.lambda, self.law.mu);
+            for i in 0..D {
+                for j in 0..D {
+                    tau[i][j][n] = nalgebra::convert(stress[(i, j)]);
+                }
+            }
+        }
     }
 
     fn first_piola_kirchhoff(
@@ -220,35 +288,15 @@ impl<T: RealField + Copy, const D: usize> LawWithMemory<T, D> for Plastic {
         q: &[[T; BLOCK]],
         P: &mut [[[T; BLOCK]; D]; D],
     ) {
-        for n in 0..BLOCK {
-            let own = in_space(F, n);
-            let (G, _) = variables(q, n);
-            let elastic = Principal::of(own * G * own.transpose());
-            let e = elastic.values.map(|value| 0.5 * value.ln());
-            let tau = e.map(|e| 2.0 * self.mu * e).add_scalar(self.lambda * e.sum());
-            let inverse = own.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
-            let stress = elastic.tensor(tau) * inverse.transpose();
-            for i in 0..D {
-                for j in 0..D {
-                    P[i][j][n] = nalgebra::convert(stress[(i, j)]);
-                }
-            }
-        }
+        self.kirchhoff(F, q, P);
+        crate::memory::pull_back(F, P);
     }
 
     fn evolve(&self, increment: &Increment<'_, T, D>, q: &mut [[T; BLOCK]]) {
-        let Increment { start, end, .. } = *increment;
-        for n in 0..BLOCK {
-            let (G, alpha) = variables(q, n);
-            let (start, end) = (in_space(start, n), in_space(end, n));
-            let (G, alpha) = match self.map {
-                ReturnMap::Exponential => self.exponential(&end, &G, alpha),
-                ReturnMap::Midpoint => self.midpoint(&start, &end, &G, alpha),
-            };
-            for (&(i, j), column) in ENTRIES.iter().zip(&mut *q) {
-                column[n] = nalgebra::convert(G[(i, j)]);
-            }
-            q[6][n] = nalgebra::convert(alpha);
+        if D < 3 {
+            self.evolve_in_plane(increment, q);
+        } else {
+            self.evolve_in_space(increment, q);
         }
     }
 }

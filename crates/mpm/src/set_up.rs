@@ -190,7 +190,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         let at_corner = domain::at_corners(shape, &mesh)?;
         Some(SharedCorners::new(mesh, at_corner))
     });
-    let shares = fill(&mut particles, law.at_rest(), transfer.is_affine())?;
+    let shares = fill(&mut particles, &*law, transfer.is_affine())?;
     let fused = is_fused(integrator, transfer);
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
@@ -265,20 +265,20 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     })
 }
 
-/// Fills the columns that a law with these internal variables at rest, and affine velocities, ask for.
+/// Fills the columns that a law with internal variables, and affine velocities, ask for.
 fn fill<T: Lanes, const D: usize>(
     particles: &mut Particles<T, D>,
-    at_rest: &[T],
+    law: &dyn BlockLaw<T, D>,
     is_affine: bool,
 ) -> Result<Shares, SetupError> {
-    let count = particles.x.len();
-    let (found, expected) = (particles.internal.len(), count * at_rest.len());
+    let (count, variables) = (particles.x.len(), law.variables());
+    let (found, expected) = (particles.internal.len(), count * variables);
     if found == 0 {
-        particles.internal = at_rest.repeat(count);
+        particles.internal = particles.X.iter().flat_map(|X| law.initial(X)).collect();
     } else if found != expected {
         return Err(SetupError::LengthMismatch { array: "internal", found, expected });
     }
-    let shares = Shares { affine: is_affine.into(), internal: at_rest.len(), ..Shares::ONE };
+    let shares = Shares { affine: is_affine.into(), internal: variables, ..Shares::ONE };
     particles.affine = Vec::new();
     particles.fill(&shares);
     Ok(shares)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
-use mmsmith_lanes::tensor::{product, real};
+use mmsmith_lanes::tensor::product;
 use mmsmith_laws::{
     BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory, LibraryLaw,
 };
@@ -27,9 +27,14 @@ pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
         contributions: &mut Contributions<T, D, BLOCK>,
     );
 
-    /// The internal variables of a particle at rest; none for elastic laws.
-    fn at_rest(&self) -> &[T] {
-        &[]
+    /// How many internal variables a particle has; none for elastic laws.
+    fn variables(&self) -> usize {
+        0
+    }
+
+    /// The internal variables of a particle at time zero, from its reference position.
+    fn initial(&self, _X: &SVector<T, D>) -> Vec<T> {
+        Vec::new()
     }
 
     /// Advances the internal variables of no more than a block of particles, whose deformation gradient goes from `start` to `end` in a
@@ -117,20 +122,19 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnBlocks<T, D> {
             block.set(n, F);
         }
         block.evaluate(self.0.as_ref());
-        set_fluxes(c, F, |n| block.stress(n), contributions);
+        set_fluxes(c, F, |n, F| product(&block.stress(n), &F.transpose()), contributions);
     }
 }
 
-/// Sets the stress fluxes of a block whose first Piola-Kirchhoff stresses `P` gives, particle by particle.
+/// Sets the stress fluxes of a block whose Kirchhoff stresses `tau` gives, particle by particle.
 fn set_fluxes<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     F: &[SMatrix<T, D, D>; BLOCK],
-    P: impl Fn(usize) -> SMatrix<T, D, D>,
+    tau: impl Fn(usize, &SMatrix<T, D, D>) -> SMatrix<T, D, D>,
     contributions: &mut Contributions<T, D, BLOCK>,
 ) {
     for (n, F) in F.iter().enumerate() {
-        let tau = product(&P(n), &F.transpose());
-        let tau = c.planted.stress_in_forces(tau, F);
+        let tau = c.planted.stress_in_forces(tau(n, F), F);
         contributions.stress_flux[n] = tau * -(contributions.volume[n] * c.inverse_spacing);
     }
 }
@@ -139,14 +143,12 @@ fn set_fluxes<T: Lanes, const D: usize>(
 pub(crate) struct MemoryBlocks<T, const D: usize> {
     law: Arc<dyn LawWithMemory<T, D>>,
     variables: Vec<InternalVariable>,
-    at_rest: Vec<T>,
 }
 
 impl<T: Lanes, const D: usize> MemoryBlocks<T, D> {
     pub(crate) fn new(law: Arc<dyn LawWithMemory<T, D>>) -> Self {
         let variables = law.variables();
-        let at_rest = variables.iter().map(|variable| real(variable.at_rest)).collect();
-        Self { law, variables, at_rest }
+        Self { law, variables }
     }
 }
 
@@ -159,12 +161,16 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
         let mut block = BlockWithMemory::at_rest(&self.variables);
-        let stress = block.stresses(self.law.as_ref(), F, internal);
-        set_fluxes(c, F, stress, contributions);
+        let tau = block.kirchhoff(self.law.as_ref(), F, internal);
+        set_fluxes(c, F, |n, _| tau(n), contributions);
     }
 
-    fn at_rest(&self) -> &[T] {
-        &self.at_rest
+    fn variables(&self) -> usize {
+        self.variables.len()
+    }
+
+    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
+        self.law.initial(X)
     }
 
     fn evolve(

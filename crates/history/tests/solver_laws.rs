@@ -1,0 +1,280 @@
+//! The solver's laws, which share no formula with the rate equations, against histories at a material point.
+
+#![allow(non_snake_case, clippy::unwrap_used)]
+
+use mmsmith_history::{
+    Dual, Hardening, J2, Kinematics, LawWithHistory, Maxwell, Overstress, Tensor, Trajectory,
+    Viscoelastic, divergence,
+};
+use mmsmith_laws::{
+    BLOCK, Element, Flow, Increment, Law, LawWithMemory, Material, Memory, ReturnMap, Volumetric,
+    WithMemory, with_memory,
+};
+use nalgebra::Matrix3;
+use std::sync::Arc;
+
+const LAMBDA: f64 = 5769.0;
+const MU: f64 = 3846.0;
+const YIELD: f64 = 50.0;
+
+/// Shear and stretch, in space or in the plane, from a state at rest.
+fn motion(dimension: usize) -> impl Fn(f64) -> Kinematics<Dual<f64, 1>> + Sync {
+    let mut along = match dimension {
+        1 => Matrix3::from_diagonal(&[0.08, 0.0, 0.0].into()),
+        2 => Matrix3::new(0.06, 0.05, 0.0, 0.02, -0.05, 0.0, 0.0, 0.0, 0.0),
+        _ => Matrix3::new(0.06, 0.05, 0.03, 0.02, -0.05, -0.04, 0.01, 0.03, 0.02),
+    };
+    let mut across = along * along;
+    if dimension == 1 {
+        across = along;
+    }
+    along *= 0.9;
+    move |t| {
+        let ramp = |A: f64, B: f64| along * A + across * B;
+        let F = Matrix3::identity() + ramp(t + 0.3 * t * t, 8.0 * t * t * t);
+        let rate = ramp(1.0 + 0.6 * t, 24.0 * t * t);
+        let of = |A: Matrix3<f64>| -> Tensor<Dual<f64, 1>> {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| Dual { value: A[(i, j)], slopes: [0.0] })
+            })
+        };
+        Kinematics { F: of(F), rate: of(rate) }
+    }
+}
+
+/// The internal variables and the stress at time one.
+struct State {
+    variables: Vec<f64>,
+    P: Vec<f64>,
+}
+
+impl State {
+    /// The largest differences of variables and of stresses, over the largest of each.
+    fn off(&self, exact: &Self) -> [f64; 2] {
+        let largest = |a: &[f64], b: &[f64]| {
+            let size = b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
+        };
+        [largest(&self.variables, &exact.variables), largest(&self.P, &exact.P)]
+    }
+}
+
+/// By the solver's law in so many steps.
+fn by_steps<const D: usize>(law: &Law<f64, D>, steps: usize) -> State {
+    let Law::WithMemory(law) = law else { panic!("{law:?}") };
+    let law: &Arc<dyn LawWithMemory<f64, D>> = law;
+    let motion = motion(D);
+    let F = |t: f64| -> [[[f64; BLOCK]; D]; D] {
+        let at = motion(t);
+        std::array::from_fn(|i| std::array::from_fn(|j| [at.F[i][j].value; BLOCK]))
+    };
+    let mut q: Vec<[f64; BLOCK]> = law.variables().iter().map(|q| [q.at_rest; BLOCK]).collect();
+    for step in 0..steps {
+        let [start, end] = [step, step + 1].map(|k| F(k as f64 / steps as f64));
+        let increment = Increment { start: &start, end: &end, time: 1.0 / steps as f64 };
+        law.evolve(&increment, &mut q);
+    }
+    let mut P = [[[0.0; BLOCK]; D]; D];
+    law.first_piola_kirchhoff(&F(1.0), &q, &mut P);
+    for stress in P.iter().flatten() {
+        assert!(stress.iter().all(|value| value.to_bits() == stress[0].to_bits()));
+    }
+    State {
+        variables: q.iter().map(|q| q[0]).collect(),
+        P: P.iter().flatten().map(|stress| stress[0]).collect(),
+    }
+}
+
+/// By the rate equations.
+fn exact<const D: usize>(
+    law: &impl LawWithHistory,
+    start: &[f64],
+    own: impl Fn(&mut Vec<f64>),
+) -> State {
+    let motion = motion(D);
+    let found = Trajectory::new(law, &motion, start, &[1.0], 1e-13).unwrap();
+    let z = &found.states[0];
+    let (_, P) = divergence(law, &motion(1.0), z);
+    let mut variables: Vec<f64> = z.iter().map(|z| z.value).collect();
+    own(&mut variables);
+    State { variables, P: (0..D * D).map(|k| P[k / D][k % D]).collect() }
+}
+
+/// The orders of a law in the step, of variables and stresses.
+fn assert_order<const D: usize>(law: &Law<f64, D>, exact: &State, order: f64, what: &str) {
+    let errors = [100, 200, 400].map(|steps| by_steps(law, steps).off(exact));
+    for k in 0..2 {
+        for pair in errors.windows(2) {
+            let found = (pair[0][k] / pair[1][k]).log2();
+            assert!((found - order).abs() < 0.15, "{what} {D}D {k}: {errors:?} {found}");
+        }
+    }
+    println!("{what} {D}D: {errors:?}");
+}
+
+fn j2(flow: Flow<f64>) -> J2 {
+    let Flow { yield_stress, modulus, exponent, overstress, .. } = flow;
+    let overstress =
+        overstress.map(|mmsmith_laws::Overstress { drag, exponent, time }| Overstress {
+            drag,
+            exponent,
+            time,
+        });
+    J2 { lambda: LAMBDA, mu: MU, hardening: Hardening { yield_stress, modulus, exponent }, overstress }
+}
+
+fn of_solver<const D: usize>(flow: Flow<f64>, map: ReturnMap) -> Law<f64, D>
+where
+    f64: mmsmith_laws::Stressed<D>,
+{
+    let elastic = Material::Hencky { lambda: LAMBDA, mu: MU };
+    with_memory(WithMemory { elastic, memory: Memory::Flow(flow) }, map).unwrap()
+}
+
+fn check_flow<const D: usize>(flow: Flow<f64>, what: &str)
+where
+    f64: mmsmith_laws::Stressed<D>,
+{
+    let law = j2(flow);
+    let start: Vec<f64> = of_solver::<D>(flow, ReturnMap::Exponential)
+        .variables()
+        .iter()
+        .map(|variable| variable.at_rest)
+        .collect();
+    let exact = exact::<D>(&law, &start, |z| z[6] = law.plastic_strain(z));
+    assert!(exact.variables[6] > 0.02, "{what} {D}D: {:?}", exact.variables);
+    for (map, order) in [(ReturnMap::Exponential, 1.0), (ReturnMap::Midpoint, 2.0)] {
+        // On a line the direction of flow does not change, and backward Euler has no error in it.
+        if D == 1 && flow.overstress.is_none() {
+            let off = by_steps(&of_solver::<D>(flow, map), 50).off(&exact);
+            assert!(off.iter().all(|off| *off < 1e-10), "{what}: {off:?}");
+            continue;
+        }
+        assert_order(&of_solver::<D>(flow, map), &exact, order, &format!("{what} {map:?}"));
+    }
+}
+
+const PLASTIC: Flow<f64> = Flow {
+    yield_stress: YIELD,
+    modulus: 500.0,
+    exponent: 1.0,
+    overstress: None,
+    is_on_yield: true,
+};
+
+#[test]
+fn plastic_flow_has_its_orders() {
+    for (flow, what) in [
+        (PLASTIC, "linear"),
+        (Flow { modulus: 0.0, ..PLASTIC }, "perfect"),
+        (Flow { modulus: 80.0, exponent: 1.0 / 3.0, ..PLASTIC }, "power"),
+    ] {
+        check_flow::<1>(flow, what);
+        check_flow::<2>(flow, what);
+        check_flow::<3>(flow, what);
+    }
+}
+
+#[test]
+fn viscous_flow_has_its_orders() {
+    let over = |drag, exponent, time| Some(mmsmith_laws::Overstress { drag, exponent, time });
+    for (flow, what) in [
+        (Flow { overstress: over(40.0, 1.0, 3.0), ..PLASTIC }, "perzyna 1"),
+        (Flow { overstress: over(60.0, 3.0, 3.0), ..PLASTIC }, "perzyna 3"),
+        (
+            Flow {
+                // The rate equations measure stresses in the yield stress.
+                yield_stress: 1e-12,
+                modulus: 0.0,
+                exponent: 1.0,
+                overstress: over(100.0, 2.0, 2.0),
+                is_on_yield: false,
+            },
+            "norton",
+        ),
+    ] {
+        check_flow::<1>(flow, what);
+        check_flow::<2>(flow, what);
+        check_flow::<3>(flow, what);
+    }
+}
+
+/// Without a yield stress flow by a power law has no other limit than itself.
+#[test]
+fn a_yield_stress_of_zero_is_creep() {
+    let overstress = Some(mmsmith_laws::Overstress { drag: 100.0, exponent: 2.0, time: 2.0 });
+    let flow = Flow { yield_stress: 0.0, modulus: 0.0, exponent: 1.0, overstress, is_on_yield: false };
+    for map in [ReturnMap::Exponential, ReturnMap::Midpoint] {
+        let creep = by_steps(&of_solver::<2>(flow, map), 20);
+        let almost =
+            by_steps(&of_solver::<2>(Flow { yield_stress: 1e-12, ..flow }, map), 20);
+        assert!(creep.off(&almost).iter().all(|off| *off < 1e-13), "{creep:?}", creep = creep.P);
+        assert!(creep.variables[6] > 0.01);
+    }
+}
+
+#[test]
+fn maxwell_elements_have_second_order() {
+    fn check<const D: usize>()
+    where
+        f64: mmsmith_laws::Stressed<D>,
+    {
+        let elements = vec![Maxwell { share: 0.3, time: 0.2 }, Maxwell { share: 0.2, time: 0.7 }];
+        let law = Viscoelastic { lambda: LAMBDA, mu: MU, elements: elements.clone() };
+        let start = vec![0.0; law.variables().len()];
+        let exact = exact::<D>(&law, &start, |_| {});
+        // The neo-Hookean energy of the isochoric invariant, with the volumetric one of a logarithm.
+        let elastic = Material::Yeoh {
+            c1: 0.5 * MU,
+            c2: 0.0,
+            c3: 0.0,
+            kappa: LAMBDA,
+            volumetric: Volumetric::Logarithmic,
+        };
+        let elements =
+            elements.into_iter().map(|Maxwell { share, time }| Element { share, time }).collect();
+        let law = WithMemory { elastic, memory: Memory::Maxwell(elements) };
+        let law: Law<f64, D> = with_memory(law, ReturnMap::default()).unwrap();
+        assert_order(&law, &exact, 2.0, "simo");
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+/// Linear elasticity with elements: the deviator of the stress relaxes, `s' + s/tau = 2 mu g e'` each.
+#[test]
+fn prony_series_of_linear_elasticity_have_second_order() {
+    let (share, time) = (0.4, 0.3);
+    let law = WithMemory {
+        elastic: Material::LinearElastic { lambda: LAMBDA, mu: MU },
+        memory: Memory::Maxwell(vec![Element { share, time }]),
+    };
+    let law: Law<f64, 2> = with_memory(law, ReturnMap::default()).unwrap();
+    let motion = motion(2);
+    let strain = |t: f64| {
+        let F = Matrix3::from_fn(|i, j| motion(t).F[i][j].value);
+        (F + F.transpose()) * 0.5 - Matrix3::identity()
+    };
+    let rate = |t: f64| {
+        let rate = Matrix3::from_fn(|i, j| motion(t).rate[i][j].value);
+        let d = (rate + rate.transpose()) * 0.5;
+        (d - Matrix3::identity() * (d.trace() / 3.0)) * (2.0 * MU)
+    };
+    // The integral of exp(-(1 - s)/tau) g s_el'(s) by Simpson's rule.
+    let count = 2000;
+    let Q: Matrix3<f64> = (0..=count)
+        .map(|k| {
+            let s = f64::from(k) / f64::from(count);
+            let weight = if k == 0 || k == count { 1.0 } else { f64::from(2 + 2 * (k % 2)) };
+            rate(s) * (share * (-(1.0 - s) / time).exp() * weight / (3.0 * f64::from(count)))
+        })
+        .sum();
+    let e = strain(1.0);
+    let deviator = (e - Matrix3::identity() * (e.trace() / 3.0)) * (2.0 * MU);
+    let bulk = LAMBDA + 2.0 * MU / 3.0;
+    let P = Matrix3::identity() * (bulk * e.trace()) + deviator * (1.0 - share) + Q;
+    let variables = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| Q[at]).to_vec();
+    let exact = State { variables, P: (0..4).map(|k| P[(k / 2, k % 2)]).collect() };
+    assert_order(&law, &exact, 2.0, "prony");
+}
