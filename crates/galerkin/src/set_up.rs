@@ -200,10 +200,19 @@ pub(super) fn check<const D: usize>(
     grid.coordinates.check(&grid.axes.map(|axis| [axis.lower, axis.upper]))
 }
 
-/// Asks for all the memory of a run first, which turns a grid that is too large into an error instead of an abort.
-pub(super) fn reserve<const D: usize>(grid: &Grid<D>, degree: usize) -> Result<(), SetupError> {
+/// Asks for all the memory of a run with so many internal variables of a particle first, which turns a grid that is too large into an error instead of an abort.
+pub(super) fn reserve<const D: usize>(
+    grid: &Grid<D>,
+    degree: usize,
+    variables: usize,
+) -> Result<(), SetupError> {
+    let points = grid.axes.iter().map(|axis| axis.cells as f64 * grid.per_cell as f64);
+    let of_memory = match variables {
+        0 => 0.0,
+        variables => points.product::<f64>() * (variables + D * D) as f64,
+    };
     // Saturates where no integer is large enough.
-    let bytes = (doubles(grid, degree) * size_of::<f64>() as f64) as u128;
+    let bytes = ((doubles(grid, degree) + of_memory) * size_of::<f64>() as f64) as u128;
     let too_large = || SetupError::GridTooLarge {
         cells: grid.axes.iter().map(|axis| axis.cells).collect(),
         bytes,

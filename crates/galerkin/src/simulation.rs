@@ -6,7 +6,7 @@ use std::{array, mem};
 use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_laws::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
+use mmsmith_laws::{AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog};
 use mmsmith_mpm::BodyForce;
 use mmsmith_mpm::Particles;
 use mmsmith_mpm::{SavedState, SavedStateError, replace_whole};
@@ -18,12 +18,13 @@ use super::axis::End;
 use super::basis::Basis;
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity};
 use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
+use super::composition::Composition;
 use super::coordinates::RowGeometry;
 use super::fit::Line;
 use super::mass::{Band, Mass};
 use super::piece;
 use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, reserve, rows};
-use super::stress::{LawOfRows, OwnRows, Places, Stress, is_deformation};
+use super::stress::{LawOfRows, MemoryRows, OwnRows, Places, Stress, is_deformation};
 
 /// A running simulation in the reference configuration.
 ///
@@ -41,6 +42,9 @@ pub struct TotalLagrangian<const D: usize> {
     /// The body force at the particles.
     b: Vec<SVector<f64, D>>,
     particles: Particles<f64, D>,
+    /// Of laws with memory: their internal variables, and the deformation gradients that those of the particles belong to.
+    variables: Vec<InternalVariable>,
+    remembered: Vec<SMatrix<f64, D, D>>,
     density: f64,
     /// Curvilinear coordinates: reciprocal radius by place along axis 0, and what a row of places along it has in common.
     reciprocal_radius: Vec<f64>,
@@ -52,6 +56,9 @@ pub struct TotalLagrangian<const D: usize> {
 
 impl<const D: usize> TotalLagrangian<D> {
     /// Sets up a body at rest and undeformed, of density `density` per reference volume, at time 0.
+    ///
+    /// Stages of compositions of higher order go back in time, where internal variables of a law with memory cannot follow: with such a
+    /// law it is leapfrog, and [`scheme`](Self::scheme) says so.
     ///
     /// # Errors
     ///
@@ -65,11 +72,12 @@ impl<const D: usize> TotalLagrangian<D> {
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         let law = law.into();
-        if matches!(law, Law::WithMemory(_)) {
-            return Err(SetupError::WithMemory);
+        let (variables, mut scheme) = (law.variables(), scheme);
+        if !variables.is_empty() {
+            scheme.composition = Composition::Order2;
         }
         check(&grid, &scheme, density, time_step)?;
-        reserve(&grid, scheme.degree)?;
+        reserve(&grid, scheme.degree, variables.len())?;
         let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
         let faces = faces(&grid, &lines);
         let basis = |k: usize, normal: bool| {
@@ -110,8 +118,15 @@ impl<const D: usize> TotalLagrangian<D> {
             masses.push(<[Mass; 2]>::from(pair_of_masses));
         }
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
-        let particles = particles(&grid, &lines, density);
+        let mut particles = particles(&grid, &lines, density);
+        particles.internal = initial(&law, &particles.X);
+        let remembered = match variables.is_empty() {
+            true => Vec::new(),
+            false => vec![SMatrix::identity(); particles.len()],
+        };
         Ok(Self {
+            variables,
+            remembered,
             reciprocal_radius: match grid.coordinates.are_curvilinear() {
                 true => lines[0].points.iter().map(|R| R.recip()).collect(),
                 false => Vec::new(),
@@ -175,6 +190,14 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         self.fit(u, boundary, Quantity::Displacement, |component| &mut component.u);
         self.fit(v, boundary, Quantity::Velocity, |component| &mut component.v);
+        self.particles.internal = initial(&self.law, &self.particles.X);
+        if let Law::WithMemory(law) = self.law.clone() {
+            let rates = self.gradients(Field::Velocity);
+            let all = self.particles.internal.chunks_exact_mut(self.variables.len());
+            for (rate, q) in rates.iter().zip(all) {
+                law.start_at_rate(rate, q);
+            }
+        }
         self.steps_done = 0;
         self.failed = None;
         Ok(())
@@ -253,7 +276,7 @@ impl<const D: usize> TotalLagrangian<D> {
     ) -> Result<(), StepError> {
         let start = self.time();
         if self.steps_done == 0 {
-            self.accelerate(body_force, boundary, start)?;
+            self.accelerate(body_force, boundary, start, None)?;
         }
         // The step's part that is done: time is a variable of the drift, or the composition would lose its order.
         let mut done = 0.0;
@@ -273,7 +296,7 @@ impl<const D: usize> TotalLagrangian<D> {
             if stage + 1 == stages.len() {
                 self.prescribe(boundary, Quantity::Displacement, moved, |of| &mut of.u);
             }
-            self.accelerate(body_force, boundary, now)?;
+            self.accelerate(body_force, boundary, now, Some(part))?;
             each_component(&mut self.components, &|component| component.kick(0.5 * part));
         }
         let end = start + done * self.time_step;
@@ -344,6 +367,23 @@ impl<const D: usize> TotalLagrangian<D> {
         &self.particles
     }
 
+    /// The gradients of a field at the particles, Cartesian.
+    fn gradients(&mut self, field: Field) -> Vec<SMatrix<f64, D, D>> {
+        let row = self.row();
+        let Self { components, operators, particles, rows, grid, reciprocal_radius, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, field, true);
+        });
+        let of_place = |p: usize| {
+            let local = SVector::from_fn(|i, _| components[i].values[p]);
+            let H = SMatrix::from_fn(|i, k| components[i].slopes[k][p]);
+            let Some(at) = rows.get(p / row) else { return H };
+            let H = grid.coordinates.gradient(&local, &H, reciprocal_radius[p % row], at);
+            at.frame * H * at.frame.transpose()
+        };
+        (0..particles.len()).map(of_place).collect()
+    }
+
     /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
     pub fn particles(&self) -> &Particles<f64, D> {
         &self.particles
@@ -351,9 +391,12 @@ impl<const D: usize> TotalLagrangian<D> {
 
     /// The state between two steps: arrays as bytes in this machine's order.
     pub fn state(&self) -> Vec<&[u8]> {
-        let Self { components, steps_done, .. } = self;
+        let Self { components, steps_done, remembered, particles, .. } = self;
         let coefficients = components.iter().flat_map(|Component { u, v, a, .. }| [u, v, a]);
         let mut state: Vec<&[u8]> = coefficients.map(|c| cast_slice(c)).collect();
+        if !remembered.is_empty() {
+            state.extend([cast_slice(remembered), cast_slice(&particles.internal)]);
+        }
         state.push(bytes_of(steps_done));
         state
     }
@@ -364,9 +407,12 @@ impl<const D: usize> TotalLagrangian<D> {
     ///
     /// Where the state is not one of this set-up; nothing is changed then.
     pub fn take_up(&mut self, parts: &[SavedState]) -> Result<(), SavedStateError> {
-        let Self { components, steps_done, .. } = self;
+        let Self { components, steps_done, remembered, particles, .. } = self;
         let coefficients = components.iter_mut().flat_map(|Component { u, v, a, .. }| [u, v, a]);
         let mut state: Vec<&mut [u8]> = coefficients.map(|c| cast_slice_mut(c)).collect();
+        if !remembered.is_empty() {
+            state.extend([cast_slice_mut(remembered), cast_slice_mut(&mut particles.internal)]);
+        }
         state.push(bytes_of_mut(steps_done));
         replace_whole(&mut state, parts)
     }
@@ -406,12 +452,13 @@ impl<const D: usize> TotalLagrangian<D> {
         self.rows.get(row).map_or(*vector, |row| row.frame.tr_mul(vector))
     }
 
-    /// The accelerations at the current displacement and at `time`.
+    /// The accelerations at the current displacement and at `time`, after an increment of a time that internal variables follow.
     fn accelerate(
         &mut self,
         body_force: &dyn BodyForce<f64, D>,
         boundary: &dyn BoundaryData<D>,
         time: f64,
+        increment: Option<f64>,
     ) -> Result<(), StepError> {
         let curvilinear = self.grid.coordinates.are_curvilinear();
         let Self { components, operators, .. } = self;
@@ -435,8 +482,11 @@ impl<const D: usize> TotalLagrangian<D> {
                 }
             }
             Law::Own(law) => self.stress(OwnRows(law), force),
-            // Refused at the start.
-            Law::WithMemory(_) => true,
+            Law::WithMemory(law) => {
+                let variables = self.variables.clone();
+                let rows = MemoryRows { law: &*law, variables: &variables, time: increment };
+                self.stress(rows, force)
+            }
         };
         if bad {
             return Err(self.describe());
@@ -470,8 +520,13 @@ impl<const D: usize> TotalLagrangian<D> {
         force: Option<(&dyn BodyForce<f64, D>, f64)>,
     ) -> bool {
         let row = self.row();
-        let Self { components, b, particles, .. } = self;
+        let count = self.variables.len();
+        // What it changes of the particles.
+        let mut internal = mem::take(&mut self.particles.internal);
+        let Self { components, b, particles, remembered, .. } = self;
         let size = piece(b.len()).div_ceil(row) * row;
+        let mut of_memory =
+            (remembered.chunks_mut(size), internal.chunks_mut((size * count).max(1)));
         let mut arrays = components.each_mut().map(|Component { values, slopes, .. }| {
             (values.chunks_mut(size), slopes.each_mut().map(|array| array.chunks_mut(size)))
         });
@@ -485,6 +540,8 @@ impl<const D: usize> TotalLagrangian<D> {
                     slopes.each_mut().map(|chunks| chunks.next().unwrap_or_default())
                 }),
                 b,
+                F: of_memory.0.next().unwrap_or_default(),
+                internal: of_memory.1.next().unwrap_or_default(),
             })
             .collect();
         let stress = Stress {
@@ -504,6 +561,7 @@ impl<const D: usize> TotalLagrangian<D> {
                 bad.store(true, Ordering::Relaxed);
             }
         });
+        self.particles.internal = internal;
         bad.into_inner()
     }
 
@@ -527,6 +585,14 @@ impl<const D: usize> TotalLagrangian<D> {
 }
 
 /// The Cartesian vector with these components in row `row` of particles.
+/// The internal variables of particles at time zero, those of a particle one after the other.
+fn initial<const D: usize>(law: &Law<f64, D>, X: &[SVector<f64, D>]) -> Vec<f64> {
+    match law {
+        Law::WithMemory(law) => X.iter().flat_map(|X| law.initial(X)).collect(),
+        Law::Library(_) | Law::Own(_) => Vec::new(),
+    }
+}
+
 fn cartesian<const D: usize>(
     rows: &[RowGeometry<D>],
     row: usize,
@@ -585,10 +651,10 @@ mod tests {
             // A position alone takes sixteen.
             assert!(bytes > (16 * 9 * (cells as u128)) << 22);
             let cells = vec![1 << 22, cells];
-            assert_eq!(reserve(&grid, 2), Err(SetupError::GridTooLarge { cells, bytes }));
+            assert_eq!(reserve(&grid, 2, 0), Err(SetupError::GridTooLarge { cells, bytes }));
         }
         grid.axes = [Axis { cells: 4, ..axis }; 2];
-        assert_eq!(reserve(&grid, 2), Ok(()));
+        assert_eq!(reserve(&grid, 2, 0), Ok(()));
     }
 
     #[test]

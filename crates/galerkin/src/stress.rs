@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_laws::{BLOCK, BlockOfStresses, ConstitutiveLaw, LibraryLaw};
+use mmsmith_laws::{
+    BLOCK, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory,
+    LibraryLaw,
+};
 use mmsmith_mpm::{BodyForce, Particles};
 use nalgebra::{SMatrix, SVector};
 
@@ -17,6 +20,9 @@ pub(super) struct Places<'a, const D: usize> {
     pub(super) values: [&'a mut [f64]; D],
     pub(super) slopes: [[&'a mut [f64]; D]; D],
     pub(super) b: &'a mut [SVector<f64, D>],
+    /// Of laws with memory: the deformation gradients that the internal variables belong to, and these.
+    pub(super) F: &'a mut [SMatrix<f64, D, D>],
+    pub(super) internal: &'a mut [f64],
 }
 
 /// From displacements to forces, at the particles.
@@ -36,7 +42,8 @@ pub(super) struct Stress<'a, L, const D: usize> {
 
 impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
     /// See [`TotalLagrangian::stress`].
-    pub(super) fn at(&self, Places { first, mut values, mut slopes, b }: Places<'_, D>) -> bool {
+    pub(super) fn at(&self, places: Places<'_, D>) -> bool {
+        let Places { first, mut values, mut slopes, b, F, internal } = places;
         let Self { row, planted, coordinates, reciprocal_radius, .. } = *self;
         if let Some((body_force, time)) = self.force {
             body_force.evaluate(first, &self.particles.X[first..first + b.len()], time, b);
@@ -52,6 +59,8 @@ impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
                 volume,
                 values,
                 slopes,
+                F: &mut *F,
+                internal: &mut *internal,
                 at,
                 coordinates,
                 reciprocal_radius,
@@ -83,6 +92,8 @@ pub(super) struct RowOfPlaces<'a, 'b, const D: usize> {
     volume: &'a [f64],
     values: &'a mut [&'b mut [f64]; D],
     slopes: &'a mut [[&'b mut [f64]; D]; D],
+    F: &'a mut [SMatrix<f64, D, D>],
+    internal: &'a mut [f64],
     at: Option<&'a RowGeometry<D>>,
     coordinates: Coordinates,
     reciprocal_radius: &'a [f64],
@@ -169,6 +180,45 @@ impl<const D: usize> LawOfRows<D> for OwnRows<D> {
             block.evaluate(self.0.as_ref());
             for (n, F) in F[..here].iter().enumerate() {
                 row.set_stress(first + n, F, block.stress(n));
+            }
+        }
+    }
+}
+
+/// A law with memory, and the time of the increment that ends here; none where the state is only looked at.
+pub(super) struct MemoryRows<'a, const D: usize> {
+    pub(super) law: &'a dyn LawWithMemory<f64, D>,
+    pub(super) variables: &'a [InternalVariable],
+    pub(super) time: Option<f64>,
+}
+
+impl<const D: usize> LawOfRows<D> for MemoryRows<'_, D> {
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        let &Self { law, variables, time } = self;
+        let mut block = BlockWithMemory::at_rest(variables);
+        let count = row.volume.len();
+        // Internal variables are Cartesian, as they are in files.
+        let frame = row.at.map(|at| at.frame);
+        for first in (0..count).step_by(BLOCK) {
+            let here = BLOCK.min(count - first);
+            let mut own = [SMatrix::identity(); BLOCK];
+            let mut F = own;
+            for n in 0..here {
+                own[n] = row.deformation_gradient(first + n);
+                F[n] = frame.map_or(own[n], |Q| Q * own[n] * Q.transpose());
+            }
+            let place = row.start + first;
+            let last = &mut row.F[place..place + here];
+            let internal = &mut row.internal[place * variables.len()..][..here * variables.len()];
+            if let Some(time) = time {
+                block.evolve(law, last, &F[..here], time, internal);
+            }
+            last.copy_from_slice(&F[..here]);
+            block.first_piola_kirchhoff(law, &F[..here], internal);
+            for (n, F) in own[..here].iter().enumerate() {
+                let P = block.stress(n);
+                let P = frame.map_or(P, |Q| Q.transpose() * P * Q);
+                row.set_stress(first + n, F, P);
             }
         }
     }

@@ -114,13 +114,15 @@ fn assert_order<const D: usize>(law: &Law<f64, D>, exact: &State, order: f64, wh
 
 fn j2(flow: Flow<f64>) -> J2 {
     let Flow { yield_stress, modulus, exponent, overstress, .. } = flow;
-    let overstress =
-        overstress.map(|mmsmith_laws::Overstress { drag, exponent, time }| Overstress {
-            drag,
-            exponent,
-            time,
-        });
-    J2 { lambda: LAMBDA, mu: MU, hardening: Hardening { yield_stress, modulus, exponent }, overstress }
+    let overstress = overstress.map(|mmsmith_laws::Overstress { drag, exponent, time }| {
+        Overstress { drag, exponent, time }
+    });
+    J2 {
+        lambda: LAMBDA,
+        mu: MU,
+        hardening: Hardening { yield_stress, modulus, exponent },
+        overstress,
+    }
 }
 
 fn of_solver<const D: usize>(flow: Flow<f64>, map: ReturnMap) -> Law<f64, D>
@@ -203,11 +205,11 @@ fn viscous_flow_has_its_orders() {
 #[test]
 fn a_yield_stress_of_zero_is_creep() {
     let overstress = Some(mmsmith_laws::Overstress { drag: 100.0, exponent: 2.0, time: 2.0 });
-    let flow = Flow { yield_stress: 0.0, modulus: 0.0, exponent: 1.0, overstress, is_on_yield: false };
+    let flow =
+        Flow { yield_stress: 0.0, modulus: 0.0, exponent: 1.0, overstress, is_on_yield: false };
     for map in [ReturnMap::Exponential, ReturnMap::Midpoint] {
         let creep = by_steps(&of_solver::<2>(flow, map), 20);
-        let almost =
-            by_steps(&of_solver::<2>(Flow { yield_stress: 1e-12, ..flow }, map), 20);
+        let almost = by_steps(&of_solver::<2>(Flow { yield_stress: 1e-12, ..flow }, map), 20);
         assert!(creep.off(&almost).iter().all(|off| *off < 1e-13), "{creep:?}", creep = creep.P);
         assert!(creep.variables[6] > 0.01);
     }

@@ -218,8 +218,8 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
         let change = P(1.0) * real::<T>(4.0) - P(2.0);
         // A body with memory may be under stress at rest.
         let at_rest = match self {
-            Self::WithMemory(_) => P(0.0) * real::<T>(3.0),
-            Self::Library(_) | Self::Own(_) => SMatrix::zeros(),
+            Self::Library(_) => SMatrix::zeros(),
+            Self::Own(_) | Self::WithMemory(_) => P(0.0) * real::<T>(3.0),
         };
         (change - at_rest) / (step * real(2.0))
     }

@@ -15,7 +15,7 @@ pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1),
 /// An internal variable of a law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InternalVariable {
-    /// Its name, in files and tables.
+    /// Its name, in files and tables; one in parentheses is what the law has to know of its particle, and is not written.
     pub name: String,
     /// Its value in a body at rest.
     pub at_rest: f64,
@@ -65,12 +65,8 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
     fn start_at_rate(&self, _rate: &SMatrix<T, D, D>, _q: &mut [T]) {}
 
     /// Kirchhoff stresses, `tau = P F^T`. Default: from first Piola-Kirchhoff stresses.
-    fn kirchhoff(
-        &self,
-        F: &[[[T; BLOCK]; D]; D],
-        q: &[[T; BLOCK]],
-        tau: &mut [[[T; BLOCK]; D]; D],
-    ) where
+    fn kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], q: &[[T; BLOCK]], tau: &mut [[[T; BLOCK]; D]; D])
+    where
         T: RealField + Copy,
     {
         self.first_piola_kirchhoff(F, q, tau);
@@ -171,7 +167,8 @@ impl<T: RealField + Copy, const D: usize> ConstitutiveLaw<T, D> for Frozen<T, D>
 pub struct BlockWithMemory<T, const D: usize> {
     F: [[[T; BLOCK]; D]; D],
     end: [[[T; BLOCK]; D]; D],
-    P: [[[T; BLOCK]; D]; D],
+    stress: [[[T; BLOCK]; D]; D],
+    is_deformation: [bool; BLOCK],
     q: Vec<[T; BLOCK]>,
 }
 
@@ -184,7 +181,8 @@ impl<T: RealField + Copy, const D: usize> BlockWithMemory<T, D> {
             std::array::from_fn(|j| of(if i == j { T::one() } else { T::zero() }))
         });
         let q = variables.iter().map(|variable| of(real(variable.at_rest))).collect();
-        Self { F: identity, end: identity, P: [[of(T::zero()); D]; D], q }
+        let stress = [[of(T::zero()); D]; D];
+        Self { F: identity, end: identity, stress, is_deformation: [true; BLOCK], q }
     }
 
     /// Takes the internal variables of particles, those of a particle one after the other.
@@ -197,41 +195,36 @@ impl<T: RealField + Copy, const D: usize> BlockWithMemory<T, D> {
         }
     }
 
-    /// The Kirchhoff stresses of particles; not a number where F is no deformation.
-    pub fn kirchhoff(
-        &mut self,
-        law: &dyn LawWithMemory<T, D>,
-        F: &[SMatrix<T, D, D>],
-        q: &[T],
-    ) -> impl Fn(usize) -> SMatrix<T, D, D> {
-        self.compute(F, q, |F, q, stress| law.kirchhoff(F, q, stress))
+    /// Computes the Kirchhoff stresses of particles.
+    pub fn kirchhoff(&mut self, law: &dyn LawWithMemory<T, D>, F: &[SMatrix<T, D, D>], q: &[T]) {
+        self.set(F, q);
+        law.kirchhoff(&self.F, &self.q, &mut self.stress);
     }
 
-    /// The first Piola-Kirchhoff stresses of particles; not a number where F is no deformation.
+    /// Computes the first Piola-Kirchhoff stresses of particles.
     pub fn first_piola_kirchhoff(
         &mut self,
         law: &dyn LawWithMemory<T, D>,
         F: &[SMatrix<T, D, D>],
         q: &[T],
-    ) -> impl Fn(usize) -> SMatrix<T, D, D> {
-        self.compute(F, q, |F, q, stress| law.first_piola_kirchhoff(F, q, stress))
+    ) {
+        self.set(F, q);
+        law.first_piola_kirchhoff(&self.F, &self.q, &mut self.stress);
     }
 
-    fn compute(
-        &mut self,
-        F: &[SMatrix<T, D, D>],
-        q: &[T],
-        stresses: impl FnOnce(&[[[T; BLOCK]; D]; D], &[[T; BLOCK]], &mut [[[T; BLOCK]; D]; D]),
-    ) -> impl Fn(usize) -> SMatrix<T, D, D> {
+    fn set(&mut self, F: &[SMatrix<T, D, D>], q: &[T]) {
         self.take(q);
-        let mut is_deformation = [true; BLOCK];
         for (n, F) in F.iter().enumerate() {
-            is_deformation[n] = set(&mut self.F, n, F);
+            self.is_deformation[n] = set(&mut self.F, n, F);
         }
-        stresses(&self.F, &self.q, &mut self.P);
-        let P = &self.P;
-        move |n| match is_deformation[n] {
-            true => of_particle(P, n),
+    }
+
+    /// The stress of a particle that was computed last; not a number where F is no deformation.
+    #[inline(always)]
+    #[must_use]
+    pub fn stress(&self, n: usize) -> SMatrix<T, D, D> {
+        match self.is_deformation[n] {
+            true => of_particle(&self.stress, n),
             false => SMatrix::repeat(real(f64::NAN)),
         }
     }

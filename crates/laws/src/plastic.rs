@@ -63,7 +63,9 @@ impl Plastic {
         // Logarithms of elastic stretches along the axes, for which the size of 2 mu e is sqrt(2/3) times the yield stress.
         let along: [f64; 3] = match dimension {
             1 => [1.0, -0.5, -0.5].map(|part| part * flow.yield_stress / (3.0 * mu)),
-            _ => [1.0, -1.0, 0.0].map(|part| part * flow.yield_stress / (2.0 * 3.0_f64.sqrt() * mu)),
+            _ => {
+                [1.0, -1.0, 0.0].map(|part| part * flow.yield_stress / (2.0 * 3.0_f64.sqrt() * mu))
+            }
         };
         along.map(|e| (2.0 * e).exp())
     }
@@ -123,7 +125,9 @@ impl Plastic {
         dispatch(Trials { F: end, q, planted: law.planted, elastic: &mut elastic });
         for (n, elastic) in elastic.iter().enumerate() {
             let (size, alpha) = (law.mu * elastic.size(), double(q[6][n]));
-            if !law.flows(size, alpha) && (map == ReturnMap::Exponential || law.flow.overstress.is_none()) {
+            if !law.flows(size, alpha)
+                && (map == ReturnMap::Exponential || law.flow.overstress.is_none())
+            {
                 continue;
             }
             let (G, F) = (in_plane(q, n), row(end, n));
@@ -133,9 +137,7 @@ impl Plastic {
                     let kept = 1.0 - 2.0 * law.mu * multiplier / size;
                     (plane::returned(&F, &G, elastic, kept), multiplier)
                 }
-                ReturnMap::Midpoint => {
-                    plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time)
-                }
+                ReturnMap::Midpoint => plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time),
             };
             if multiplier > 0.0 {
                 let Sym { a: [g11, g22], shear, across } = G;
@@ -166,11 +168,7 @@ fn row<T: RealField + Copy, const D: usize>(F: &[[[T; BLOCK]; D]; D], n: usize) 
 
 #[inline(always)]
 fn in_plane<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Sym {
-    Sym {
-        a: [double(q[0][n]), double(q[1][n])],
-        shear: double(q[3][n]),
-        across: double(q[2][n]),
-    }
+    Sym { a: [double(q[0][n]), double(q[1][n])], shear: double(q[3][n]), across: double(q[2][n]) }
 }
 
 fn in_rows<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Matrix3<f64> {

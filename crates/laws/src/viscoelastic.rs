@@ -11,9 +11,7 @@ use mmsmith_vocabulary::{Element, Material};
 use nalgebra::{Matrix3, SMatrix};
 
 use crate::fault::{Fault, Planted};
-use crate::memory::{
-    ENTRIES, Increment, InternalVariable, LawWithMemory, of_particle, set_stress,
-};
+use crate::memory::{ENTRIES, Increment, InternalVariable, LawWithMemory, of_particle, set_stress};
 use crate::{BLOCK, Stressed};
 
 /// An elastic law with Maxwell elements.
@@ -36,7 +34,8 @@ impl<T: Copy + nalgebra::RealField> Viscoelastic<T> {
                 (Material::LinearElastic { lambda: mu * real(-2.0 / 3.0), mu }, true)
             }
             _ if elastic.volumetric().is_some() => {
-                let without = |name: &str, value: T| if name == "kappa" { T::zero() } else { value };
+                let without =
+                    |name: &str, value: T| if name == "kappa" { T::zero() } else { value };
                 (elastic.map_named(without), false)
             }
             _ => return None,
@@ -65,7 +64,11 @@ impl<T: Copy + nalgebra::RealField> Viscoelastic<T> {
     }
 
     /// What the elements add to the stress of the elastic law, of which they take their shares.
-    fn of_elements<const D: usize>(&self, F: &SMatrix<T, D, D>, q: impl Fn(usize) -> T) -> SMatrix<T, D, D> {
+    fn of_elements<const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+        q: impl Fn(usize) -> T,
+    ) -> SMatrix<T, D, D> {
         let mut sum = SMatrix::zeros();
         for first in (0..self.elements.len()).map(|element| 6 * element) {
             for (entry, &(i, j)) in ENTRIES.iter().enumerate().filter(|(_, (_, j))| *j < D) {
@@ -105,7 +108,8 @@ impl<T: Stressed<D> + Stressed<3>, const D: usize> LawWithMemory<T, D> for Visco
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
         let mut in_space = Matrix3::identity();
         in_space.fixed_view_mut::<D, D>(0, 0).copy_from(F);
-        let P = stress(&self.elastic, &in_space) - stress(&self.isochoric, &in_space) * self.share()
+        let P = stress(&self.elastic, &in_space)
+            - stress(&self.isochoric, &in_space) * self.share()
             + self.of_elements(&in_space, |k| q[k]);
         (D < 3).then_some(P[(2, 2)])
     }
@@ -136,7 +140,8 @@ impl<T: Stressed<D> + Stressed<3>, const D: usize> LawWithMemory<T, D> for Visco
             .iter()
             .map(|element| {
                 let half = (-time * real(0.5 * hurry) / element.time).exp();
-                let share = if self.planted.is(Fault::ShareDropped) { T::zero() } else { element.share };
+                let share =
+                    if self.planted.is(Fault::ShareDropped) { T::zero() } else { element.share };
                 [half * half, half * share]
             })
             .collect();

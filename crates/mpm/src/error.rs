@@ -244,9 +244,6 @@ pub enum SetupError {
     /// The total Lagrangian formulation in single precision.
     #[error("the total Lagrangian formulation computes in double precision only")]
     DoublePrecisionOnly,
-    /// A law with internal variables in the total Lagrangian formulation.
-    #[error("laws with internal variables run in the updated Lagrangian formulation only")]
-    WithMemory,
     /// The particles do not determine the splines' coefficients.
     #[error(
         "the mass matrix along axis {axis} is singular: {per_cell} particles per cell do not determine the splines' \

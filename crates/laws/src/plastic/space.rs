@@ -41,12 +41,7 @@ fn symmetric(A: Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// `tau = lambda/2 tr(ln b) I + mu ln b`.
-pub(super) fn kirchhoff(
-    F: &Matrix3<f64>,
-    G: &Matrix3<f64>,
-    lambda: f64,
-    mu: f64,
-) -> Matrix3<f64> {
+pub(super) fn kirchhoff(F: &Matrix3<f64>, G: &Matrix3<f64>, lambda: f64, mu: f64) -> Matrix3<f64> {
     let elastic = Principal::elastic(F, G);
     let logarithms = elastic.values.map(f64::ln);
     elastic.tensor((logarithms * mu).add_scalar(0.5 * lambda * logarithms.sum()))

@@ -161,8 +161,8 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
         let mut block = BlockWithMemory::at_rest(&self.variables);
-        let tau = block.kirchhoff(self.law.as_ref(), F, internal);
-        set_fluxes(c, F, |n, _| tau(n), contributions);
+        block.kirchhoff(self.law.as_ref(), F, internal);
+        set_fluxes(c, F, |n, _| block.stress(n), contributions);
     }
 
     fn variables(&self) -> usize {
