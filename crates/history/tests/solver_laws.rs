@@ -109,7 +109,6 @@ fn assert_order<const D: usize>(law: &Law<f64, D>, exact: &State, order: f64, wh
             assert!((found - order).abs() < 0.15, "{what} {D}D {k}: {errors:?} {found}");
         }
     }
-    println!("{what} {D}D: {errors:?}");
 }
 
 fn j2(flow: Flow<f64>) -> J2 {

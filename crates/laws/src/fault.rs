@@ -135,8 +135,6 @@ pub enum Fault {
     RelaxationTime,
     /// Maxwell elements: stresses that decay, and take up no change of shape.
     ShareDropped,
-    /// A law that the specification states: internal variables advance by a thousandth too little.
-    RateOff,
 }
 
 /// A fault in a law of the library, as what it makes of constants.

@@ -27,7 +27,7 @@ use crate::BLOCK;
 use crate::fault::{Fault, Planted};
 use crate::memory::{ENTRIES, Increment, InternalVariable, LawWithMemory, in_space};
 use multiplier::Yield;
-use plane::{Elastic, F2, Sym};
+use plane::{Elastic, Elastics, F2, Sym};
 
 /// How a step of a flow finds its direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -121,10 +121,10 @@ impl Plastic {
         let Self { law, map, .. } = *self;
         let Increment { start, end, time } = *increment;
         let time = double(time);
-        let mut elastic = [Elastic::AT_REST; BLOCK];
+        let mut elastic = Elastics::AT_REST;
         dispatch(Trials { F: end, q, planted: law.planted, elastic: &mut elastic });
-        for (n, elastic) in elastic.iter().enumerate() {
-            let (size, alpha) = (law.mu * elastic.size(), double(q[6][n]));
+        for n in 0..BLOCK {
+            let (size, alpha) = (law.mu * elastic.size[n], double(q[6][n]));
             if !law.flows(size, alpha)
                 && (map == ReturnMap::Exponential || law.flow.overstress.is_none())
             {
@@ -135,7 +135,7 @@ impl Plastic {
                 ReturnMap::Exponential => {
                     let multiplier = law.multiplier(size, alpha, time);
                     let kept = 1.0 - 2.0 * law.mu * multiplier / size;
-                    (plane::returned(&F, &G, elastic, kept), multiplier)
+                    (plane::returned(&F, &G, &elastic.get(n), kept), multiplier)
                 }
                 ReturnMap::Midpoint => plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time),
             };
@@ -185,7 +185,7 @@ struct Trials<'a, T, const D: usize> {
     F: &'a [[[T; BLOCK]; D]; D],
     q: &'a [[T; BLOCK]],
     planted: Planted,
-    elastic: &'a mut [Elastic; BLOCK],
+    elastic: &'a mut Elastics,
 }
 
 impl<T: RealField + Copy, const D: usize> Loop for Trials<'_, T, D> {
@@ -196,7 +196,7 @@ impl<T: RealField + Copy, const D: usize> Loop for Trials<'_, T, D> {
         for n in 0..BLOCK {
             let across = if planted.is(Fault::AcrossDropped) { 1.0 } else { double(g33[n]) };
             let G = Sym { a: [double(g11[n]), double(g22[n])], shear: double(g12[n]), across };
-            elastic[n] = Elastic::new(&row(F, n), &G);
+            elastic.set(n, &Elastic::new(&row(F, n), &G));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use mmsmith_laws::BlockWithMemory;
 use mmsmith_mpm::{Law, Particles, Stressed};
 use mmsmith_ranks::{gather, share};
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
@@ -184,15 +185,34 @@ impl<'a, const D: usize> Comparison<'a, D> {
         first: usize,
         magnitudes: &mut [[Row<f64>; 4]],
     ) {
-        let Room { exact, run } = room;
+        let Room { exact, run, memory } = room;
         let exact = &mut exact[..magnitudes.len()];
         self.exact.evaluate(times.0, times.1, first / BLOCK, exact);
         for (n, (exact, magnitudes)) in exact.iter().zip(magnitudes).enumerate() {
             let first = first + n * BLOCK;
             let places = first..particles.len().min(first + BLOCK);
-            run.pick(particles, places);
+            run.pick(particles, places.clone());
             // A particle that is inside out has no stress; the solver stops at its next step.
-            law.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
+            match law {
+                Law::WithMemory(law) => {
+                    let memory = memory.get_or_insert_with(|| {
+                        let variables = law.variables();
+                        (variables.len(), Box::new(BlockWithMemory::at_rest(&variables)))
+                    });
+                    let (count, block) = (memory.0, &mut memory.1);
+                    let q = &particles.internal[places.start * count..places.end * count];
+                    block.first_piola_kirchhoff(law.as_ref(), &particles.F[places.clone()], q);
+                    for n in 0..BLOCK {
+                        let stress = block.stress(n.min(places.len() - 1));
+                        for i in 0..D {
+                            (0..D).for_each(|j| run.P[i][j][n] = stress[(i, j)]);
+                        }
+                    }
+                }
+                Law::Library(_) | Law::Own(_) => {
+                    law.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
+                }
+            }
             Arch::new().dispatch(Errors { run, exact, magnitudes });
         }
     }
@@ -264,11 +284,13 @@ compared! {
 struct Room<T, const D: usize> {
     exact: [StateRun<f64, D>; RUNS],
     run: Run<T, D>,
+    /// Of a law with memory: the number of its variables, and where its stresses are computed.
+    memory: Option<(usize, Box<BlockWithMemory<T, D>>)>,
 }
 
 impl<T: Real, const D: usize> Room<T, D> {
     fn zero() -> Self {
-        Self { exact: [StateRun::zero(); RUNS], run: Run::zero() }
+        Self { exact: [StateRun::zero(); RUNS], run: Run::zero(), memory: None }
     }
 }
 
@@ -423,9 +445,30 @@ pub fn over_particles<R, const N: usize>(
     joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
 }
 
-/// The norms of four magnitudes over the particles of all processes; `groups` has the tallies of the groups whose home is here.
-/// Collective.
-fn over_homes(homes: &Homes, groups: &[[Tally; 4]]) -> [PerNorm<f64>; 4] {
+/// The norms of one magnitude of each particle; where there are several processes, `own` has those of the particles held here, and all
+/// call this.
+#[must_use]
+pub fn norms_of(homes: Option<&Homes>, own: &[f64]) -> PerNorm<f64> {
+    let tallies_of = |values: &[f64]| {
+        tallies(
+            values.len(),
+            || (),
+            |_, first, rows: &mut [[Row<f64>; 1]]| {
+                for (k, value) in values[first..].iter().take(rows.len() * BLOCK).enumerate() {
+                    rows[k / BLOCK][0][k % BLOCK] = *value;
+                }
+            },
+        )
+    };
+    let [norms] = match homes {
+        None => joined(tallies_of(own).iter()).map(|tally| tally.norms(own.len())),
+        Some(homes) => over_homes(homes, &tallies_of(&homes.bring(own))),
+    };
+    norms
+}
+
+/// The norms of magnitudes over the particles of all processes; `groups` has the tallies of the groups whose home is here. Collective.
+fn over_homes<const N: usize>(homes: &Homes, groups: &[[Tally; N]]) -> [PerNorm<f64>; N] {
     let numbers: Vec<[f64; 4]> =
         groups.iter().flatten().map(|tally: &Tally| tally.numbers()).collect();
     let all = gather(homes.ranks(), numbers.as_flattened());
@@ -433,8 +476,8 @@ fn over_homes(homes: &Homes, groups: &[[Tally; 4]]) -> [PerNorm<f64>; 4] {
         .chunks_exact(4)
         .map(|numbers| Tally::of_numbers(std::array::from_fn(|k| numbers[k])))
         .collect();
-    let groups: Vec<[Tally; 4]> =
-        all.chunks_exact(4).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
+    let groups: Vec<[Tally; N]> =
+        all.chunks_exact(N).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
     let norms = joined(groups.iter()).map(|tally| tally.norms(homes.count()));
     let mut numbers: Vec<f64> =
         norms.iter().flat_map(|PerNorm { linf, l2, l1 }| [*linf, *l2, *l1]).collect();

@@ -7,5 +7,5 @@ mod comparison;
 mod homes;
 pub mod norms;
 
-pub use comparison::{Compared, Comparison, RUNS, Row, each_group, over_particles};
+pub use comparison::{Compared, Comparison, RUNS, Row, each_group, norms_of, over_particles};
 pub use homes::{Holder, Homes};

@@ -29,6 +29,7 @@
 //! ```
 
 mod function;
+mod memory;
 mod moduli;
 mod program;
 mod slope;
@@ -36,7 +37,8 @@ mod stress;
 mod tape;
 mod text;
 
-pub use mmsmith_vocabulary::Response;
+pub use memory::StatedMemory;
+pub use mmsmith_vocabulary::{Internal, Response};
 pub use moduli::ModuliAtRest;
 
 use function::GAUSS;
@@ -142,13 +144,7 @@ impl Programs {
         let mut tape = Tape::default();
         let mut kinematics = Kinematics::new(&mut tape, dimension);
         for (name, value) in constants {
-            if name == "Pi" || kinematics.names.arguments.contains_key(name) {
-                return Err(StatedLawError::TakenName { name: name.clone() });
-            }
-            if !value.is_finite() {
-                return Err(StatedLawError::NotFinite { part: name.clone() });
-            }
-            kinematics.names.constants.insert(name.clone(), Value::constant(*value));
+            kinematics.names.add(name, *value)?;
         }
         let (stress, energy, across) = match response {
             Response::Energy(text) => {
@@ -296,6 +292,23 @@ pub trait Compiled<const D: usize>: RealField + Copy {
 
     /// [`StatedLaw::kirchhoff_across`].
     fn across(law: &StatedLaw<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
+
+    /// [`StatedMemory::first_piola_kirchhoff`] of as many particles as a block has.
+    fn stress_with_memory(
+        law: &StatedMemory<Self>,
+        F: &[[[Self; LANES]; D]; D],
+        q: &[[Self; LANES]],
+        P: &mut [[[Self; LANES]; D]; D],
+    );
+
+    /// [`StatedMemory::evolve`] of as many particles as a block has.
+    fn evolve(
+        law: &StatedMemory<Self>,
+        start: &[[[Self; LANES]; D]; D],
+        end: &[[[Self; LANES]; D]; D],
+        time: Self,
+        q: &mut [[Self; LANES]],
+    );
 }
 
 macro_rules! compiled {
@@ -315,6 +328,25 @@ macro_rules! compiled {
 
             fn across(law: &StatedLaw<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {
                 law.kirchhoff_across(F)
+            }
+
+            fn stress_with_memory(
+                law: &StatedMemory<Self>,
+                F: &[[[Self; LANES]; $D]; $D],
+                q: &[[Self; LANES]],
+                P: &mut [[[Self; LANES]; $D]; $D],
+            ) {
+                law.first_piola_kirchhoff(F, q, P);
+            }
+
+            fn evolve(
+                law: &StatedMemory<Self>,
+                start: &[[[Self; LANES]; $D]; $D],
+                end: &[[[Self; LANES]; $D]; $D],
+                time: Self,
+                q: &mut [[Self; LANES]],
+            ) {
+                law.evolve(start, end, time, q);
             }
         })*)*
     };

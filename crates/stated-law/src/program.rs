@@ -34,6 +34,9 @@ enum Work {
         row: usize,
         column: usize,
     },
+    Input {
+        index: usize,
+    },
     /// The deviation alone, `factor x`.
     Multiple {
         x: Location,
@@ -173,6 +176,7 @@ impl Program {
         };
         let work = match operation {
             Operation::Entry { row, column } => Work::Entry { row, column },
+            Operation::Input { index } => Work::Input { index },
             Operation::Argument { .. } => return x,
             Operation::OnePlus { .. } => {
                 let (x, y) = (x?, y?);
@@ -220,6 +224,13 @@ impl Program {
         Location { rest: 0.0, deviation: row, value }
     }
 
+    /// Whether it takes any of these inputs.
+    pub(crate) fn takes(&self, inputs: &std::ops::Range<usize>) -> bool {
+        let takes =
+            |step: &Step| matches!(step.work, Work::Input { index } if inputs.contains(&index));
+        self.steps.iter().any(takes)
+    }
+
     /// The results for deformations side by side, in registers as wide as this processor has them; not a number where F is no
     /// deformation.
     pub(crate) fn run<'a, T: RealField + Copy, const D: usize, const N: usize>(
@@ -228,9 +239,20 @@ impl Program {
         part: Portion,
         results: impl Iterator<Item = &'a mut [T; N]>,
     ) {
+        self.run_with(given, &[], part, results);
+    }
+
+    /// As [`run`](Self::run), of a law whose particles have other numbers besides their deformation.
+    pub(crate) fn run_with<'a, T: RealField + Copy, const D: usize, const N: usize>(
+        &self,
+        given: Given<'_, T, D, N>,
+        inputs: &[[T; N]],
+        part: Portion,
+        results: impl Iterator<Item = &'a mut [T; N]>,
+    ) {
         with_room(self.rows, |rows| {
             let mut valid = [true; N];
-            Arch::new().dispatch(Run { program: self, given, rows, valid: &mut valid });
+            Arch::new().dispatch(Run { program: self, given, inputs, rows, valid: &mut valid });
             for (output, result) in self.outputs.iter().zip(results) {
                 self.take(*output, part, rows, &valid, result);
             }
@@ -305,6 +327,7 @@ fn double<T: RealField + Copy>(value: T) -> f64 {
 struct Run<'a, T, const D: usize, const N: usize> {
     program: &'a Program,
     given: Given<'a, T, D, N>,
+    inputs: &'a [[T; N]],
     rows: &'a mut [[T; N]],
     /// Whether `F` is a deformation.
     valid: &'a mut [bool; N],
@@ -323,6 +346,10 @@ impl<T: RealField + Copy, const D: usize, const N: usize> WithSimd for Run<'_, T
             let Some((first, others)) = open.split_first_mut() else { continue };
             if let Work::Entry { row, column } = step.work {
                 entry(&self.given, row, column, self.valid, first, others.first_mut());
+                continue;
+            }
+            if let Work::Input { index } = step.work {
+                *first = self.inputs.get(index).copied().unwrap_or([real(f64::NAN); N]);
                 continue;
             }
             match (step.wanted, others.first_mut()) {
@@ -409,7 +436,7 @@ fn both<T: RealField + Copy, const N: usize>(
 ) {
     match work {
         // Of these only one part is written.
-        Work::Entry { .. } | Work::Multiple { .. } | Work::Shift { .. } => {}
+        Work::Entry { .. } | Work::Input { .. } | Work::Multiple { .. } | Work::Shift { .. } => {}
         Work::Affine { x, factor, constant } => {
             let (d, v) = (&rows[x.deviation], &rows[x.value]);
             let (factor, constant): (T, T) = (real(factor), real(constant));
@@ -544,7 +571,7 @@ fn deviation<T: RealField + Copy, const N: usize>(
 #[inline(always)]
 fn value<T: RealField + Copy, const N: usize>(work: Work, rows: &[[T; N]], result: &mut [T; N]) {
     match work {
-        Work::Entry { .. } => {}
+        Work::Entry { .. } | Work::Input { .. } => {}
         Work::Multiple { x, factor: a } => affine(&rows[x.value], a, 0.0, result),
         Work::Affine { x, factor, constant } => affine(&rows[x.value], factor, constant, result),
         Work::Shift { x, constant } => affine(&rows[x.value], 1.0, constant, result),

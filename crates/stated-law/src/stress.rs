@@ -54,6 +54,32 @@ impl Kinematics {
         Kinematics { F, C, cofactor, I1, dimension, names }
     }
 
+    /// Names the rates of the deformation, whose rate is these inputs, row by row: `Fdot11`, ..., `Jdot = cof F : Fdot`, and `d11`, ..., the
+    /// symmetric part of `Fdot F^-1`.
+    pub(crate) fn add_rates(&mut self, tape: &mut Tape, first: usize) {
+        let dimension = self.dimension;
+        let rate: Tensor = tensor(|i, j| match i.max(j) < dimension {
+            true => tape.input(first + i * dimension + j),
+            false => Value::ZERO,
+        });
+        let cofactor = self.cofactor;
+        let J = sum_over(|j| (1.0, [self.F[0][j], cofactor[0][j]]), tape);
+        let of_J = tape.reciprocal(J);
+        let rows =
+            [0, 1, 2].map(|i| (1.0, sum_over(|j| (1.0, [cofactor[i][j], rate[i][j]]), tape)));
+        let rate_of_J = tape.sum(&rows);
+        self.names.constants.insert("Jdot".into(), rate_of_J);
+        let velocity: Tensor = tensor(|i, j| {
+            let sum = sum_over(|k| (1.0, [rate[i][k], cofactor[j][k]]), tape);
+            tape.product(sum, of_J)
+        });
+        for (i, j) in (0..dimension * dimension).map(|m| (m / dimension, m % dimension)) {
+            let d = tape.sum(&[(0.5, velocity[i][j]), (0.5, velocity[j][i])]);
+            self.names.constants.insert(format!("Fdot{}{}", i + 1, j + 1), rate[i][j]);
+            self.names.constants.insert(format!("d{}{}", i + 1, j + 1), d);
+        }
+    }
+
     /// `P = W_J cof F + 2 W_I1 F + 2 W_I2 (I1 F - F C) + F (W_C + W_C^T) + W_F`, with the normal stresses along axes that
     /// are left out.
     pub(crate) fn stress(&self, tape: &mut Tape, energy: Value) -> Tensor {

@@ -121,6 +121,10 @@ pub(crate) enum Operation {
         row: usize,
         column: usize,
     },
+    /// A number of a particle besides its deformation, which has no value at rest.
+    Input {
+        index: usize,
+    },
     /// An argument of the law: the same number as another node, but derivatives stop here.
     Argument {
         argument: Argument,
@@ -171,7 +175,7 @@ impl Operation {
     /// The nodes that it takes, the first one twice where it takes one.
     pub(crate) fn operands(self) -> Option<[Node; 2]> {
         match self {
-            Self::Entry { .. } => None,
+            Self::Entry { .. } | Self::Input { .. } => None,
             Self::Argument { value: x, .. }
             | Self::Affine { x, .. }
             | Self::Reciprocal { x }
@@ -232,6 +236,7 @@ impl Tape {
         match operation {
             Operation::Entry { row, column } if row == column => Rest { value: 1.0, error: 0.0 },
             Operation::Entry { .. } => Rest::ZERO,
+            Operation::Input { .. } => Rest { value: f64::NAN, error: 0.0 },
             // What is known of the value at rest is known of its other name.
             Operation::Argument { value, .. } => of(value),
             Operation::Affine { x, factor, constant } => {
@@ -258,6 +263,10 @@ impl Tape {
 
     pub(crate) fn entry(&mut self, row: usize, column: usize) -> Value {
         Value::Varying(self.push(Operation::Entry { row, column }))
+    }
+
+    pub(crate) fn input(&mut self, index: usize) -> Value {
+        Value::Varying(self.push(Operation::Input { index }))
     }
 
     pub(crate) fn argument(&mut self, argument: Argument, value: Value) -> Value {
@@ -461,7 +470,9 @@ impl Tape {
             return Value::ZERO;
         }
         match operation {
-            Operation::Entry { .. } | Operation::Argument { .. } => Value::ZERO,
+            Operation::Entry { .. } | Operation::Input { .. } | Operation::Argument { .. } => {
+                Value::ZERO
+            }
             Operation::Affine { factor, .. } => self.sum(&[(factor.get(), dx)]),
             Operation::Sum { a, b, .. } => self.sum(&[(a.get(), dx), (b.get(), dy)]),
             Operation::Product { x, y } => {

@@ -38,6 +38,24 @@ pub(crate) struct Names {
 }
 
 impl Names {
+    /// Adds a constant.
+    pub(crate) fn add(&mut self, name: &str, value: f64) -> Result<(), StatedLawError> {
+        if !value.is_finite() {
+            return Err(StatedLawError::NotFinite { part: name.to_owned() });
+        }
+        self.add_value(name, Value::constant(value))
+    }
+
+    /// Adds a number that is neither a measure of the deformation nor an argument of derivatives.
+    pub(crate) fn add_value(&mut self, name: &str, value: Value) -> Result<(), StatedLawError> {
+        let is_taken = name == "Pi" || self.arguments.contains_key(name);
+        if is_taken || self.constants.contains_key(name) {
+            return Err(StatedLawError::TakenName { name: name.to_owned() });
+        }
+        self.constants.insert(name.to_owned(), value);
+        Ok(())
+    }
+
     /// The number that `text` states.
     pub(crate) fn read(&self, tape: &mut Tape, text: &str) -> Result<Value, StatedLawError> {
         let value = self.value(tape, text, &Ast::parse(text)?)?;

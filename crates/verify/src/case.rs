@@ -1,5 +1,6 @@
 //! The settings of one simulation.
 
+use mmsmith_laws::{ReturnMap, Stressed, with_memory};
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{Integrator, Law, Material, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
@@ -7,6 +8,7 @@ use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
 use crate::named::{Named, named};
+use crate::points;
 use crate::precision::Precision;
 use crate::scheme::{Placement, Scheme, Start, Updated};
 use crate::stated_law;
@@ -28,6 +30,8 @@ pub struct Case {
     pub periods: f64,
     /// How much of an annulus is modelled; `None` chooses the quarter where symmetry allows it.
     pub extent: Option<Extent>,
+    /// How a step of a law with plastic or viscous flow finds its direction; none for other laws, and for the usual one.
+    pub return_map: Option<ReturnMap>,
 }
 
 impl Default for Case {
@@ -41,6 +45,7 @@ impl Default for Case {
             cfl_speed: CflSpeed::Bar,
             periods: 1.0,
             extent: None,
+            return_map: None,
         }
     }
 }
@@ -62,6 +67,10 @@ named! {
         PWave = "p-wave":
             "Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)";
     }
+    ReturnMap {
+        Exponential = "exponential": "The direction of flow at the end of a step: first order in time";
+        Midpoint = "midpoint": "The direction of flow at the middle of a step: second order in time";
+    }
     Extent {
         Quarter = "quarter":
             "The part between the planes of symmetry: a quarter of a ring, an eighth of a shell";
@@ -78,10 +87,24 @@ impl CflSpeed {
             Self::Bar => Ok(exact.wave_speed()),
             Self::PWave => {
                 let law = law::<f64, D>(exact.law())?;
-                Ok((law.p_wave_modulus() / exact.density()).sqrt())
+                Ok((p_wave_modulus(&law, exact) / exact.density()).sqrt())
             }
         }
     }
+}
+
+/// The modulus of P-waves in the body at rest; of a law that differs from place to place the largest one at sampled places.
+fn p_wave_modulus<const D: usize>(law: &Law<f64, D>, exact: &dyn Solution<f64, D>) -> f64
+where
+    f64: Precision<D>,
+{
+    const PLACES: usize = 64;
+    let Law::WithMemory(own) = law else { return law.p_wave_modulus() };
+    if own.elastic().is_some() {
+        return law.p_wave_modulus();
+    }
+    let places = (0..PLACES).filter_map(|n| points::interior(&exact.domain(), 1.0, n));
+    places.map(|(X, _)| law.with_variables(&own.initial(&X)).p_wave_modulus()).fold(0.0, f64::max)
 }
 
 /// A positive number rounded down to two digits.
@@ -179,14 +202,25 @@ impl Case {
     }
 }
 
-/// The solver's own law for a solution's.
-pub(crate) fn law<T: Real + Compiled<D>, const D: usize>(
+/// The solver's own law for a solution's, with the usual return map.
+pub(crate) fn law<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: usize>(
     law: mmsmith_runtime::Law<T>,
+) -> Result<Law<T, D>, SceneError> {
+    law_by(law, ReturnMap::default())
+}
+
+/// The solver's own law for a solution's.
+pub(crate) fn law_by<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: usize>(
+    law: mmsmith_runtime::Law<T>,
+    map: ReturnMap,
 ) -> Result<Law<T, D>, SceneError> {
     let material = match law {
         mmsmith_runtime::Law::Library(material) => material,
         mmsmith_runtime::Law::Stated(stated) => return stated_law::read(stated),
-        mmsmith_runtime::Law::WithMemory(_) => return Err(SceneError::WithMemory),
+        mmsmith_runtime::Law::WithMemory(law) => {
+            let elastic = law.elastic.row().name;
+            return with_memory(law, map).ok_or(SceneError::WithMemory { elastic });
+        }
     };
     let planted = Planted::here();
     if planted.is(Fault::LambdaForMu)

@@ -464,7 +464,8 @@ where
         };
         let rounding = f64::EPSILON * stiffness * (own.F.norm() + inverse) * inverse.max(1.0);
         let strain = own.P.amax().max(stiffness * own.H.amax());
-        if let Some(law) = law {
+        let here = law.and_then(|law| at_point(law, solution, X, *t));
+        if let Some(law) = &here {
             let expected = stress(law, &own.F);
             let difference = expected.map_or(f64::NAN, |expected| (own.P - expected).amax());
             P.add(at, difference, rounding, strain);
@@ -545,6 +546,32 @@ where
 {
     let at_small_strain = || law.stress_at_small_strain(&(F - SMatrix::identity()));
     law.first_piola_kirchhoff(F).or_else(|| is_of_small_strain(law).then(at_small_strain))
+}
+
+/// The law at a place and a time, with the exact internal variables there; `None` where they are not known.
+fn at_point<const D: usize>(
+    law: &Law<f64, D>,
+    solution: &dyn Solution<f64, D>,
+    X: &SVector<f64, D>,
+    t: f64,
+) -> Option<Law<f64, D>>
+where
+    f64: Precision<D>,
+{
+    let Law::WithMemory(own) = law else { return Some(law.clone()) };
+    let mut q = own.initial(X);
+    let exact = solution.internal(X, t);
+    let names = solution.internal_variables();
+    for (variable, q) in own.variables().iter().zip(&mut q) {
+        let place = names.iter().position(|name| *name == variable.name);
+        match (place, variable.name.as_str()) {
+            (Some(place), _) => *q = *exact.get(place)?,
+            (None, "(t)") => *q = t,
+            (None, name) if name.starts_with("(X") => {}
+            (None, _) => return None,
+        }
+    }
+    Some(law.with_variables(&q))
 }
 
 fn is_of_small_strain<const D: usize>(law: &Law<f64, D>) -> bool {

@@ -158,25 +158,37 @@ pub enum CheckpointError {
 }
 
 /// How far a run is, beside the solver's own state.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reached {
     pub(crate) step: u64,
     pub(crate) wall_s: f64,
     pub(crate) cpu_s: f64,
     pub(crate) errors: PerField<PerNorm<f64>>,
+    /// Of internal variables.
+    pub(crate) internal: Vec<(String, PerNorm<f64>)>,
 }
 
 impl Reached {
-    /// How many numbers it is: the step, two times, and three norms of four fields.
-    const NUMBERS: usize = 15;
+    /// How many numbers it is: the step, two times, three norms of four fields, and how many internal variables there are.
+    const NUMBERS: usize = 16;
 
     fn numbers(&self) -> Vec<u64> {
         let errors = self.errors.iter();
         let errors = errors.flat_map(|(_, norms)| norms.iter().map(|(_, e)| e.to_bits()));
-        [self.step, self.wall_s.to_bits(), self.cpu_s.to_bits()].into_iter().chain(errors).collect()
+        let times = [self.step, self.wall_s.to_bits(), self.cpu_s.to_bits()];
+        let count = [self.internal.len() as u64];
+        let internal = self.internal.iter().flat_map(|(name, norms)| {
+            let letters = name.bytes().map(u64::from);
+            let norms = norms.iter().map(|(_, e)| e.to_bits()).collect::<Vec<_>>();
+            [name.len() as u64].into_iter().chain(letters).chain(norms)
+        });
+        times.into_iter().chain(errors).chain(count).chain(internal).collect()
     }
 
-    fn from_numbers(numbers: &[u64]) -> Option<Self> {
+    /// From the first numbers, and what is left of them.
+    fn from_numbers(numbers: &[u64]) -> Option<(Self, &[u64])> {
+        let (numbers, mut left) = numbers.split_at_checked(Self::NUMBERS)?;
+        let (&count, numbers) = numbers.split_last()?;
         let (&[step, wall_s, cpu_s], errors) = numbers.split_first_chunk()?;
         let (norms, rest) = errors.as_chunks::<3>();
         let norm = |[linf, l2, l1]: [u64; 3]| {
@@ -186,7 +198,17 @@ impl Reached {
         let (&[u, v, F, P], []) = (norms, rest) else { return None };
         let errors = PerField { u: norm(u), v: norm(v), F: norm(F), P: norm(P) };
         let [wall_s, cpu_s] = [wall_s, cpu_s].map(f64::from_bits);
-        Some(Self { step, wall_s, cpu_s, errors })
+        let mut internal = Vec::new();
+        for _ in 0..count {
+            let (&length, rest) = left.split_first()?;
+            let (letters, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+            let (&norms, rest) = rest.split_first_chunk()?;
+            let letters = letters.iter().map(|&letter| u8::try_from(letter).ok());
+            let name = String::from_utf8(letters.collect::<Option<_>>()?).ok()?;
+            internal.push((name, norm(norms)));
+            left = rest;
+        }
+        Some((Self { step, wall_s, cpu_s, errors, internal }, left))
     }
 }
 
@@ -365,9 +387,8 @@ impl Checkpoints {
         if numbers.is_empty() {
             return Ok(None);
         }
-        let reached = numbers.split_at_checked(Reached::NUMBERS).and_then(|(reached, history)| {
-            Some((Reached::from_numbers(reached)?, history_of_numbers(history)?))
-        });
+        let reached = Reached::from_numbers(&numbers)
+            .and_then(|(reached, history)| Some((reached, history_of_numbers(history)?)));
         let (reached, history) =
             reached.ok_or_else(|| damaged(self.path(), "errors or moments are missing"))?;
         let own = (1..=others.len()).filter(|part| part % count == rank).try_for_each(|part| {
@@ -493,7 +514,8 @@ mod tests {
     fn reached() -> Reached {
         let norm = |x: f64| PerNorm { linf: x, l2: 0.1 * x, l1: -0.0 };
         let errors = PerField { u: norm(1.0), v: norm(2.0), F: norm(f64::NAN), P: norm(1e-300) };
-        Reached { step: 12, wall_s: 0.3, cpu_s: 0.4, errors }
+        let internal = vec![("alpha".to_owned(), norm(3.0)), ("q".to_owned(), norm(-0.5))];
+        Reached { step: 12, wall_s: 0.3, cpu_s: 0.4, errors, internal }
     }
 
     fn history(axes: usize) -> Vec<Moment> {

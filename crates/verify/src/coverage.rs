@@ -143,8 +143,9 @@ where
         return Err(SceneError::Unknown { what: "shape", value: format!("{domain:?}") }.into());
     }
     let exact = solution.law();
-    let without_pressure = law::<f64, D>(without_pressure(exact.clone())).ok();
-    let law = law::<f64, D>(exact).ok();
+    let elastic = |law: &mmsmith_mpm::Law<f64, D>| !matches!(law, mmsmith_mpm::Law::WithMemory(_));
+    let without_pressure = law::<f64, D>(without_pressure(exact.clone())).ok().filter(elastic);
+    let law = law::<f64, D>(exact).ok().filter(elastic);
     let density = solution.density();
     let mut squares = Squares::default();
     for n in 0..count {

@@ -68,6 +68,7 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
     {
         let OnGrid { exact, model, case, scene, .. } = on_grid;
         let (exact, model) = (*exact, *model);
+        prepare_until(exact, model, on_grid.end)?;
         let time_step: T = Real::nearest(time_step);
         let mut solver: Box<dyn Solver<T, D> + 'a> = match &case.scheme {
             Scheme::Updated(updated) => {
@@ -125,6 +126,16 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
         }
         Ok(Outcome::Done)
     }
+}
+
+/// Prepares the fields of solutions that follow from histories of particles, up to a time.
+pub(crate) fn prepare_until<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    end: f64,
+) -> Result<(), CaseError> {
+    exact.prepare_until(end).map_err(CaseError::History)?;
+    model.prepare_until(T::nearest(end)).map_err(CaseError::History)
 }
 
 /// Whether the particles of all processes make a [`Lattice`]; a call of all.

@@ -58,6 +58,9 @@ pub enum CaseError {
     /// A checkpoint could not be written or read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// The history of a material with memory cannot be followed along the exact motion.
+    #[error("the exact fields of the solution: {0}")]
+    History(String),
     /// Somebody [asked](crate::interrupt) for the end.
     #[error("interrupted after step {step}, t = {time:.6e}")]
     Interrupted {
@@ -130,11 +133,16 @@ pub enum SceneError {
          I1 and I2, or the solution in Cartesian coordinates (mms check, eval and gen serve it all the same)"
     )]
     CurvilinearComponents,
-    /// A law with internal variables.
+    /// An elastic law without memory of this kind.
     #[error(
-        "the solver has no law with these internal variables yet (mms check, eval and gen serve it all the same)"
+        "the solver has no memory of this kind for the law '{elastic}': flow is of law = 'hencky', Maxwell elements are of \
+         law = 'linear-elastic' and of laws with a volumetric part, 'yeoh', 'gent', 'arruda-boyce', 'ogden' and \
+         'holzapfel-gasser-ogden' (mms check, eval and gen serve it all the same)"
     )]
-    WithMemory,
+    WithMemory {
+        /// The name of the elastic law.
+        elastic: &'static str,
+    },
     /// A stated law that cannot be read.
     #[error("the law that the specification states: {0}")]
     StatedLaw(#[from] StatedLawError),

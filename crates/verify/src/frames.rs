@@ -200,10 +200,14 @@ fn frame<T: Precision<D>, const D: usize>(
     let mut error = Vec::with_capacity(count);
     let mut error_magnitude = Vec::with_capacity(count);
     let mut volume = Vec::with_capacity(count);
+    let variables = law.variables();
     for p in 0..count {
         let X = particles.X[p].map(Real::to_f64);
         let x = particles.x[p].map(Real::to_f64);
         let F = particles.F[p].map(Real::to_f64);
+        // As its internal variables are.
+        let q = &particles.internal[p * variables.len()..(p + 1) * variables.len()];
+        let law = &law.with_variables(q);
         let u = exact.displacement(&X, time);
         let delta = (x - X) - u;
         points.push(padded(&x));
@@ -226,8 +230,9 @@ fn frame<T: Precision<D>, const D: usize>(
         volume.push(F_3D.determinant() * particles.volume[p].to_f64());
     }
     let array = |name: &str, values| Array { name: name.into(), values };
-    let variables = law.variables();
-    let internal = variables.iter().enumerate().map(|(k, variable)| {
+    let is_written = |name: &str| !name.starts_with('(');
+    let written = variables.iter().enumerate().filter(|(_, own)| is_written(&own.name));
+    let internal = written.map(|(k, variable)| {
         let of_particles = particles.internal.iter().skip(k).step_by(variables.len());
         array(&variable.name, Values::Scalar(of_particles.map(|q| q.to_f64()).collect()))
     });

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use mmsmith_measure::norms::{PerField, PerNorm};
-use mmsmith_measure::{Comparison, Homes};
+use mmsmith_measure::{Comparison, Homes, each_group, norms_of};
 use mmsmith_mpm::{Arrangement, Solver};
 use mmsmith_ranks::Ranks;
-use mmsmith_runtime::Solution;
+use mmsmith_runtime::{Real, Solution};
 
 use crate::precision::Precision;
 
@@ -14,8 +14,35 @@ use crate::precision::Precision;
 pub(crate) struct Measurement<'a, const D: usize> {
     exact: &'a dyn Solution<f64, D>,
     comparison: Comparison<'a, D>,
+    /// Internal variables whose errors are measured.
+    internal: Vec<Compared>,
     /// Where several processes hold the particles.
     shared: Option<Shared>,
+}
+
+/// An internal variable that is compared with its exact values.
+struct Compared {
+    name: String,
+    /// Its place among the exact variables, and among those of the solver's law.
+    place: usize,
+    of_law: usize,
+}
+
+/// Particles in a group that one thread works on.
+const GROUP: usize = 256;
+
+/// The internal variables that tell of all: the plastic strain where there is one; of Maxwell elements a stress of the first; of a law that
+/// a specification states all.
+fn compared(exact: &[String], of_law: &[String]) -> Vec<Compared> {
+    let is_told = |name: &str| match exact.iter().any(|name| name == "alpha") {
+        true => name == "alpha",
+        false => !name.starts_with('Q') || name == "Q1_11" || !exact.contains(&"Q1_11".to_owned()),
+    };
+    let of = |(place, name): (usize, &String)| {
+        let of_law = of_law.iter().position(|own| own == name)?;
+        is_told(name).then(|| Compared { name: name.clone(), place, of_law })
+    };
+    exact.iter().enumerate().filter_map(of).collect()
 }
 
 /// The particles that one of several processes holds.
@@ -47,10 +74,13 @@ impl<'a, const D: usize> Measurement<'a, D> {
         solver: &mut (dyn Solver<T, D> + '_),
         ranks: Option<&Arc<dyn Ranks>>,
     ) -> Self {
-        let comparison = Comparison::new(exact, &solver.observe().0.X);
+        let (particles, law) = solver.observe();
+        let comparison = Comparison::new(exact, &particles.X);
+        let of_law: Vec<String> = law.variables().into_iter().map(|own| own.name).collect();
+        let internal = compared(&exact.internal_variables(), &of_law);
         let shared = ranks.zip(solver.arrangement());
         let shared = shared.map(|(ranks, found)| Shared::new(ranks.clone(), found));
-        Self { exact, comparison, shared }
+        Self { exact, comparison, internal, shared }
     }
 
     /// Takes note of particles that have moved from process to process.
@@ -80,6 +110,36 @@ impl<'a, const D: usize> Measurement<'a, D> {
             None => self.comparison.measure(solver.observe(), time, lag),
             Some(shared) => self.comparison.measure_all(&shared.homes, solver.observe(), time, lag),
         }
+    }
+
+    /// The errors of internal variables at `time`, by name; the same at all processes.
+    pub(crate) fn internal_errors<T: Precision<D>>(
+        &self,
+        solver: &mut (dyn Solver<T, D> + '_),
+        time: f64,
+    ) -> Vec<(String, PerNorm<f64>)> {
+        let Self { exact, internal, .. } = self;
+        if internal.is_empty() {
+            return Vec::new();
+        }
+        let (particles, law) = solver.observe();
+        let count = law.variables().len();
+        let group = |g: usize| {
+            let places = g * GROUP..particles.len().min((g + 1) * GROUP);
+            let of_particle = |p: usize| {
+                let exact = exact.internal(&particles.X[p].map(Real::to_f64), time);
+                let own = &particles.internal[p * count..];
+                let off = |of: &Compared| (own[of.of_law].to_f64() - exact[of.place]).abs();
+                internal.iter().map(off).collect::<Vec<f64>>()
+            };
+            places.map(of_particle).collect::<Vec<_>>()
+        };
+        let magnitudes = each_group(particles.len().div_ceil(GROUP), &group).concat();
+        let norms = |(k, of): (usize, &Compared)| {
+            let own: Vec<f64> = magnitudes.iter().map(|of_particle| of_particle[k]).collect();
+            (of.name.clone(), norms_of(self.homes(), &own))
+        };
+        internal.iter().enumerate().map(norms).collect()
     }
 
     /// The particle of largest position error at `time`.

@@ -7,7 +7,7 @@ use mmsmith_runtime::{Real, Solution};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{CflSpeed, law};
-use crate::drive::{Driven, Outcome, Stepped};
+use crate::drive::{Driven, Outcome, Stepped, prepare_until};
 use crate::error::CaseError;
 use crate::history::Totals;
 use crate::on_grid::{OnGrid, steps_to};
@@ -131,6 +131,7 @@ where
     let time_step = on_grid.waves.time_step(cfl);
     // In the solver's precision, which is what it steps with.
     let count = steps_to(end, <T as Real>::nearest(time_step).to_f64())?;
+    prepare_until(on_grid.exact, on_grid.model, end)?;
     let mut driven = Driven::set_up(on_grid, time_step, None)?;
     let &OnGrid { exact, ref scene, .. } = on_grid;
     Run { exact, scene, cfl, count, limits }.follow(&mut driven)

@@ -27,6 +27,9 @@ pub struct Record {
     pub timed_alone: bool,
     status: End,
     errors: Norms,
+    /// Of internal variables, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    internal: Vec<(String, PerNorm<Exact>)>,
 }
 
 /// A [`Temporal`] to be kept, as [`Record`] is.
@@ -64,6 +67,11 @@ impl From<&Row> for Record {
             timed_alone: row.timed_alone,
             status: (&row.status).into(),
             errors: row.errors.map(|norms| norms.map(|value| Exact(*value))),
+            internal: row
+                .internal
+                .iter()
+                .map(|(name, norms)| (name.clone(), norms.map(|value| Exact(*value))))
+                .collect(),
         }
     }
 }
@@ -83,6 +91,11 @@ impl From<Record> for Row {
             timed_alone: record.timed_alone,
             status: record.status.into(),
             errors: record.errors.map(|norms| norms.map(|value| value.0)),
+            internal: record
+                .internal
+                .into_iter()
+                .map(|(name, norms)| (name, norms.map(|value| value.0)))
+                .collect(),
         }
     }
 }
@@ -320,6 +333,7 @@ mod tests {
             timed_alone: false,
             status,
             errors: PerField { u: norms, v: norms, F: norms, P: norms },
+            internal: vec![("alpha".to_owned(), norms)],
         }
     }
 

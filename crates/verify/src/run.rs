@@ -1,5 +1,6 @@
 //! One run of a case, and the row of errors that comes out.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::{ControlFlow, Sub};
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
 use mmsmith_mpm::{Solver, StepError};
 use mmsmith_ranks::{Ranks, Sent, Traffic, counted};
 use mmsmith_runtime::Solution;
+use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 use crate::case::law;
@@ -215,7 +217,7 @@ impl Serialize for Status {
 }
 
 /// Results of one simulation.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Number of cells along the cell length.
     pub cells: usize,
@@ -237,16 +239,46 @@ pub struct Row {
     pub particle_steps_per_s: f64,
     /// Whether no other case of the same study ran beside it: where one did, its times are those of a shared machine.
     /// Written where it is false.
-    #[serde(skip_serializing_if = "is_true")]
     pub timed_alone: bool,
     /// How it ended.
     pub status: Status,
     /// The errors until then.
     pub errors: PerField<PerNorm<f64>>,
+    /// The errors of internal variables until then, by name; written among the others, as `internal`.
+    pub internal: Vec<(String, PerNorm<f64>)>,
 }
 
-fn is_true(value: &bool) -> bool {
-    *value
+/// The errors of a row as they are written.
+#[derive(Serialize)]
+struct Errors<'a> {
+    #[serde(flatten)]
+    fields: &'a PerField<PerNorm<f64>>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    internal: BTreeMap<&'a str, PerNorm<f64>>,
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { errors, internal, .. } = self;
+        let internal = internal.iter().map(|(name, norms)| (name.as_str(), *norms)).collect();
+        let mut row = serializer.serialize_struct("Row", 12)?;
+        row.serialize_field("cells", &self.cells)?;
+        row.serialize_field("h", &self.h)?;
+        row.serialize_field("dt", &self.dt)?;
+        row.serialize_field("cfl", &self.cfl)?;
+        row.serialize_field("steps", &self.steps)?;
+        row.serialize_field("particles", &self.particles)?;
+        row.serialize_field("wall_s", &self.wall_s)?;
+        row.serialize_field("cpu_s", &self.cpu_s)?;
+        row.serialize_field("particle_steps_per_s", &self.particle_steps_per_s)?;
+        match self.timed_alone {
+            true => row.skip_field("timed_alone")?,
+            false => row.serialize_field("timed_alone", &false)?,
+        }
+        row.serialize_field("status", &self.status)?;
+        row.serialize_field("errors", &Errors { fields: errors, internal })?;
+        row.end()
+    }
 }
 
 /// Steps a case to its end, and measures, writes and records on the way.
@@ -397,7 +429,13 @@ where
             lag,
             particles: measurement.count(solver),
             measurement,
-            reached: Reached { step: 0, wall_s: 0.0, cpu_s: 0.0, errors: PerField::default() },
+            reached: Reached {
+                step: 0,
+                wall_s: 0.0,
+                cpu_s: 0.0,
+                errors: PerField::default(),
+                internal: Vec::new(),
+            },
             progress: *progress,
             frames,
             snapshot: snapshot.as_deref_mut(),
@@ -432,6 +470,7 @@ where
         self.record(solver, (0, false), (0.0, velocity_time), at_start.u);
         // Before the first step no velocity is stored yet that belongs to a time of the scheme.
         self.reached.errors = PerField { v: PerNorm::default(), ..at_start };
+        self.reached.internal = self.measurement.internal_errors(solver, 0.0);
         Ok(())
     }
 
@@ -477,6 +516,10 @@ where
         let is_interrupted = self.measurement.any(is_interrupted);
         let measured = self.measurement.errors(solver, time, self.lag);
         self.reached.errors = PerField::combine(&self.reached.errors, &measured, PerNorm::larger);
+        let of_internal = self.measurement.internal_errors(solver, time);
+        for ((_, known), (_, measured)) in self.reached.internal.iter_mut().zip(&of_internal) {
+            *known = PerNorm::larger(known, measured);
+        }
         let error = measured.u.linf;
         let mut end = (error > scene.size || error.is_nan()).then(|| {
             let particle = self.measurement.worst_particle(solver, time);
@@ -504,7 +547,7 @@ where
 
     /// The row of the run, which has ended.
     fn row(&self, dt: f64, outcome: Outcome<Status>) -> Row {
-        let Reached { step, wall_s, cpu_s, errors } = self.reached;
+        let Reached { step, wall_s, cpu_s, errors, ref internal } = self.reached;
         let status = match outcome {
             Outcome::Done => Status::Ok,
             Outcome::Stopped(error) => Status::Stopped(error),
@@ -525,6 +568,7 @@ where
             timed_alone: true,
             status,
             errors,
+            internal: internal.clone(),
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Laws that specifications state, as the solver runs them.
 
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Law};
+use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Increment, InternalVariable, Law, LawWithMemory};
 use mmsmith_runtime::{Components, Real, Stated};
-use mmsmith_stated_law::{Compiled, StatedLaw};
-use nalgebra::SMatrix;
+use mmsmith_stated_law::{Compiled, StatedLaw, StatedMemory};
+use nalgebra::{SMatrix, SVector};
 
 use crate::error::SceneError;
 
@@ -16,12 +16,17 @@ use crate::error::SceneError;
 pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
     stated: Stated<T>,
 ) -> Result<Law<T, D>, SceneError> {
-    let Stated { response, components, constants, .. } = stated;
+    let has_memory = stated.has_memory();
+    let Stated { response, components, constants, given, internal } = stated;
     if components == Components::Curvilinear {
         return Err(SceneError::CurvilinearComponents);
     }
     let constants: Vec<(String, f64)> =
         constants.into_iter().map(|(name, value)| (name, value.to_f64())).collect();
+    if has_memory {
+        let law = StatedMemory::new(D, &response, &constants, &given, &internal)?;
+        return Ok(Law::with_memory(OfTextWithMemory { law, planted: Planted::here() }));
+    }
     let law = StatedLaw::new(D, &response, &constants)?;
     Ok(Law::from_constitutive(OfText { law, planted: Planted::here() }))
 }
@@ -35,16 +40,7 @@ struct OfText<T> {
 impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> {
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]) {
         T::stress_of_block(&self.law, F, P);
-        if self.planted.is(Fault::StatedFactor) {
-            for i in 0..D {
-                for j in (0..D).filter(|j| *j != i) {
-                    P[i][j].iter_mut().for_each(|shear| *shear *= T::nearest(0.5));
-                }
-            }
-        }
-        if self.planted.is(Fault::StatedSign) {
-            P[0][0].iter_mut().for_each(|normal| *normal = -*normal);
-        }
+        plant(self.planted, P);
     }
 
     fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
@@ -53,5 +49,59 @@ impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> 
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         T::across(&self.law, F)
+    }
+}
+
+/// The faults of stresses that are planted here.
+fn plant<T: Real, const D: usize>(planted: Planted, P: &mut [[[T; BLOCK]; D]; D]) {
+    if planted.is(Fault::StatedFactor) {
+        for i in 0..D {
+            for j in (0..D).filter(|j| *j != i) {
+                P[i][j].iter_mut().for_each(|shear| *shear *= T::nearest(0.5));
+            }
+        }
+    }
+    if planted.is(Fault::StatedSign) {
+        P[0][0].iter_mut().for_each(|normal| *normal = -*normal);
+    }
+}
+
+#[derive(Debug)]
+struct OfTextWithMemory<T> {
+    law: StatedMemory<T>,
+    planted: Planted,
+}
+
+impl<T: Real + Compiled<D>, const D: usize> LawWithMemory<T, D> for OfTextWithMemory<T> {
+    fn variables(&self) -> Vec<InternalVariable> {
+        let at_rest = self.law.initial(&SVector::<T, D>::zeros());
+        let of = |(name, at_rest): (&String, T)| InternalVariable {
+            name: name.clone(),
+            at_rest: at_rest.to_f64(),
+        };
+        self.law.columns().iter().zip(at_rest).map(of).collect()
+    }
+
+    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
+        self.law.initial(X)
+    }
+
+    fn start_at_rate(&self, rate: &SMatrix<T, D, D>, q: &mut [T]) {
+        self.law.start_at_rate(rate, q);
+    }
+
+    fn first_piola_kirchhoff(
+        &self,
+        F: &[[[T; BLOCK]; D]; D],
+        q: &[[T; BLOCK]],
+        P: &mut [[[T; BLOCK]; D]; D],
+    ) {
+        T::stress_with_memory(&self.law, F, q, P);
+        plant(self.planted, P);
+    }
+
+    fn evolve(&self, increment: &Increment<'_, T, D>, q: &mut [[T; BLOCK]]) {
+        let Increment { start, end, time } = *increment;
+        T::evolve(&self.law, start, end, time, q);
     }
 }

@@ -10,10 +10,11 @@ use mmsmith_runtime::{AnySolution, Condition, Domain, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use crate::case::{Case, CflSpeed, Extent, law, two_digits};
+use crate::case::{Case, CflSpeed, Extent, law_by, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::named::Named;
+use crate::points;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Total;
@@ -243,10 +244,16 @@ where
     f64: Precision<D>,
 {
     let Total { degree, mass, composition, .. } = *total;
+    // The mass matrix is a product over the axes.
+    let places = (0..64).filter_map(|n| points::interior(&scene.domain, 1.0, n));
+    if places.into_iter().any(|(X, _)| exact.density_at(&X) != exact.density()) {
+        let instead = "updated-lagrangian for a density that differs from place to place";
+        return Err(CaseError::setting("formulation", "total-lagrangian", instead));
+    }
     let set_up = SetUp {
         grid: total.grid(scene, case.per_cell)?,
         scheme: Scheme { degree, mass, composition },
-        law: law(exact.law())?,
+        law: law_by(exact.law(), case.return_map.unwrap_or_default())?,
         density: exact.density(),
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],

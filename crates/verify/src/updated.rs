@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
 use mmsmith_mpm::{
-    Annulus, Body, Integrator, Load, Mesh, Particles, Settings, Shape, Share, Solver,
+    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share, Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
-use crate::case::{Case, Extent, law};
+use crate::case::{Case, Extent, law_by};
 use crate::error::{CaseError, SceneError};
 use crate::precision::Precision;
 use crate::scene::Scene;
@@ -218,7 +218,10 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     if particles == 0 {
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
+    set_density(&mut body.particles, exact);
+    let law = law_by::<T, D>(model.law(), case.return_map.unwrap_or_default())?;
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
+    set_memory(&mut body.particles, exact, &law, time_step.to_f64());
     if let Some(Mesh { X, x, .. }) = &mut body.mesh {
         let grid = scene.grid::<T>();
         for (x, X) in x.iter_mut().zip(X) {
@@ -241,8 +244,41 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         halve_first_acceleration: updated.integrator == Integrator::Cd
             && updated.start == Start::Halved,
     };
-    let (grid, law) = (scene.grid(), law(model.law())?);
-    Ok(T::updated_lagrangian(grid, body, law, settings, share)?)
+    Ok(T::updated_lagrangian(scene.grid(), body, law, settings, share)?)
+}
+
+/// Gives particles of a body whose density differs from place to place their masses.
+fn set_density<T: Real, const D: usize>(
+    particles: &mut Particles<T, D>,
+    exact: &dyn Solution<f64, D>,
+) {
+    let uniform = exact.density();
+    let Particles { X, volume, mass, .. } = particles;
+    for ((X, volume), mass) in X.iter().zip(volume).zip(mass) {
+        let density = exact.density_at(&X.map(Real::to_f64));
+        if density != uniform {
+            *mass = *volume * T::nearest(density);
+        }
+    }
+}
+
+/// Gives particles the internal variables of time zero, with the rate of the deformation gradient then, by differences of second order.
+fn set_memory<T: Real, const D: usize>(
+    particles: &mut Particles<T, D>,
+    exact: &dyn Solution<f64, D>,
+    law: &Law<T, D>,
+    dt: f64,
+) {
+    let Law::WithMemory(law) = law else { return };
+    particles.internal = Vec::new();
+    for X in &particles.X {
+        let place = X.map(Real::to_f64);
+        let F = |t: f64| exact.deformation_gradient(&place, t);
+        let rate = (F(dt) * 4.0 - F(2.0 * dt) - F(0.0) * 3.0) / (2.0 * dt);
+        let mut q = law.initial(X);
+        law.start_at_rate(&rate.map(Real::nearest), &mut q);
+        particles.internal.extend(q);
+    }
 }
 
 /// Gives particles at rest the exact state at time zero, with the velocity that the integrator starts from.

@@ -13,6 +13,7 @@ mod new_solution;
 mod orders;
 mod planted_faults;
 mod planted_law_faults;
+mod planted_memory_faults;
 mod planted_solver_faults;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;

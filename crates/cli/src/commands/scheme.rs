@@ -91,6 +91,7 @@ impl Settled {
             cfl_speed: step.speed,
             periods: options.periods,
             extent: options.extent,
+            return_map: None,
         };
         let loaded = verify::loaded_instead(exact, &case);
         let mut settled = Self {

@@ -45,8 +45,7 @@ impl Yield {
     /// which is the allowed one, and an overstress where flow depends on its rate. Zero where the trial does not flow.
     pub(super) fn multiplier(&self, size: f64, alpha: f64, time: f64) -> f64 {
         let over = size - self.allowed(alpha);
-        // Where something is not a number, too.
-        if !(over > 0.0) {
+        if over <= 0.0 || over.is_nan() {
             return 0.0;
         }
         let stiffness = 2.0 * self.mu;

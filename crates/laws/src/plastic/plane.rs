@@ -8,6 +8,7 @@
 use mmsmith_scalar_functions::logarithm::ln_of_both_in_range;
 
 use super::multiplier::Yield;
+use crate::BLOCK;
 
 /// A tensor with the axis across among its principal ones: its entries 11, 22, 12 and 33.
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +38,6 @@ pub(super) struct Elastic {
 }
 
 impl Elastic {
-    /// Without deformation.
-    pub(super) const AT_REST: Self =
-        Self { deviator: [0.0; 2], root: 1.0, theta: 0.0, sinh: 0.0, mean: 0.0, across: 0.0 };
-
     #[inline(always)]
     pub(super) fn new(F: &F2, G: &Sym) -> Self {
         let [[f11, f12], [f21, f22]] = *F;
@@ -129,16 +126,98 @@ struct Direction {
     across: f64,
 }
 
+/// The hyperbolic sine, by its series up to one.
+#[inline(always)]
+fn sinh(x: f64) -> f64 {
+    if x.abs() > 1.0 {
+        return x.sinh();
+    }
+    /// `1/((2 k)(2 k + 1))` from the last term that counts to the first.
+    const QUOTIENTS: [f64; 8] = [
+        1.0 / (16.0 * 17.0),
+        1.0 / (14.0 * 15.0),
+        1.0 / (12.0 * 13.0),
+        1.0 / (10.0 * 11.0),
+        1.0 / (8.0 * 9.0),
+        1.0 / (6.0 * 7.0),
+        1.0 / (4.0 * 5.0),
+        1.0 / (2.0 * 3.0),
+    ];
+    let square = x * x;
+    x * QUOTIENTS.iter().fold(1.0, |sum, quotient| 1.0 + sum * (square * quotient))
+}
+
+/// The exponential of a number that is mostly small.
+#[inline(always)]
+fn exp(x: f64) -> f64 {
+    if x.abs() > 1.0 {
+        return x.exp();
+    }
+    let sinh = sinh(x);
+    sinh + (1.0 + sinh * sinh).sqrt()
+}
+
 /// `sinh(x)/y`, or `otherwise` where `y` is zero.
+#[inline(always)]
 fn sinh_over(x: f64, y: f64, otherwise: f64) -> f64 {
-    if y > 0.0 { x.sinh() / y } else { otherwise }
+    if y > 0.0 { sinh(x) / y } else { otherwise }
+}
+
+/// Elastic deformations side by side.
+pub(super) struct Elastics {
+    deviator: [[f64; BLOCK]; 2],
+    root: [f64; BLOCK],
+    theta: [f64; BLOCK],
+    sinh: [f64; BLOCK],
+    mean: [f64; BLOCK],
+    across: [f64; BLOCK],
+    pub(super) size: [f64; BLOCK],
+}
+
+impl Elastics {
+    const ROW: [f64; BLOCK] = [0.0; BLOCK];
+    /// Without deformation.
+    pub(super) const AT_REST: Self = Self {
+        deviator: [Self::ROW; 2],
+        root: [1.0; BLOCK],
+        theta: Self::ROW,
+        sinh: Self::ROW,
+        mean: Self::ROW,
+        across: Self::ROW,
+        size: Self::ROW,
+    };
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, n: usize, own: &Elastic) {
+        for (row, entry) in self.deviator.iter_mut().zip(own.deviator) {
+            row[n] = entry;
+        }
+        self.root[n] = own.root;
+        self.theta[n] = own.theta;
+        self.sinh[n] = own.sinh;
+        self.mean[n] = own.mean;
+        self.across[n] = own.across;
+        self.size[n] = own.size();
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, n: usize) -> Elastic {
+        Elastic {
+            deviator: [self.deviator[0][n], self.deviator[1][n]],
+            root: self.root[n],
+            theta: self.theta[n],
+            sinh: self.sinh[n],
+            mean: self.mean[n],
+            across: self.across[n],
+        }
+    }
 }
 
 /// `G` after a step that ends at `F` and leaves the share `kept` of the logarithm's deviator.
 pub(super) fn returned(F: &F2, G: &Sym, elastic: &Elastic, kept: f64) -> Sym {
     let &Elastic { theta, sinh, root, .. } = elastic;
     let across = (1.0 - kept) * elastic.deviator_across();
-    let growth = (0.5 * across).exp();
+    let growth = exp(0.5 * across);
     let of_G = growth * sinh_over(kept * theta, sinh, kept);
     let of_identity = growth * root * sinh_over((1.0 - kept) * theta, sinh, 1.0 - kept);
     // The inverse of C = F^T F.
@@ -184,12 +263,12 @@ pub(super) fn midpoint(
         0.5 * (A[0][0] * G.shear + A[0][1] * g22 + A[1][0] * g11 + A[1][1] * G.shear),
     ];
     let after = |D: f64| {
-        let (mean, x) = ((-2.0 * D * n.mean).exp(), 2.0 * D * n.size);
+        let (mean, x) = (exp(-2.0 * D * n.mean), 2.0 * D * n.size);
         let (of_G, of_A) = (mean * x.cosh(), mean * sinh_over(x, n.size, 2.0 * D));
         Sym {
             a: [of_G * g11 - of_A * AG[0], of_G * g22 - of_A * AG[1]],
             shear: of_G * G.shear - of_A * AG[2],
-            across: G.across * (-2.0 * D * n.across).exp(),
+            across: G.across * exp(-2.0 * D * n.across),
         }
     };
     let D = if law.flow.overstress.is_some() {

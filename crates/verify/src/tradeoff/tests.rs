@@ -65,6 +65,7 @@ impl Formula {
             timed_alone: true,
             status: if is_unstable { unstable } else { Status::Ok },
             errors: PerField { u: norms, v: norms, F: norms, P: norms },
+            internal: Vec::new(),
         }
     }
 

@@ -4,5 +4,6 @@ mod check;
 mod extremes;
 mod hand_coded;
 mod history;
+mod memory;
 mod ranks;
 mod run;

@@ -151,7 +151,8 @@ fn draw(options: &StabilityOptions, common: &Problem, sample: usize) -> Result<P
 
 /// The command line that repeats a setting.
 fn command(options: &StabilityOptions, problem: &Problem) -> String {
-    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent } = problem.settled.case;
+    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent, return_map } =
+        problem.settled.case;
     let mut text = format!(
         "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --periods {periods:?} --precision {} --error-multiple {:?} \
          --energy-rate {:?}",
@@ -168,6 +169,9 @@ fn command(options: &StabilityOptions, problem: &Problem) -> String {
     }
     if let Some(extent) = extent {
         text += &format!(" --extent {}", extent.name());
+    }
+    if let Some(map) = return_map {
+        text += &format!(" --return-map {}", map.name());
     }
     for (name, value) in problem.selection.parameters() {
         text += &format!(" --set {name}={value:?}");

@@ -1,0 +1,420 @@
+//! Runs of laws with memory against closed forms, in both formulations: a law of a user's own, stated in text with an internal variable,
+//! a given field or a rate; plastic flow; masses that differ from place to place.
+
+use mmsmith_ranks::in_process;
+use mmsmith_solutions::{
+    AnySolution, Boundary, Condition, Domain, Fields, Law, Material, Solution, Surface,
+};
+use mmsmith_solutions::{Components, Flow, Internal, Memory, Response, Stated, WithMemory};
+use mmsmith_verify::{
+    Arithmetic, Case, CflSpeed, Composition, Layout, MassMatrix, Outputs, ReturnMap, Row, Scheme,
+    Status, Sweep, Total, Transfer, Updated, check, converge, run,
+};
+use nalgebra::{SMatrix, Vector1};
+use std::f64::consts::PI;
+
+type X1 = Vector1<f64>;
+
+/// A solution on a line.
+trait Line: Send + Sync + 'static {
+    /// Displacement, velocity, acceleration.
+    fn motion(&self, X: f64, t: f64) -> [f64; 3];
+    fn gradient(&self, X: f64, t: f64) -> f64;
+    /// The stress and its slope.
+    fn stress(&self, X: f64, t: f64) -> [f64; 2];
+    fn law(&self) -> Law<f64>;
+    fn internal(&self, X: f64, t: f64) -> Vec<(&'static str, f64)>;
+    fn condition(&self) -> Condition;
+    fn density(&self, _X: f64) -> f64 {
+        1.0
+    }
+}
+
+struct OnLine<S> {
+    own: S,
+    boundaries: [Boundary; 2],
+}
+
+fn on_line<S: Line>(own: S) -> AnySolution<f64> {
+    let condition = own.condition();
+    let boundaries =
+        [Surface::Lower(0), Surface::Upper(0)].map(|surface| Boundary { surface, condition });
+    AnySolution::One(Box::new(OnLine { own, boundaries }))
+}
+
+impl<S: Line> Solution<f64, 1> for OnLine<S> {
+    fn displacement(&self, X: &X1, t: f64) -> X1 {
+        Vector1::new(self.own.motion(X[0], t)[0])
+    }
+    fn velocity(&self, X: &X1, t: f64) -> X1 {
+        Vector1::new(self.own.motion(X[0], t)[1])
+    }
+    fn acceleration(&self, X: &X1, t: f64) -> X1 {
+        Vector1::new(self.own.motion(X[0], t)[2])
+    }
+    fn displacement_gradient(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
+        Vector1::new(self.own.gradient(X[0], t))
+    }
+    fn deformation_gradient(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
+        Vector1::new(1.0 + self.own.gradient(X[0], t))
+    }
+    fn jacobian(&self, X: &X1, t: f64) -> f64 {
+        1.0 + self.own.gradient(X[0], t)
+    }
+    fn first_piola_kirchhoff(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
+        Vector1::new(self.own.stress(X[0], t)[0])
+    }
+    fn body_force(&self, X: &X1, t: f64) -> X1 {
+        let [.., a] = self.own.motion(X[0], t);
+        Vector1::new(a - self.own.stress(X[0], t)[1] / self.own.density(X[0]))
+    }
+    fn fields(&self, X: &X1, t: f64) -> Fields<f64, 1> {
+        Fields {
+            u: self.displacement(X, t),
+            v: self.velocity(X, t),
+            a: self.acceleration(X, t),
+            H: self.displacement_gradient(X, t),
+            F: self.deformation_gradient(X, t),
+            J: self.jacobian(X, t),
+            P: self.first_piola_kirchhoff(X, t),
+            b: self.body_force(X, t),
+        }
+    }
+    fn domain(&self) -> Domain<f64, 1> {
+        Domain::Box { lower: Vector1::new(0.0), upper: Vector1::new(1.0) }
+    }
+    fn boundaries(&self) -> &[Boundary] {
+        &self.boundaries
+    }
+    fn cell_length(&self) -> f64 {
+        1.0
+    }
+    fn law(&self) -> Law<f64> {
+        self.own.law()
+    }
+    fn density(&self) -> f64 {
+        self.own.density(0.5)
+    }
+    fn density_at(&self, X: &X1) -> f64 {
+        self.own.density(X[0])
+    }
+    fn internal_variables(&self) -> Vec<String> {
+        self.own.internal(0.5, 0.0).iter().map(|(name, _)| (*name).to_owned()).collect()
+    }
+    fn internal(&self, X: &X1, t: f64) -> Vec<f64> {
+        self.own.internal(X[0], t).iter().map(|(_, value)| *value).collect()
+    }
+    fn wave_speed(&self) -> f64 {
+        1.5
+    }
+    fn period(&self) -> f64 {
+        1.0
+    }
+}
+
+const AMPLITUDE: f64 = 0.02;
+const FREQUENCY: f64 = 2.0;
+
+/// `A sin(Pi X) sin(w t)` with its rates.
+fn standing_wave(X: f64, t: f64) -> [f64; 3] {
+    let (sin, cos) = (FREQUENCY * t).sin_cos();
+    let shape = AMPLITUDE * (PI * X).sin();
+    [shape * sin, FREQUENCY * shape * cos, -FREQUENCY * FREQUENCY * shape * sin]
+}
+
+/// The slope of the shape, and its slope.
+fn slopes(X: f64) -> [f64; 2] {
+    let (sin, cos) = (PI * X).sin_cos();
+    [AMPLITUDE * PI * cos, -AMPLITUDE * PI * PI * sin]
+}
+
+fn stated(stress: &str, constants: &[(&str, f64)], given: &[(&str, &str)]) -> Stated<f64> {
+    let owned = |&(name, text): &(&str, &str)| (name.to_owned(), text.to_owned());
+    Stated {
+        response: Response::Stress(vec![vec![stress.to_owned()]]),
+        components: Components::Cartesian,
+        constants: constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
+        given: given.iter().map(owned).collect(),
+        internal: Vec::new(),
+    }
+}
+
+/// Springs beside each other, one of them behind a dashpot, the other with a stiffness that a given field of position and time states.
+struct Springs;
+
+impl Springs {
+    const TIME: f64 = 0.3;
+
+    /// The factor of `q` in time.
+    fn memory(t: f64) -> f64 {
+        let (w, tau) = (FREQUENCY, Self::TIME);
+        ((w * t).sin() - w * tau * (w * t).cos() + w * tau * (-t / tau).exp())
+            / (1.0 + w * w * tau * tau)
+    }
+}
+
+impl Line for Springs {
+    fn motion(&self, X: f64, t: f64) -> [f64; 3] {
+        standing_wave(X, t)
+    }
+    fn gradient(&self, X: f64, t: f64) -> f64 {
+        slopes(X)[0] * (FREQUENCY * t).sin()
+    }
+    fn stress(&self, X: f64, t: f64) -> [f64; 2] {
+        let (in_time, stiff) = ((FREQUENCY * t).sin(), 1.0 + 0.5 * X * t);
+        let behind = 0.8 * (in_time - Self::memory(t));
+        let [slope, curvature] = slopes(X);
+        let factor = stiff * in_time + behind;
+        [factor * slope, factor * curvature + 0.5 * t * in_time * slope]
+    }
+    fn law(&self) -> Law<f64> {
+        let stress = "stiff*(F11 - 1) + g*(F11 - 1 - q)";
+        let constants = [("k", 1.0), ("g", 0.8), ("tau", Self::TIME)];
+        let mut law = stated(stress, &constants, &[("slope", "t/2"), ("stiff", "k*(1 + slope*X)")]);
+        law.internal = vec![Internal {
+            name: "q".into(),
+            rate: "(F11 - 1 - q)/tau".into(),
+            initial: "0*X".into(),
+        }];
+        Law::Stated(law)
+    }
+    fn internal(&self, X: f64, t: f64) -> Vec<(&'static str, f64)> {
+        vec![("q", slopes(X)[0] * Self::memory(t))]
+    }
+    fn condition(&self) -> Condition {
+        Condition::Sliding
+    }
+}
+
+/// A spring beside a dashpot, `P = k (F - 1) + eta F'`.
+struct KelvinVoigt;
+
+impl Line for KelvinVoigt {
+    fn motion(&self, X: f64, t: f64) -> [f64; 3] {
+        standing_wave(X, t)
+    }
+    fn gradient(&self, X: f64, t: f64) -> f64 {
+        slopes(X)[0] * (FREQUENCY * t).sin()
+    }
+    fn stress(&self, X: f64, t: f64) -> [f64; 2] {
+        let (sin, cos) = (FREQUENCY * t).sin_cos();
+        slopes(X).map(|slope| (sin + 0.01 * FREQUENCY * cos) * slope)
+    }
+    fn law(&self) -> Law<f64> {
+        Law::Stated(stated("k*(F11 - 1) + eta*Jdot", &[("k", 1.0), ("eta", 0.01)], &[]))
+    }
+    fn internal(&self, _: f64, _: f64) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+    fn condition(&self) -> Condition {
+        Condition::Sliding
+    }
+}
+
+/// A neo-Hookean bar whose density grows along it.
+struct Heavy;
+
+impl Line for Heavy {
+    fn motion(&self, X: f64, t: f64) -> [f64; 3] {
+        standing_wave(X, t)
+    }
+    fn gradient(&self, X: f64, t: f64) -> f64 {
+        slopes(X)[0] * (FREQUENCY * t).sin()
+    }
+    fn stress(&self, X: f64, t: f64) -> [f64; 2] {
+        let sin = (FREQUENCY * t).sin();
+        let [slope, curvature] = slopes(X).map(|slope| slope * sin);
+        let F = 1.0 + slope;
+        [F - 1.0 / F, curvature * (1.0 + 1.0 / (F * F))]
+    }
+    fn law(&self) -> Law<f64> {
+        Law::Library(Material::NeoHookean { lambda: 0.0, mu: 1.0 })
+    }
+    fn internal(&self, _: f64, _: f64) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+    fn condition(&self) -> Condition {
+        Condition::Sliding
+    }
+    fn density(&self, X: f64) -> f64 {
+        1.0 + 0.5 * X
+    }
+}
+
+/// A bar that flows from the start: `alpha = 2 mu ln F / (3 mu + H)`, as the elastic stretch at the start is along the bar.
+struct PlasticBar;
+
+impl PlasticBar {
+    const LAMBDA: f64 = 1.2;
+    const MU: f64 = 0.8;
+    const YIELD: f64 = 0.02;
+    const MODULUS: f64 = 0.3;
+
+    fn alpha(F: f64) -> f64 {
+        2.0 * Self::MU * F.ln() / (3.0 * Self::MU + Self::MODULUS)
+    }
+
+    /// `u = r(t) (X + X^2/2)`.
+    fn ramp(t: f64) -> [f64; 3] {
+        [0.05 * (t + t * t), 0.05 * (1.0 + 2.0 * t), 0.1]
+    }
+}
+
+impl Line for PlasticBar {
+    fn motion(&self, X: f64, t: f64) -> [f64; 3] {
+        Self::ramp(t).map(|r| r * (X + 0.5 * X * X))
+    }
+    fn gradient(&self, X: f64, t: f64) -> f64 {
+        Self::ramp(t)[0] * (1.0 + X)
+    }
+    fn stress(&self, X: f64, t: f64) -> [f64; 2] {
+        let F = 1.0 + self.gradient(X, t);
+        let slope = Self::ramp(t)[0];
+        let (lambda, mu) = (Self::LAMBDA, Self::MU);
+        let of_logarithm = lambda + 2.0 * mu - 4.0 * mu * mu / (3.0 * mu + Self::MODULUS);
+        let tau = of_logarithm * F.ln() + 2.0 / 3.0 * Self::YIELD;
+        [tau / F, slope * (of_logarithm - tau) / (F * F)]
+    }
+    fn law(&self) -> Law<f64> {
+        let flow = Flow {
+            yield_stress: Self::YIELD,
+            modulus: Self::MODULUS,
+            exponent: 1.0,
+            overstress: None,
+            is_on_yield: true,
+        };
+        let elastic = Material::Hencky { lambda: Self::LAMBDA, mu: Self::MU };
+        Law::WithMemory(WithMemory { elastic, memory: Memory::Flow(flow) })
+    }
+    fn internal(&self, X: f64, t: f64) -> Vec<(&'static str, f64)> {
+        let (F, e0) = (1.0 + self.gradient(X, t), Self::YIELD / (3.0 * Self::MU));
+        let alpha = Self::alpha(F);
+        let along = (2.0 * (e0 - alpha)).exp();
+        let across = (alpha - e0).exp();
+        vec![
+            ("G11", along),
+            ("G22", across),
+            ("G33", across),
+            ("G12", 0.0),
+            ("G13", 0.0),
+            ("G23", 0.0),
+            ("alpha", alpha),
+        ]
+    }
+    fn condition(&self) -> Condition {
+        Condition::PrescribedMotion
+    }
+}
+
+fn total(degree: usize) -> Scheme {
+    Scheme::Total(Total {
+        degree,
+        mass: MassMatrix::Consistent,
+        composition: Composition::Order2,
+        layout: Layout::Gauss,
+        ..Total::of_degree(degree)
+    })
+}
+
+fn study(solution: &AnySolution<f64>, case: &Case, cells: &[usize]) -> Vec<Row> {
+    let sweep = Sweep::Cells(cells.to_vec());
+    let rows = converge(solution, Arithmetic::Double, case, &sweep, &mut |_| ())
+        .expect("cases that can be run")
+        .rows;
+    for row in &rows {
+        assert_eq!(row.status, Status::Ok, "{row:?}");
+    }
+    rows
+}
+
+/// The orders of the largest errors of u, P and internal variables on the last two grids.
+fn orders(rows: &[Row]) -> Vec<f64> {
+    let [.., coarse, fine] = rows else { panic!("two rows") };
+    let order = |a: f64, b: f64| (a / b).log2();
+    let internal = coarse.internal.iter().zip(&fine.internal);
+    let internal = internal.map(|((_, a), (_, b))| order(a.l2, b.l2));
+    let fields =
+        [order(coarse.errors.u.l2, fine.errors.u.l2), order(coarse.errors.P.l2, fine.errors.P.l2)];
+    fields.into_iter().chain(internal).collect()
+}
+
+#[test]
+fn a_law_of_a_user_with_an_internal_variable_and_a_given_field_runs_without_code() {
+    let solution = on_line(Springs);
+    let found = check(&solution, 200).expect("a solution that can be checked");
+    assert!(found.passed(), "{found:?}");
+    for scheme in [Scheme::Updated(Updated::default()), total(2)] {
+        let case = Case { scheme, cfl: 0.3, ..Case::default() };
+        let rows = study(&solution, &case, &[16, 32]);
+        assert_eq!(rows[0].internal[0].0, "q");
+        let found = orders(&rows);
+        assert!(found.iter().all(|order| *order > 1.85), "{scheme:?}: {found:?} {rows:?}");
+        let written = serde_json::to_value(&rows[0]).expect("JSON");
+        assert_eq!(written["errors"]["internal"]["q"]["l2"], rows[0].internal[0].1.l2);
+        assert_eq!(written["errors"]["u"]["l2"], rows[0].errors.u.l2);
+    }
+}
+
+#[test]
+fn a_stress_of_the_rate_of_deformation_has_second_order() {
+    let solution = on_line(KelvinVoigt);
+    for scheme in [Scheme::Updated(Updated::default()), total(2)] {
+        let case = Case { scheme, cfl: 0.3, ..Case::default() };
+        let rows = study(&solution, &case, &[16, 32]);
+        let found = orders(&rows);
+        assert!(found.iter().all(|order| *order > 1.85), "{scheme:?}: {found:?} {rows:?}");
+        assert!(rows[0].internal.is_empty());
+        let written = serde_json::to_value(&rows[0]).expect("JSON");
+        assert!(written["errors"].get("internal").is_none());
+    }
+}
+
+#[test]
+fn a_density_that_grows_along_a_bar_has_second_order() {
+    let solution = on_line(Heavy);
+    let case = Case { cfl: 0.3, ..Case::default() };
+    let found = orders(&study(&solution, &case, &[16, 32]));
+    assert!(found.iter().all(|order| *order > 1.85), "{found:?}");
+    let case = Case { scheme: total(2), ..case };
+    let progress = &mut |_| ();
+    let refused = run(&solution, Arithmetic::Double, &case, &mut Outputs::new(progress));
+    let message = refused.unwrap_err().to_string();
+    assert!(message.contains("updated-lagrangian for a density"), "{message}");
+}
+
+#[test]
+fn plastic_flow_in_a_bar_has_the_orders_of_splines() {
+    let solution = on_line(PlasticBar);
+    let found = check(&solution, 200).expect("a solution that can be checked");
+    assert!(found.passed(), "{found:?}");
+    for map in [None, Some(ReturnMap::Midpoint)] {
+        let case = Case { scheme: total(2), cfl: 0.3, return_map: map, ..Case::default() };
+        let rows = study(&solution, &case, &[16, 32, 64]);
+        assert_eq!(rows[0].internal.len(), 1);
+        assert_eq!(rows[0].internal[0].0, "alpha");
+        let found = orders(&rows);
+        assert!(found.iter().all(|order| (order - 2.0).abs() < 0.1), "{map:?}: {found:?}");
+    }
+}
+
+#[test]
+fn several_processes_measure_internal_variables_to_the_bit() {
+    let case = Case {
+        scheme: Scheme::Updated(Updated { transfer: Transfer::Apic, ..Updated::default() }),
+        cells: 64,
+        cfl_speed: CflSpeed::PWave,
+        periods: 0.2,
+        ..Case::default()
+    };
+    let timeless = |row: Row| Row { wall_s: 0.0, cpu_s: 0.0, particle_steps_per_s: 0.0, ..row };
+    let measured = |ranks| {
+        let progress = &mut |_| ();
+        let mut outputs = Outputs { ranks, ..Outputs::new(progress) };
+        timeless(run(&on_line(Springs), Arithmetic::Double, &case, &mut outputs).expect("a case"))
+    };
+    let alone = measured(None);
+    assert!(alone.internal[0].1.l2 > 0.0);
+    for row in in_process(2, |ranks| measured(Some(ranks))) {
+        assert_eq!(row, alone);
+    }
+}

@@ -1,0 +1,107 @@
+//! Faults planted in laws with memory, one at a time: histories along a motion, which share no formula with the solver's laws, must catch
+//! each of them at a material point.
+
+#![allow(clippy::unwrap_used)]
+
+use mmsmith_history::{
+    Dual, Hardening, J2, Kinematics, LawWithHistory, Maxwell, Trajectory, Viscoelastic, divergence,
+};
+use mmsmith_laws::{
+    BLOCK, Element, Flow, Increment, Law, Material, Memory, ReturnMap, Volumetric, WithMemory,
+    with_memory,
+};
+use mmsmith_mpm::fault::{self, Fault};
+use nalgebra::Matrix3;
+
+const LAMBDA: f64 = 5769.0;
+const MU: f64 = 3846.0;
+const STEPS: usize = 200;
+
+/// A shear and a stretch in the plane.
+fn motion(t: f64) -> Kinematics<Dual<f64, 1>> {
+    let along = Matrix3::new(0.05, 0.06, 0.0, 0.02, -0.04, 0.0, 0.0, 0.0, 0.0);
+    let of = |A: Matrix3<f64>| -> [[Dual<f64, 1>; 3]; 3] {
+        std::array::from_fn(|i| std::array::from_fn(|j| Dual { value: A[(i, j)], slopes: [0.0] }))
+    };
+    let (r, rate) = (t + 0.4 * t * t, 1.0 + 0.8 * t);
+    Kinematics { F: of(Matrix3::identity() + along * r), rate: of(along * rate) }
+}
+
+/// The exact stress at time one.
+fn exact(law: &impl LawWithHistory, start: &[f64]) -> [f64; 4] {
+    let found = Trajectory::new(law, &motion, start, &[1.0], 1e-12).unwrap();
+    let (_, P) = divergence(law, &motion(1.0), &found.states[0]);
+    [P[0][0], P[0][1], P[1][0], P[1][1]]
+}
+
+/// The error of the solver's stress, in the largest of the exact one.
+fn error(law: WithMemory<f64>, exact: [f64; 4]) -> f64 {
+    let Law::WithMemory(law) = with_memory::<f64, 2>(law, ReturnMap::Midpoint).unwrap() else {
+        panic!("no memory")
+    };
+    let F = |t: f64| {
+        let at = motion(t);
+        [0, 1].map(|i| [0, 1].map(|j| [at.F[i][j].value; BLOCK]))
+    };
+    let mut q: Vec<[f64; BLOCK]> = law.variables().iter().map(|q| [q.at_rest; BLOCK]).collect();
+    for step in 0..STEPS {
+        let [start, end] = [step, step + 1].map(|k| F(k as f64 / STEPS as f64));
+        let increment = Increment { start: &start, end: &end, time: 1.0 / STEPS as f64 };
+        law.evolve(&increment, &mut q);
+    }
+    let mut P = [[[0.0; BLOCK]; 2]; 2];
+    law.first_piola_kirchhoff(&F(1.0), &q, &mut P);
+    let found = [P[0][0][0], P[0][1][0], P[1][0][0], P[1][1][0]];
+    let size = exact.iter().fold(0.0_f64, |most, P| most.max(P.abs()));
+    found.iter().zip(exact).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
+}
+
+/// Each fault is caught where the sound law passes.
+fn all_are_caught(faults: &[Fault], law: &WithMemory<f64>, exact: [f64; 4]) {
+    let sound = error(law.clone(), exact);
+    assert!(sound < 1e-5, "{law:?}: {sound:e}");
+    for &fault in faults {
+        let found = fault::with(fault, || error(law.clone(), exact));
+        assert!(found > 1e-3, "{fault:?} is not caught: {found:e} beside {sound:e}");
+    }
+}
+
+#[test]
+fn faults_of_plastic_flow_are_caught() {
+    let (yield_stress, modulus, exponent) = (50.0, 500.0, 1.0);
+    let flow = Flow { yield_stress, modulus, exponent, overstress: None, is_on_yield: false };
+    let law = WithMemory {
+        elastic: Material::Hencky { lambda: LAMBDA, mu: MU },
+        memory: Memory::Flow(flow),
+    };
+    let hardening = Hardening { yield_stress, modulus, exponent };
+    let exact_law = J2 { lambda: LAMBDA, mu: MU, hardening, overstress: None };
+    let start = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+    let faults = [
+        Fault::YieldRootDropped,
+        Fault::HardeningSign,
+        Fault::PlasticStrainStays,
+        Fault::AcrossDropped,
+        Fault::ElasticPartAlone,
+    ];
+    all_are_caught(&faults, &law, exact(&exact_law, &start));
+}
+
+#[test]
+fn faults_of_maxwell_elements_are_caught() {
+    let (share, time) = (0.4, 0.5);
+    let law = WithMemory {
+        elastic: Material::Yeoh {
+            c1: 0.5 * MU,
+            c2: 0.0,
+            c3: 0.0,
+            kappa: LAMBDA,
+            volumetric: Volumetric::Logarithmic,
+        },
+        memory: Memory::Maxwell(vec![Element { share, time }]),
+    };
+    let exact_law =
+        Viscoelastic { lambda: LAMBDA, mu: MU, elements: vec![Maxwell { share, time }] };
+    let faults = [Fault::RelaxationTime, Fault::ShareDropped, Fault::ElasticPartAlone];
+    all_are_caught(&faults, &law, exact(&exact_law, &[0.0; 6]));
+}
