@@ -68,7 +68,6 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
     {
         let OnGrid { exact, model, case, scene, .. } = on_grid;
         let (exact, model) = (*exact, *model);
-        prepare_until(exact, model, on_grid.end)?;
         let time_step: T = Real::nearest(time_step);
         let mut solver: Box<dyn Solver<T, D> + 'a> = match &case.scheme {
             Scheme::Updated(updated) => {
@@ -134,8 +133,9 @@ pub(crate) fn prepare_until<T: Real, const D: usize>(
     model: &dyn Solution<T, D>,
     end: f64,
 ) -> Result<(), CaseError> {
-    exact.prepare_until(end).map_err(CaseError::History)?;
-    model.prepare_until(T::nearest(end)).map_err(CaseError::History)
+    let history = |reason| CaseError::History { reason };
+    exact.prepare_until(end).map_err(history)?;
+    model.prepare_until(T::nearest(end)).map_err(history)
 }
 
 /// Whether the particles of all processes make a [`Lattice`]; a call of all.

@@ -58,9 +58,6 @@ pub enum CaseError {
     /// A checkpoint could not be written or read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The history of a material with memory cannot be followed along the exact motion.
-    #[error("the exact fields of the solution: {0}")]
-    History(String),
     /// Somebody [asked](crate::interrupt) for the end.
     #[error("interrupted after step {step}, t = {time:.6e}")]
     Interrupted {

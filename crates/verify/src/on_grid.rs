@@ -4,6 +4,7 @@ use mmsmith_measure::norms::PerField;
 use mmsmith_runtime::Solution;
 
 use crate::case::{Case, CflSpeed, Extent, law};
+use crate::drive::prepare_until;
 use crate::error::{CaseError, MOST_STEPS};
 use crate::precision::Precision;
 use crate::scene::Scene;
@@ -65,9 +66,7 @@ where
         let scene = Scene::new(exact, case, end)?;
         let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
         let steps = Steps::new(case.cfl, end, waves)?;
-        let history = |reason| CaseError::History { reason };
-        exact.prepare_until(end).map_err(history)?;
-        model.prepare_until(T::nearest(end)).map_err(history)?;
+        prepare_until(exact, model, end)?;
         if let Scheme::Updated(updated) = &case.scheme {
             updated::admit(&scene, updated)?;
         }
