@@ -24,6 +24,7 @@ mod function;
 mod law;
 mod maxwell;
 mod number;
+mod sampled;
 mod stated;
 mod table;
 mod tensor;

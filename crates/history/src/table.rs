@@ -26,41 +26,46 @@ pub struct Grid<const D: usize> {
 }
 
 /// Roots of the Chebyshev polynomial of degree `n`, ascending, from -1 to 1.
-fn roots(n: usize) -> Vec<f64> {
+pub(crate) fn roots(n: usize) -> Vec<f64> {
     (0..n).map(|k| -(PI * (k as f64 + 0.5) / n as f64).cos()).collect()
 }
 
 /// The Chebyshev polynomials at a place between -1 and 1.
 fn polynomials(x: f64, n: usize) -> Vec<f64> {
-    let mut values = vec![1.0; n];
-    if n > 1 {
-        values[1] = x;
-    }
-    for k in 2..n {
-        values[k] = 2.0 * x * values[k - 1] - values[k - 2];
-    }
+    let mut values = vec![0.0; n];
+    polynomials_into(x, &mut values);
     values
 }
 
+/// As [`polynomials`], as many as there is room for.
+pub(crate) fn polynomials_into(x: f64, values: &mut [f64]) {
+    let (mut last, mut next) = (1.0, x);
+    for value in values {
+        *value = last;
+        (last, next) = (next, 2.0 * x * next - last);
+    }
+}
+
 /// From values at the roots to coefficients.
-struct Transform {
+pub(crate) struct Transform {
     n: usize,
     /// Row by row.
     matrix: Vec<f64>,
 }
 
 impl Transform {
-    fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         let entry = |k: usize, j: usize| {
-            // The roots ascend, their angles descend.
-            let angle = PI * k as f64 * ((n - 1 - j) as f64 + 0.5) / n as f64;
+            // The roots ascend, their angles descend. Whole turns are left out before there is any rounding.
+            let quarters = k * (2 * (n - 1 - j) + 1) % (4 * n);
+            let angle = PI * quarters as f64 / (2 * n) as f64;
             angle.cos() * if k == 0 { 1.0 } else { 2.0 } / n as f64
         };
         let matrix = (0..n * n).map(|place| entry(place / n, place % n)).collect();
         Self { n, matrix }
     }
 
-    fn coefficients(&self, values: &[f64]) -> impl Iterator<Item = f64> {
+    pub(crate) fn coefficients(&self, values: &[f64]) -> impl Iterator<Item = f64> {
         self.matrix
             .chunks_exact(self.n)
             .map(move |row| row.iter().zip(values).map(|(weight, value)| weight * value).sum())
@@ -481,7 +486,7 @@ fn in_time<const D: usize, E: Send>(
     const POSITIONS: u32 = 8;
     const MOST: usize = 24;
     const LEAST: usize = 6;
-    const MOST_PIECES: usize = 32;
+    const MOST_PIECES: usize = 12;
     let mut knots = vec![0.0, end];
     let transform = Transform::new(MOST);
     let mut worst_before = [f64::INFINITY; 2];
@@ -576,7 +581,7 @@ fn along_lines<const D: usize, E: Send>(
         }
     }
     let most = MOST[MOST.len() - 1];
-    Ok(if rough < 1e-6 { most } else { ROUGH })
+    Ok(if rough < 1e-9 { most } else { ROUGH })
 }
 
 /// From values at the nodes to coefficients, along each axis.

@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::dormand_prince::{Errors, Step, factor};
 use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
 use crate::number::{Dual, Number};
+use crate::sampled::Sampled;
 use crate::tensor::{Tensor, tensor};
 
 /// Why a history could not be followed.
@@ -477,10 +478,6 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
     }
 
     fn run(mut self) -> Result<Trajectory<K>, HistoryError> {
-        if !self.along.law.has_branches() && self.z.is_empty() {
-            self.found.states = vec![Vec::new(); self.times.len()];
-            return Ok(self.found);
-        }
         while let Some(next) = self.next_time() {
             if next <= self.time {
                 self.keep(next, self.z.clone());
@@ -513,6 +510,16 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
 }
 
 impl<const K: usize> Trajectory<K> {
+    fn empty() -> Self {
+        Self {
+            states: Vec::new(),
+            changes: Vec::new(),
+            least_margin: f64::INFINITY,
+            residuals: Residuals::default(),
+            evaluations: 0,
+        }
+    }
+
     /// Follows a particle from the time 0 through ascending `times`, where its variables begin as the law has them. The tolerance is
     /// relative to what stresses [depend on](LawWithHistory::resolution): 1e-13 gives them, and their divergence, to about 1e-13 of their
     /// largest values.
@@ -533,7 +540,11 @@ impl<const K: usize> Trajectory<K> {
             }
             before = after;
         }
-        let along = Along::new(law, motion);
+        if law.variables().is_empty() && !law.has_branches() {
+            return Ok(Self { states: vec![Vec::new(); times.len()], ..Self::empty() });
+        }
+        let sampled = Sampled::new(motion, before);
+        let along = Along::new(law, &sampled);
         let z = law.initial(&along.steady);
         let (first, start) = (values_of(&z), values(&motion.at(0.0)));
         if first.iter().any(|value| !value.is_finite()) {
@@ -544,13 +555,7 @@ impl<const K: usize> Trajectory<K> {
             return Err(HistoryError::BeyondYield { excess });
         }
         let branch = law.first_branch(&start, &along.steady_values, &first);
-        let found = Self {
-            states: Vec::with_capacity(times.len()),
-            changes: Vec::new(),
-            least_margin: f64::INFINITY,
-            residuals: Residuals::default(),
-            evaluations: 0,
-        };
+        let found = Self { states: Vec::with_capacity(times.len()), ..Self::empty() };
         let tolerance = LENIENCE * tolerance * law.resolution(&along.steady_values);
         let way = Way { along, tolerance, times, time: 0.0, branch, z, step: 0.0, found };
         way.run()
