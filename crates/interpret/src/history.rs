@@ -8,6 +8,7 @@ use mmsmith_history::{
 use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness as Told};
 use mmsmith_stage::History;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
 /// The relative tolerance of trajectories.
@@ -247,6 +248,35 @@ impl<const D: usize> Histories<D> {
         })
     }
 
+    /// The kind of each quantity, in the order of [`in_frame`](Self::in_frame): components of one tensor are of one kind.
+    fn kinds(&self) -> Vec<usize> {
+        let mut stems: Vec<&str> = Vec::new();
+        let of_variables = self.names.iter().map(|name| {
+            let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            let stem = if name.len() == stem.len() + 2 { stem } else { name };
+            let place = stems.iter().position(|known| *known == stem);
+            2 + place.unwrap_or_else(|| {
+                stems.push(stem);
+                stems.len() - 1
+            })
+        });
+        let of_variables: Vec<usize> = of_variables.collect();
+        [vec![0; D], vec![1; D * D], of_variables].concat()
+    }
+
+    /// The series of a particle alone, for bodies whose fields no table has well.
+    fn own_series(&self, X: [f64; D], end: f64, range: &Range<usize>) -> Option<AtPoint> {
+        let particle = self.particle(X);
+        let trajectory = Trajectory::<D>::new(&self.law, &particle, &[end], TOLERANCE).ok()?;
+        let breaks: Vec<f64> = trajectory.changes.iter().map(|change| change.time).collect();
+        let kinds = &self.kinds()[range.clone()];
+        let of = |times: &[f64]| {
+            let mut all = self.in_frame(X, times)?;
+            Ok::<_, HistoryError>(all.drain(range.clone()).collect())
+        };
+        AtPoint::fine(end, &breaks, TABLE_TOLERANCE, kinds, of).ok().map(|(series, _)| series)
+    }
+
     fn particle(&self, X: [f64; D]) -> Particle<'_, D> {
         let mut particle = Particle { histories: self, X, frame: [[0.0; D]; D] };
         let values = self.inertia.evaluate_in(&particle.inputs(0.0));
@@ -320,6 +350,7 @@ impl<const D: usize> Histories<D> {
         let mut report = HistoryReport {
             table_error: self.tables_until(end)?.error,
             least_margin: f64::INFINITY,
+            flows: matches!(self.law, AnyLaw::Flow(_)),
             particles: places.len(),
             always: 0,
             onsets: 0,
@@ -437,7 +468,8 @@ impl<const D: usize> Tables<D> {
             axes.iter().zip(own).for_each(|(&axis, own)| q[axis] = own);
             histories.in_frame(chart.place(q), times)
         };
-        let (table, error) = Table::<K>::fine(range, end, TABLE_TOLERANCE, of)?;
+        let kinds = histories.kinds();
+        let (table, error) = Table::<K>::fine_by_kinds(range, end, TABLE_TOLERANCE, &kinds, of)?;
         Ok(Self { table: any(table), end, error })
     }
 
@@ -477,14 +509,23 @@ pub(crate) enum Quantities {
 pub(crate) struct Prepared<'a, const D: usize> {
     histories: &'a Histories<D>,
     tables: Arc<Tables<D>>,
-    /// How many fields there are.
-    count: usize,
-    /// Coefficients of a series of one piece, with zeros up to a multiple of [`SIDE_BY_SIDE`].
-    padded: usize,
-    pieces: usize,
-    /// For each particle, piece and field the coefficients.
-    coefficients: Vec<f64>,
+    series: SeriesOfAll,
     particles: Vec<Place<D>>,
+}
+
+enum SeriesOfAll {
+    /// From tables, all with the same pieces.
+    OfTables {
+        /// How many fields there are.
+        count: usize,
+        /// Coefficients of a series of one piece, with zeros up to a multiple of [`SIDE_BY_SIDE`].
+        padded: usize,
+        pieces: usize,
+        /// For each particle, piece and field the coefficients.
+        coefficients: Vec<f64>,
+    },
+    /// From the history of each particle; none where it could not be followed.
+    Own(Vec<Option<AtPoint>>),
 }
 
 /// A particle.
@@ -498,6 +539,8 @@ struct Place<const D: usize> {
 const SIDE_BY_SIDE: usize = 4;
 /// Particles whose series are formed at a time.
 const CHUNK: usize = 1024;
+/// Where tables have larger errors, as behind fronts of flow, each particle has series of its own.
+const LARGEST_ERROR: f64 = 1e-10;
 
 /// The polynomials at a time, for [`Prepared`].
 pub(crate) struct Moment {
@@ -519,30 +562,13 @@ impl<'a, const D: usize> Prepared<'a, D> {
             Quantities::Internal => D + D * D..D + D * D + histories.names.len(),
         };
         let place = |X: &[f64; D]| Place { X: *X, frame: histories.particle(*X).frame };
-        let in_time = tables.at_time(0.0).polynomials.len().max(1);
-        let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
-        let (mut pieces, mut coefficients) = (1, Vec::new());
-        for X in X.chunks(CHUNK) {
-            for series in tables.at_all(histories, X) {
-                pieces = series.coefficients(range.start).len() / in_time;
-                for piece in 0..pieces {
-                    for quantity in range.clone() {
-                        let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
-                        coefficients.extend_from_slice(own);
-                        coefficients.resize(coefficients.len() + padded - in_time, 0.0);
-                    }
-                }
-            }
-        }
-        Self {
-            histories,
-            count: range.len(),
-            padded,
-            pieces,
-            coefficients,
-            particles: X.par_iter().map(place).collect(),
-            tables,
-        }
+        let series = if tables.error <= LARGEST_ERROR {
+            SeriesOfAll::of_tables(histories, &tables, &range, X)
+        } else {
+            let own = |X: &[f64; D]| histories.own_series(*X, tables.end, &range);
+            SeriesOfAll::Own(X.par_iter().map(own).collect())
+        };
+        Self { histories, series, particles: X.par_iter().map(place).collect(), tables }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -550,21 +576,35 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Place<D>>() + 8 * self.pieces * self.count * self.padded
+        let of_series = match &self.series {
+            SeriesOfAll::OfTables { count, padded, pieces, .. } => pieces * count * padded,
+            SeriesOfAll::Own(all) => {
+                all.iter().flatten().next().map_or(0, |series| series.coefficients(0).len() * D)
+            }
+        };
+        size_of::<Place<D>>() + 8 * of_series
     }
 
     /// What all particles need of a time.
     pub(crate) fn moment(&self, t: f64) -> Moment {
         let AtTime { piece, mut polynomials } = self.tables.at_time(t);
-        polynomials.resize(self.padded, 0.0);
+        polynomials.resize(polynomials.len().next_multiple_of(SIDE_BY_SIDE), 0.0);
         Moment { t, piece, polynomials }
     }
 
     /// Field `k` of particle `n` in its frame.
     #[inline]
     fn value(&self, n: usize, k: usize, moment: &Moment) -> f64 {
-        let first = ((n * self.pieces + moment.piece) * self.count + k) * self.padded;
-        let own = &self.coefficients[first..][..self.padded];
+        let (count, padded, pieces, coefficients) = match &self.series {
+            SeriesOfAll::Own(all) => {
+                return all[n].as_ref().map_or(f64::NAN, |series| series.value(k, moment.t));
+            }
+            SeriesOfAll::OfTables { count, padded, pieces, coefficients } => {
+                (*count, *padded, *pieces, coefficients)
+            }
+        };
+        let first = ((n * pieces + moment.piece) * count + k) * padded;
+        let own = &coefficients[first..][..padded];
         let mut sums = [0.0; SIDE_BY_SIDE];
         let terms = own.chunks_exact(SIDE_BY_SIDE);
         for (c, p) in terms.zip(moment.polynomials.chunks_exact(SIDE_BY_SIDE)) {
@@ -616,5 +656,31 @@ impl<'a, const D: usize> Prepared<'a, D> {
         }
         let own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
         turn_tensors(names, frame, &own)
+    }
+}
+
+impl SeriesOfAll {
+    fn of_tables<const D: usize>(
+        histories: &Histories<D>,
+        tables: &Tables<D>,
+        range: &Range<usize>,
+        X: &[[f64; D]],
+    ) -> Self {
+        let in_time = tables.at_time(0.0).polynomials.len().max(1);
+        let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
+        let (mut pieces, mut coefficients) = (1, Vec::new());
+        for X in X.chunks(CHUNK) {
+            for series in tables.at_all(histories, X) {
+                pieces = series.coefficients(range.start).len() / in_time;
+                for piece in 0..pieces {
+                    for quantity in range.clone() {
+                        let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
+                        coefficients.extend_from_slice(own);
+                        coefficients.resize(coefficients.len() + padded - in_time, 0.0);
+                    }
+                }
+            }
+        }
+        Self::OfTables { count: range.len(), padded, pieces, coefficients }
     }
 }

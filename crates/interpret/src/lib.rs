@@ -19,7 +19,8 @@ use mmsmith_history::HistoryError;
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
     AnySolution, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields, HistoryReport,
-    Lattice, Law, ParameterError, PlainPoints, Real, Solution, StateAtPoints, StateRun, Surface,
+    InternalAtPoints, Lattice, Law, ParameterError, PlainPoints, Real, Solution, StateAtPoints,
+    StateRun, Surface,
 };
 use mmsmith_spec::{self as spec, Coordinates, DeriveError, Spec};
 use mmsmith_stage::{FieldName, Measures, Sides, Staged};
@@ -393,6 +394,17 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         }
     }
 
+    fn internal_at(&self, X: &[SVector<T, D>]) -> Box<dyn InternalAtPoints<T> + '_> {
+        let prepared = self.history.as_ref().and_then(|history| {
+            let quantities = Quantities::Internal;
+            self.prepared(history, quantities, X)
+        });
+        match prepared {
+            Some(points) => Box::new(points),
+            None => Box::new(PlainPoints { solution: self, X: X.to_vec() }),
+        }
+    }
+
     fn history(&self, X: &[SVector<T, D>], end: T) -> Result<Option<HistoryReport>, String> {
         let Some(history) = &self.history else { return Ok(None) };
         let X: Vec<[f64; D]> = X.iter().map(in_double).collect();
@@ -538,6 +550,13 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, 
 
     fn bytes_per_point(&self) -> usize {
         self.bytes()
+    }
+}
+
+impl<T: Interpretable, const D: usize> InternalAtPoints<T> for Prepared<'_, D> {
+    fn evaluate(&self, t: T, point: usize) -> Vec<T> {
+        let moment = self.moment(t.to_f64());
+        self.internal(point, &moment).into_iter().map(T::nearest).collect()
     }
 }
 

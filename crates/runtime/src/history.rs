@@ -14,6 +14,8 @@ pub enum Smoothness {
 /// How the histories of some particles of a body go until a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HistoryReport {
+    /// Whether the law is one of flow, which may begin and stop; of others particles, changes and margins tell nothing.
+    pub flows: bool,
     /// The particles that were followed.
     pub particles: usize,
     /// Those that flow from the start to the end; all of them for laws whose internal variables always have rates.

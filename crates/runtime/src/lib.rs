@@ -38,6 +38,6 @@ pub use parameters::{Description, Parameter, ParameterError};
 pub use real::Real;
 pub use solution::{AnySolution, Fields, Solution};
 pub use staged::{
-    BLOCK, BodyForceAtPoints, BodyForceStages, PlainPoints, StagedPoints, StagedStates, State,
-    StateAtPoints, StateRun, StateStages,
+    BLOCK, BodyForceAtPoints, BodyForceStages, InternalAtPoints, PlainPoints, StagedPoints,
+    StagedStates, State, StateAtPoints, StateRun, StateStages,
 };

@@ -3,8 +3,8 @@
 use crate::lattice::POINTS_A_LAYER;
 use crate::staged::PlainPoints;
 use crate::{
-    BLOCK, BodyForceAtPoints, Boundary, Domain, HistoryReport, Lattice, Law, Real, StateAtPoints,
-    StateRun, Surface,
+    BLOCK, BodyForceAtPoints, Boundary, Domain, HistoryReport, InternalAtPoints, Lattice, Law,
+    Real, StateAtPoints, StateRun, Surface,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -122,6 +122,10 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     /// [`internal_variables`](Self::internal_variables).
     fn internal(&self, _X: &SVector<T, D>, _t: T) -> Vec<T> {
         Vec::new()
+    }
+    /// The internal variables at many fixed points, prepared as [`Solution::body_force_at`] prepares the body force.
+    fn internal_at(&self, X: &[SVector<T, D>]) -> Box<dyn InternalAtPoints<T> + '_> {
+        Box::new(PlainPoints { solution: self, X: X.to_vec() })
     }
     /// Prepares fields that follow from the history of each particle for times up to `end`: tables that
     /// [`body_force_at`](Self::body_force_at) and [`state_at`](Self::state_at) then use. Solutions that are formulas need none.

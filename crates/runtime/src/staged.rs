@@ -62,6 +62,16 @@ pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
     fn bytes_per_point(&self) -> usize;
 }
 
+/// The exact internal variables at many fixed points, prepared by [`Solution::internal_at`].
+pub trait InternalAtPoints<T: Real>: Send + Sync {
+    /// The internal variables of a point at time `t`, in the order of [`Solution::internal_variables`].
+    ///
+    /// # Panics
+    ///
+    /// Panics where there are fewer points.
+    fn evaluate(&self, t: T, point: usize) -> Vec<T>;
+}
+
 /// The exact state at one point, to compare a simulation with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<T: Real, const D: usize> {
@@ -609,5 +619,14 @@ where
 
     fn bytes_per_point(&self) -> usize {
         size_of::<SVector<T, D>>()
+    }
+}
+
+impl<S, T: Real, const D: usize> InternalAtPoints<T> for PlainPoints<'_, S, T, D>
+where
+    S: Solution<T, D> + ?Sized,
+{
+    fn evaluate(&self, t: T, point: usize) -> Vec<T> {
+        self.solution.internal(&self.X[point], t)
     }
 }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_measure::{Comparison, Homes, each_group, norms_of};
-use mmsmith_mpm::{Arrangement, Solver};
+use mmsmith_mpm::{Arrangement, Particles, Solver};
 use mmsmith_ranks::Ranks;
-use mmsmith_runtime::{Real, Solution};
+use mmsmith_runtime::{InternalAtPoints, Real, Solution};
 
 use crate::precision::Precision;
 
@@ -14,6 +14,7 @@ use crate::precision::Precision;
 pub(crate) struct Measurement<'a, const D: usize> {
     exact: &'a dyn Solution<f64, D>,
     comparison: Comparison<'a, D>,
+    exact_internal: Box<dyn InternalAtPoints<f64> + 'a>,
     /// Internal variables whose errors are measured.
     internal: Vec<Compared>,
     /// Where several processes hold the particles.
@@ -67,6 +68,18 @@ impl Shared {
     }
 }
 
+/// The exact internal variables at the reference positions of particles; of no point where the law has none.
+fn exact_internal<'a, T: Precision<D>, const D: usize>(
+    exact: &'a dyn Solution<f64, D>,
+    particles: &Particles<T, D>,
+) -> Box<dyn InternalAtPoints<f64> + 'a> {
+    let X: Vec<_> = match exact.internal_variables().is_empty() {
+        true => Vec::new(),
+        false => particles.X.iter().map(|X| X.map(Real::to_f64)).collect(),
+    };
+    exact.internal_at(&X)
+}
+
 impl<'a, const D: usize> Measurement<'a, D> {
     /// For the particles that a solver has now.
     pub(crate) fn new<T: Precision<D>>(
@@ -78,9 +91,10 @@ impl<'a, const D: usize> Measurement<'a, D> {
         let comparison = Comparison::new(exact, &particles.X);
         let of_law: Vec<String> = law.variables().into_iter().map(|own| own.name).collect();
         let internal = compared(&exact.internal_variables(), &of_law);
+        let exact_internal = exact_internal(exact, particles);
         let shared = ranks.zip(solver.arrangement());
         let shared = shared.map(|(ranks, found)| Shared::new(ranks.clone(), found));
-        Self { exact, comparison, internal, shared }
+        Self { exact, comparison, exact_internal, internal, shared }
     }
 
     /// Takes note of particles that have moved from process to process.
@@ -91,7 +105,9 @@ impl<'a, const D: usize> Measurement<'a, D> {
             return;
         };
         *shared = Shared::new(shared.ranks.clone(), found);
-        self.comparison = Comparison::new(self.exact, &solver.observe().0.X);
+        let particles = solver.observe().0;
+        self.comparison = Comparison::new(self.exact, &particles.X);
+        self.exact_internal = exact_internal(self.exact, particles);
     }
 
     /// Number of particles of all processes.
@@ -118,7 +134,7 @@ impl<'a, const D: usize> Measurement<'a, D> {
         solver: &mut (dyn Solver<T, D> + '_),
         time: f64,
     ) -> Vec<(String, PerNorm<f64>)> {
-        let Self { exact, internal, .. } = self;
+        let Self { exact_internal, internal, .. } = self;
         if internal.is_empty() {
             return Vec::new();
         }
@@ -127,7 +143,7 @@ impl<'a, const D: usize> Measurement<'a, D> {
         let group = |g: usize| {
             let places = g * GROUP..particles.len().min((g + 1) * GROUP);
             let of_particle = |p: usize| {
-                let exact = exact.internal(&particles.X[p].map(Real::to_f64), time);
+                let exact = exact_internal.evaluate(time, p);
                 let own = &particles.internal[p * count..];
                 let off = |of: &Compared| (own[of.of_law].to_f64() - exact[of.place]).abs();
                 internal.iter().map(off).collect::<Vec<f64>>()

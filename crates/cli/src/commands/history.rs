@@ -19,6 +19,9 @@ pub(super) fn text(report: &HistoryReport) -> String {
     let HistoryReport { particles, always, onsets, unloadings, least_margin, smoothness, .. } =
         *report;
     let mut text = String::new();
+    if !report.flows {
+        return format!("  history: tables {} of each field\n", table::error(report.table_error));
+    }
     if least_margin == f64::INFINITY && report.yield_condition == 0.0 && always == 0 {
         text += &format!("  history: none of {particles} particles flows: the body is elastic\n");
     } else if always == particles {
@@ -60,6 +63,7 @@ pub(super) fn text(report: &HistoryReport) -> String {
 /// The report as JSON.
 pub(super) fn document(report: &HistoryReport) -> Value {
     json!({
+        "flows": report.flows,
         "particles": report.particles,
         "always": report.always,
         "onsets": report.onsets,
