@@ -12,6 +12,10 @@ const COUNT: usize = 24;
 const PIECES: [usize; 4] = [1, 2, 4, 8];
 /// Numbers in kinematics with three slopes, at most.
 const MOST: usize = 18 * 4;
+/// Numbers whose sums are formed together.
+const WIDTH: usize = 8;
+/// Coefficients below such a share are left out.
+const NOTHING: f64 = 3e-17;
 /// What series may leave out, as a share of the largest value, and of the largest slope.
 const TAIL: f64 = 1e-15;
 /// By how much they may be off at other times.
@@ -30,8 +34,10 @@ struct Series {
     steady: [f64; MOST],
     /// Which numbers change.
     places: Vec<usize>,
-    /// For each piece and each polynomial the coefficients of the numbers that change.
-    coefficients: Vec<f64>,
+    /// Polynomials in each piece that count.
+    count: usize,
+    /// For each piece, each group of numbers that change, and each polynomial, the coefficients.
+    coefficients: Vec<[f64; WIDTH]>,
 }
 
 fn flat<const K: usize>(at: &Kinematics<Dual<f64, K>>) -> [f64; MOST] {
@@ -67,21 +73,22 @@ impl Series {
         let share = time / self.end * self.pieces as f64;
         let piece = (share.max(0.0) as usize).min(self.pieces - 1);
         let mut polynomials = [0.0; COUNT];
-        polynomials_into(2.0 * (share - piece as f64) - 1.0, &mut polynomials);
-        let count = self.places.len();
-        let own = &self.coefficients[piece * COUNT * count..][..COUNT * count];
-        let rows = own.chunks_exact(count.max(1));
-        let mut sums = [0.0; MOST];
-        let sums = &mut sums[..count];
-        // The small ones first.
-        for (row, factor) in rows.rev().zip(polynomials.into_iter().rev()) {
-            for (sum, c) in sums.iter_mut().zip(row) {
-                *sum += factor * c;
-            }
-        }
+        let polynomials = &mut polynomials[..self.count];
+        polynomials_into(2.0 * (share - piece as f64) - 1.0, polynomials);
+        let groups = self.places.len().div_ceil(WIDTH);
+        let own = &self.coefficients[piece * groups * self.count..][..groups * self.count];
         let mut numbers = self.steady;
-        for (&place, sum) in self.places.iter().zip(sums) {
-            numbers[place] = *sum;
+        for (places, rows) in self.places.chunks(WIDTH).zip(own.chunks_exact(self.count)) {
+            let mut sums = [0.0; WIDTH];
+            // The small ones first.
+            for (row, factor) in rows.iter().zip(&*polynomials).rev() {
+                for (sum, c) in sums.iter_mut().zip(row) {
+                    *sum += factor * c;
+                }
+            }
+            for (&place, sum) in places.iter().zip(sums) {
+                numbers[place] = sum;
+            }
         }
         of_flat(&numbers)
     }
@@ -112,23 +119,25 @@ impl<'a, M: Motion<K>, const K: usize> Sampled<'a, M, K> {
             if largest.iter().any(|most| !most.is_finite()) {
                 return own;
             }
-            let count = places.len();
-            let mut coefficients = vec![0.0; pieces * COUNT * count];
-            let mut is_short = false;
+            let groups = places.len().div_ceil(WIDTH);
+            let mut all = vec![[[0.0; WIDTH]; COUNT]; pieces * groups];
+            let (mut is_short, mut count) = (false, 1);
             for (number, &place) in places.iter().enumerate() {
                 let most = largest[group::<K>(place)];
                 for (piece, own) in samples.chunks_exact(COUNT).enumerate() {
                     let values: Vec<f64> = own.iter().map(|own| own[place]).collect();
                     for (k, c) in transform.coefficients(&values).enumerate() {
-                        coefficients[(piece * COUNT + k) * count + number] = c;
+                        all[piece * groups + number / WIDTH][k][number % WIDTH] = c;
                         is_short |= k + 2 >= COUNT && c.abs() > TAIL * most;
+                        count = if c.abs() > NOTHING * most { count.max(k + 1) } else { count };
                     }
                 }
             }
             if is_short {
                 continue;
             }
-            let series = Series { end, pieces, steady: samples[0], places, coefficients };
+            let coefficients = all.iter().flat_map(|own| &own[..count]).copied().collect();
+            let series = Series { end, pieces, steady: samples[0], places, count, coefficients };
             // Waves that are too short for the nodes have other values in between.
             let is_right = [0.071, 0.456, 0.832].into_iter().all(|share| {
                 let (exact, found) =

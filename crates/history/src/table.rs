@@ -204,12 +204,14 @@ impl<const D: usize> Table<D> {
     ) -> Result<(Self, f64), E> {
         const PROBES: u32 = 24;
         const TIMES: u32 = 5;
-        const MOST_RAISES: usize = 2;
-        let (knots, in_time, kinds) = in_time(range, end, tolerance, kinds, &of)?;
+        const MOST_RAISES: usize = 1;
+        // Some lines and positions do not show all: a half is for the others.
+        let half = 0.5 * tolerance;
+        let (knots, in_time, kinds) = in_time(range, end, half, kinds, &of)?;
         let mut grid = Grid { range, knots, in_space: [1; D], in_time };
         let mut times = grid.times();
         for axis in 0..D {
-            grid.in_space[axis] = along_lines(range, axis, tolerance, &times, &kinds, &of)?;
+            grid.in_space[axis] = along_lines(range, axis, half, &times, &kinds, &of)?;
         }
         let new = |grid: &Grid<D>, times: &[f64]| {
             let mut table = Self::new(grid.clone(), |X| of(X, times))?;
@@ -219,8 +221,8 @@ impl<const D: usize> Table<D> {
         let mut table = new(&grid, &times)?;
         for _ in 0..MOST_RAISES {
             let (tails, late) = table.all_tails();
-            // Rough fields do not become smooth by some more nodes.
-            let is_short = |tail: f64| tail > tolerance && tail < 1e3 * tolerance;
+            // Another table takes its time, and rough fields do not become smooth by some more nodes.
+            let is_short = |tail: f64| tail > 8.0 * tolerance && tail < 1e3 * tolerance;
             if !tails.iter().chain([&late]).any(|&tail| is_short(tail)) {
                 break;
             }
@@ -234,15 +236,9 @@ impl<const D: usize> Table<D> {
             table = new(&grid, &times)?;
         }
         let probe = |probe: u32| -> Result<f64, E> {
-            let mut X = place(&range, probe);
-            if probe % 2 == 1 {
-                // Series are worst next to the ends of the ranges.
-                X = std::array::from_fn(|axis| {
-                    let [low, high] = range[axis];
-                    let share = (X[axis] - low) / (high - low);
-                    low + (high - low) * 0.5 * (1.0 - (PI * share).cos())
-                });
-            }
+            let X = place(&range, probe);
+            // Series are worst next to the ends of the ranges.
+            let X = if probe % 2 == 1 { outwards(&range, X) } else { X };
             let share = |k: u32| fraction(0.37 + 0.618_033_988_75 * f64::from(TIMES * probe + k));
             let mut times: Vec<f64> = (0..TIMES).map(|k| end * share(k)).collect();
             times.sort_by(f64::total_cmp);
@@ -474,6 +470,15 @@ fn enough(rests: &[f64], tolerance: f64) -> usize {
     first.map_or(rests.len(), |first| (first + 2).min(rests.len()))
 }
 
+/// A position moved to the ends of the range, as nodes are.
+fn outwards<const D: usize>(range: &[[f64; 2]; D], X: [f64; D]) -> [f64; D] {
+    std::array::from_fn(|axis| {
+        let [low, high] = range[axis];
+        let share = (X[axis] - low) / (high - low);
+        low + (high - low) * 0.5 * (1.0 - (PI * share).cos())
+    })
+}
+
 /// Knots between which series of polynomials in time leave out less than a share of each quantity's largest value, at some positions, and
 /// the number of polynomials; and the kinds of the quantities.
 fn in_time<const D: usize, E: Send>(
@@ -542,7 +547,7 @@ fn along_lines<const D: usize, E: Send>(
     kinds: &Kinds,
     of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
 ) -> Result<usize, E> {
-    const LINES: u32 = 3;
+    const LINES: usize = 6;
     const MOST: [usize; 3] = [16, 28, 40];
     const LEAST: usize = 4;
     /// What a field that is not smooth has.
@@ -551,10 +556,14 @@ fn along_lines<const D: usize, E: Send>(
     for count in MOST {
         let (at, transform) = (roots(count), Transform::new(count));
         let [low, high] = range[axis];
-        let samples: Vec<Result<Series, E>> = (0..LINES as usize * count)
+        let samples: Vec<Result<Series, E>> = (0..LINES * count)
             .into_par_iter()
             .map(|number| {
-                let mut X = place(&range, 31 + (number / count) as u32);
+                let line = number / count;
+                let mut X = place(&range, 31 + line as u32);
+                if line % 2 == 1 {
+                    X = outwards(&range, outwards(&range, X));
+                }
                 X[axis] = 0.5 * (low + high) + 0.5 * (high - low) * at[number % count];
                 of(X, times)
             })
