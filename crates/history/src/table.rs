@@ -6,6 +6,7 @@
 //! Source: L. N. Trefethen, "Approximation Theory and Approximation Practice", SIAM (2013), chapters 3 to 8.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -263,19 +264,28 @@ impl<const D: usize> Table<D> {
     /// The fields at a position.
     #[must_use]
     pub fn at(&self, X: &[f64; D]) -> AtPoint {
-        self.at_some(std::slice::from_ref(X)).swap_remove(0)
+        self.at_some(std::slice::from_ref(X), 0..self.quantities).swap_remove(0)
     }
 
     /// The fields at many positions. Those in a row that share their last coordinates, as points of a lattice do, share sums.
     #[must_use]
     pub fn at_all(&self, points: &[[f64; D]]) -> Vec<AtPoint> {
+        self.at_all_of(points, 0..self.quantities)
+    }
+
+    /// As [`at_all`](Self::at_all), of some of the quantities, which count from zero at the points: the time that this takes is in proportion
+    /// to their number. Those beyond the last are left out.
+    #[must_use]
+    pub fn at_all_of(&self, points: &[[f64; D]], quantities: Range<usize>) -> Vec<AtPoint> {
         const CHUNK: usize = 256;
-        let chunks: Vec<Vec<AtPoint>> =
-            points.par_chunks(CHUNK).map(|chunk| self.at_some(chunk)).collect();
+        let of = |chunk| self.at_some(chunk, quantities.clone());
+        let chunks: Vec<Vec<AtPoint>> = points.par_chunks(CHUNK).map(of).collect();
         chunks.into_iter().flatten().collect()
     }
 
-    fn at_some(&self, points: &[[f64; D]]) -> Vec<AtPoint> {
+    fn at_some(&self, points: &[[f64; D]], quantities: Range<usize>) -> Vec<AtPoint> {
+        let end = quantities.end.min(self.quantities);
+        let quantities = quantities.start.min(end)..end;
         let Grid { range, ref knots, in_space, in_time } = self.grid;
         let steps = self.grid.pieces() * in_time;
         // The axis from which on, downwards, sums differ from those of the point before, and the polynomials of the point.
@@ -294,12 +304,13 @@ impl<const D: usize> Table<D> {
         let empty = || AtPoint {
             knots: knots.clone(),
             in_time,
-            coefficients: vec![vec![0.0; steps]; self.quantities],
+            coefficients: vec![vec![0.0; steps]; quantities.len()],
         };
         let mut all: Vec<AtPoint> = points.iter().map(|_| empty()).collect();
         // Sums over the axes from each on.
         let mut sums: [Vec<f64>; D] = std::array::from_fn(|_| Vec::new());
-        for (number, column) in self.coefficients.iter().enumerate() {
+        let columns = &self.coefficients[quantities.start * steps..quantities.end * steps];
+        for (number, column) in columns.iter().enumerate() {
             for ((first, along), point) in plan.iter().zip(&mut all) {
                 // The slowest axis first: sums run along what is side by side.
                 for axis in (0..*first).rev() {
