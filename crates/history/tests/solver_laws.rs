@@ -2,6 +2,7 @@
 
 #![allow(non_snake_case, clippy::unwrap_used)]
 
+use mmsmith_history::Motion;
 use mmsmith_history::{
     AnyLaw, Dual, Kinematics, LawWithHistory, Number, Tensor, Trajectory, divergence,
 };
@@ -9,7 +10,9 @@ use mmsmith_laws::{
     BLOCK, Element, Flow, Increment, Law, LawWithMemory, Material, Memory, Overstress, ReturnMap,
     Stressed, Volumetric, WithMemory, with_memory,
 };
-use nalgebra::Matrix3;
+use mmsmith_stated_law::StatedMemory;
+use mmsmith_vocabulary::{Components, Internal, Law as Stating, Response, Stated};
+use nalgebra::{Matrix3, SMatrix, SVector};
 use std::sync::Arc;
 
 const LAMBDA: f64 = 5769.0;
@@ -244,4 +247,111 @@ fn prony_series_of_linear_elasticity_have_second_order() {
     let variables = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| Q[at]).to_vec();
     let exact = State { variables, P: (0..4).map(|k| P[(k / 2, k % 2)]).collect() };
     assert_order(&law, &exact, 2.0, "prony");
+}
+
+/// The place at which laws of text are looked at.
+const PLACE: [f64; 2] = [0.3, 0.7];
+
+/// A motion, with constants, coordinates and the time in the order that a law of text names them in.
+struct WithPlaces {
+    constants: Vec<(String, f64)>,
+    names: Vec<String>,
+}
+
+impl Motion<1> for WithPlaces {
+    fn at(&self, time: f64) -> Kinematics<Dual<f64, 1>> {
+        motion(2)(time)
+    }
+
+    fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, 1>>) {
+        constants.extend(self.names.iter().map(|name| {
+            let known = self.constants.iter().find(|(own, _)| own == name);
+            Dual::constant(match name.as_str() {
+                "X" => PLACE[0],
+                "Y" => PLACE[1],
+                "t" => time,
+                name => known.unwrap_or_else(|| panic!("{name}")).1,
+            })
+        }));
+    }
+}
+
+/// A law of text in so many steps.
+fn text_by_steps(law: &Stated<f64>, steps: usize) -> State {
+    let Stated { response, constants, given, internal, .. } = law;
+    let own = StatedMemory::<f64>::new(2, response, constants, given, internal).unwrap();
+    let motion = motion(2);
+    let F = |t: f64| {
+        let at = motion(t);
+        [0, 1].map(|i| [0, 1].map(|j| [at.F[i][j].value; 2]))
+    };
+    let rate = SMatrix::<f64, 2, 2>::from_fn(|i, j| motion(0.0).rate[i][j].value);
+    let mut start = own.initial(&SVector::<f64, 2>::from(PLACE));
+    own.start_at_rate(&rate, &mut start);
+    let mut q: Vec<[f64; 2]> = start.iter().map(|&value| [value; 2]).collect();
+    for step in 0..steps {
+        let [start, end] = [step, step + 1].map(|k| F(k as f64 / steps as f64));
+        own.evolve(&start, &end, 1.0 / steps as f64, &mut q);
+    }
+    let mut P = [[[0.0; 2]; 2]; 2];
+    own.first_piola_kirchhoff(&F(1.0), &q, &mut P);
+    State {
+        variables: q[..internal.len()].iter().map(|q| q[0]).collect(),
+        P: P.iter().flatten().map(|stress| stress[0]).collect(),
+    }
+}
+
+/// Laws that are stated in text, with internal variables, given fields and rates.
+#[test]
+fn laws_of_text_have_second_order() {
+    let internal = |name: &str, rate: &str, initial: &str| Internal {
+        name: name.into(),
+        rate: rate.into(),
+        initial: initial.into(),
+    };
+    let stated = |response, internal| Stated {
+        response,
+        components: Components::Cartesian,
+        constants: [("lambda", LAMBDA), ("mu", MU), ("tau", 0.4), ("eta", 200.0)]
+            .map(|(name, value)| (name.to_owned(), value))
+            .to_vec(),
+        given: vec![
+            ("theta".into(), "20 + 5*X*cos(t)".into()),
+            ("soft".into(), "theta/(20 + Y)".into()),
+        ],
+        internal,
+    };
+    let energy = "soft*(1 - q/3 - r)*mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2";
+    let by_energy = stated(
+        Response::Energy(energy.into()),
+        vec![
+            internal("q", "(C12 + J*Jdot/10 + d12 - q)/tau", "X*Y/10"),
+            internal("r", "q*Fdot11*theta/20", "0"),
+        ],
+    );
+    let rows = [
+        ["mu*(F11 - 1/F11) + eta*d11*soft", "mu*F12 + eta*Fdot12"],
+        ["mu*F21 + eta*d12 - q", "mu*(F22 - 1) + eta*Jdot"],
+    ];
+    let rows = rows.map(|row| row.map(String::from).to_vec()).to_vec();
+    let by_stress = stated(Response::Stress(rows), vec![internal("q", "mu*d12 - q/tau", "theta")]);
+    for law in [by_energy, by_stress] {
+        let own = AnyLaw::new(&Stating::Stated(law.clone()), 2).unwrap();
+        let along = WithPlaces { constants: law.constants.clone(), names: own.constants() };
+        let found = Trajectory::new(&own, &along, &[1.0], 1e-13).unwrap();
+        let mut constants = Vec::new();
+        along.constants(1.0, &mut constants);
+        let (_, P) = divergence(&own, &along.at(1.0), &constants, &found.states[0]);
+        let exact = State {
+            variables: found.states[0].iter().map(|z| z.value).collect(),
+            P: (0..4).map(|k| P[k / 2][k % 2]).collect(),
+        };
+        let errors = [100, 200, 400].map(|steps| text_by_steps(&law, steps).off(&exact));
+        for k in 0..2 {
+            for pair in errors.windows(2) {
+                let order = (pair[0][k] / pair[1][k]).log2();
+                assert!((order - 2.0).abs() < 0.15, "{law:?} {k}: {errors:?} {order}");
+            }
+        }
+    }
 }

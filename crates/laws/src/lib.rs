@@ -111,7 +111,14 @@ macro_rules! with_law {
 /// The law of an elastic law of the library with memory, with the return map that flow takes; `None` where that elastic law has no memory
 /// of this kind: flow is of Hencky's law, elements are of isochoric laws and of linear elasticity.
 #[must_use]
-pub fn with_memory<T: Stressed<D> + Stressed<3>, const D: usize>(
+pub fn with_memory<T: Stressed<D>, const D: usize>(
+    law: WithMemory<T>,
+    map: ReturnMap,
+) -> Option<Law<T, D>> {
+    T::with_memory(law, map)
+}
+
+fn memory_of_library<T: Stressed<D> + Stressed<3>, const D: usize>(
     law: WithMemory<T>,
     map: ReturnMap,
 ) -> Option<Law<T, D>> {
@@ -163,6 +170,10 @@ pub trait Stressed<const D: usize>: Lanes {
     /// [`Law::strain_energy`].
     #[doc(hidden)]
     fn strain_energy(material: &Material<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
+
+    /// [`with_memory`].
+    #[doc(hidden)]
+    fn with_memory(law: WithMemory<Self>, map: ReturnMap) -> Option<Law<Self, D>>;
 }
 
 /// The law as stresses are formed of it: another with a planted fault alone.
@@ -213,6 +224,10 @@ macro_rules! stressed {
             ) -> Option<Self> {
                 jacobian(F)?;
                 Some(with_law!(material, |law| law.strain_energy(F)))
+            }
+
+            fn with_memory(law: WithMemory<Self>, map: ReturnMap) -> Option<Law<Self, $D>> {
+                memory_of_library(law, map)
             }
         })*)*
     };

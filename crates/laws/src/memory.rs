@@ -76,6 +76,20 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
         }
     }
 
+    /// Advances the internal variables by an increment and computes the Kirchhoff stresses at its end, to the bits of
+    /// [`evolve`](Self::evolve) and [`kirchhoff`](Self::kirchhoff). Default: by these.
+    fn evolve_to_kirchhoff(
+        &self,
+        increment: &Increment<'_, T, D>,
+        q: &mut [[T; BLOCK]],
+        tau: &mut [[[T; BLOCK]; D]; D],
+    ) where
+        T: RealField + Copy,
+    {
+        self.evolve(increment, q);
+        self.kirchhoff(increment.end, q, tau);
+    }
+
     /// The normal Kirchhoff stress of a particle along the axes that F leaves out, where the stretch is one; `None` where it is not known.
     fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>, _q: &[T]) -> Option<T> {
         None
@@ -238,15 +252,39 @@ impl<T: RealField + Copy, const D: usize> BlockWithMemory<T, D> {
         time: T,
         q: &mut [T],
     ) {
+        self.set_increment(start, end, q);
+        law.evolve(&Increment { start: &self.F, end: &self.end, time }, &mut self.q);
+        self.give(q);
+    }
+
+    /// As [`evolve`](Self::evolve), with the Kirchhoff stresses at the end.
+    pub fn evolve_to_kirchhoff(
+        &mut self,
+        law: &dyn LawWithMemory<T, D>,
+        start: &[SMatrix<T, D, D>],
+        end: &[SMatrix<T, D, D>],
+        time: T,
+        q: &mut [T],
+    ) {
+        self.set_increment(start, end, q);
+        let increment = Increment { start: &self.F, end: &self.end, time };
+        law.evolve_to_kirchhoff(&increment, &mut self.q, &mut self.stress);
+        self.give(q);
+    }
+
+    fn set_increment(&mut self, start: &[SMatrix<T, D, D>], end: &[SMatrix<T, D, D>], q: &[T]) {
         self.take(q);
-        let mut is_deformation = [true; BLOCK];
         for (n, (start, end)) in start.iter().zip(end).enumerate() {
             let (is_start, is_end) = (set(&mut self.F, n, start), set(&mut self.end, n, end));
-            is_deformation[n] = is_start && is_end;
+            self.is_deformation[n] = is_start && is_end;
         }
-        law.evolve(&Increment { start: &self.F, end: &self.end, time }, &mut self.q);
+    }
+
+    /// Gives the internal variables of deformations back.
+    fn give(&self, q: &mut [T]) {
         let count = self.q.len();
-        for (n, own) in q.chunks_exact_mut(count).enumerate().filter(|(n, _)| is_deformation[*n]) {
+        let own = q.chunks_exact_mut(count).zip(self.is_deformation).enumerate();
+        for (n, (own, _)) in own.filter(|(_, (_, is_deformation))| *is_deformation) {
             for (value, column) in own.iter_mut().zip(&self.q) {
                 *value = column[n];
             }

@@ -113,40 +113,50 @@ impl Plastic {
         }
     }
 
+    /// The elastic deformations at the end where no particle of the block has flown.
     fn evolve_in_plane<T: RealField + Copy, const D: usize>(
         &self,
         increment: &Increment<'_, T, D>,
         q: &mut [[T; BLOCK]],
-    ) {
+    ) -> Option<Elastics> {
         let Self { law, map, .. } = *self;
         let Increment { start, end, time } = *increment;
         let time = double(time);
-        let mut elastic = Elastics::AT_REST;
+        let (mut elastic, mut flows) = (Elastics::AT_REST, false);
         dispatch(Trials { F: end, q, planted: law.planted, elastic: &mut elastic });
+        if map == ReturnMap::Exponential {
+            let (mut multipliers, mut kept) = ([0.0; BLOCK], [1.0; BLOCK]);
+            for n in 0..BLOCK {
+                let size = law.mu * elastic.size[n];
+                let multiplier = law.multiplier(size, double(q[6][n]), time);
+                if multiplier > 0.0 {
+                    multipliers[n] = multiplier;
+                    kept[n] = 1.0 - 2.0 * law.mu * multiplier / size;
+                    flows = true;
+                }
+            }
+            if flows {
+                dispatch(Returns { F: end, q, elastic: &elastic, kept: &kept });
+                for (alpha, multiplier) in q[6].iter_mut().zip(multipliers) {
+                    *alpha = nalgebra::convert(law.advanced(double(*alpha), multiplier));
+                }
+            }
+            return (!flows).then_some(elastic);
+        }
         for n in 0..BLOCK {
             let (size, alpha) = (law.mu * elastic.size[n], double(q[6][n]));
-            if !law.flows(size, alpha)
-                && (map == ReturnMap::Exponential || law.flow.overstress.is_none())
-            {
+            if law.flow.overstress.is_none() && !law.flows(size, alpha) {
                 continue;
             }
             let (G, F) = (in_plane(q, n), row(end, n));
-            let (G, multiplier) = match map {
-                ReturnMap::Exponential => {
-                    let multiplier = law.multiplier(size, alpha, time);
-                    let kept = 1.0 - 2.0 * law.mu * multiplier / size;
-                    (plane::returned(&F, &G, &elastic.get(n), kept), multiplier)
-                }
-                ReturnMap::Midpoint => plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time),
-            };
+            let (G, multiplier) = plane::midpoint(&law, &row(start, n), &F, (&G, alpha), time);
             if multiplier > 0.0 {
-                let Sym { a: [g11, g22], shear, across } = G;
-                for (column, value) in [(0, g11), (1, g22), (2, across), (3, shear)] {
-                    q[column][n] = nalgebra::convert(value);
-                }
+                set_in_plane(q, n, &G);
                 q[6][n] = nalgebra::convert(law.advanced(alpha, multiplier));
+                flows = true;
             }
         }
+        (!flows).then_some(elastic)
     }
 }
 
@@ -171,6 +181,14 @@ fn in_plane<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Sym {
     Sym { a: [double(q[0][n]), double(q[1][n])], shear: double(q[3][n]), across: double(q[2][n]) }
 }
 
+#[inline(always)]
+fn set_in_plane<T: RealField + Copy>(q: &mut [[T; BLOCK]], n: usize, G: &Sym) {
+    q[0][n] = nalgebra::convert(G.a[0]);
+    q[1][n] = nalgebra::convert(G.a[1]);
+    q[2][n] = nalgebra::convert(G.across);
+    q[3][n] = nalgebra::convert(G.shear);
+}
+
 fn in_rows<T: RealField + Copy>(q: &[[T; BLOCK]], n: usize) -> Matrix3<f64> {
     let mut G = Matrix3::zeros();
     for (&(i, j), column) in ENTRIES.iter().zip(q) {
@@ -193,10 +211,97 @@ impl<T: RealField + Copy, const D: usize> Loop for Trials<'_, T, D> {
     fn run<V: Vectors>(self, _: V) {
         let Self { F, q, planted, elastic } = self;
         let [g11, g22, g33, g12, ..] = q else { return };
-        for n in 0..BLOCK {
-            let across = if planted.is(Fault::AcrossDropped) { 1.0 } else { double(g33[n]) };
-            let G = Sym { a: [double(g11[n]), double(g22[n])], shear: double(g12[n]), across };
-            elastic.set(n, &Elastic::new(&row(F, n), &G));
+        trials(F, [g11, g22, g33, g12], planted, elastic);
+    }
+}
+
+/// A function of its own tells the compiler that input and output do not overlap.
+#[inline(always)]
+fn trials<T: RealField + Copy, const D: usize>(
+    F: &[[[T; BLOCK]; D]; D],
+    [g11, g22, g33, g12]: [&[T; BLOCK]; 4],
+    planted: Planted,
+    elastic: &mut Elastics,
+) {
+    for n in 0..BLOCK {
+        let across = if planted.is(Fault::AcrossDropped) { 1.0 } else { double(g33[n]) };
+        let G = Sym { a: [double(g11[n]), double(g22[n])], shear: double(g12[n]), across };
+        elastic.set(n, &Elastic::new(&row(F, n), &G));
+    }
+}
+
+/// Returns of a block in the plane, each of which keeps a share of its deviator.
+struct Returns<'a, T, const D: usize> {
+    F: &'a [[[T; BLOCK]; D]; D],
+    q: &'a mut [[T; BLOCK]],
+    elastic: &'a Elastics,
+    kept: &'a [f64; BLOCK],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for Returns<'_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { F, q, elastic, kept } = self;
+        if elastic.are_small() {
+            returns::<true, T, D>(F, q, elastic, kept);
+        } else {
+            returns::<false, T, D>(F, q, elastic, kept);
+        }
+    }
+}
+
+#[inline(always)]
+fn returns<const SMALL: bool, T: RealField + Copy, const D: usize>(
+    F: &[[[T; BLOCK]; D]; D],
+    q: &mut [[T; BLOCK]],
+    elastic: &Elastics,
+    kept: &[f64; BLOCK],
+) {
+    let [g11, g22, g33, g12, ..] = q else { return };
+    for n in 0..BLOCK {
+        let G = Sym {
+            a: [double(g11[n]), double(g22[n])],
+            shear: double(g12[n]),
+            across: double(g33[n]),
+        };
+        let new = plane::returned::<SMALL>(&row(F, n), &G, &elastic.get(n), kept[n]);
+        // Whoever does not flow keeps the bits.
+        let flows = kept[n] < 1.0;
+        g11[n] = if flows { nalgebra::convert(new.a[0]) } else { g11[n] };
+        g22[n] = if flows { nalgebra::convert(new.a[1]) } else { g22[n] };
+        g33[n] = if flows { nalgebra::convert(new.across) } else { g33[n] };
+        g12[n] = if flows { nalgebra::convert(new.shear) } else { g12[n] };
+    }
+}
+
+/// Kirchhoff stresses of elastic deformations that are known.
+struct OfElastic<'a, T, const D: usize> {
+    law: &'a Plastic,
+    elastic: &'a Elastics,
+    tau: &'a mut [[[T; BLOCK]; D]; D],
+}
+
+impl<T: RealField + Copy, const D: usize> Loop for OfElastic<'_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { law, elastic, tau } = self;
+        of_elastic(law, elastic, tau);
+    }
+}
+
+#[inline(always)]
+fn of_elastic<T: RealField + Copy, const D: usize>(
+    law: &Plastic,
+    elastic: &Elastics,
+    tau: &mut [[[T; BLOCK]; D]; D],
+) {
+    let (lambda, mu) = (law.lambda, law.law.mu);
+    for n in 0..BLOCK {
+        let Sym { a, shear, .. } = elastic.get(n).kirchhoff(lambda, mu);
+        for i in 0..D {
+            for j in 0..D {
+                tau[i][j][n] = nalgebra::convert(if i == j { a[i] } else { shear });
+            }
         }
     }
 }
@@ -214,18 +319,29 @@ impl<T: RealField + Copy, const D: usize> Loop for Stresses<'_, T, D> {
     fn run<V: Vectors>(self, _: V) {
         let Self { law, F, q, tau } = self;
         let [g11, g22, g33, g12, ..] = q else { return };
-        for n in 0..BLOCK {
-            let G = Sym {
-                a: [double(g11[n]), double(g22[n])],
-                shear: double(g12[n]),
-                across: double(g33[n]),
-            };
-            let elastic = Elastic::new(&row(F, n), &law.of_stress(G));
-            let Sym { a, shear, .. } = elastic.kirchhoff(law.lambda, law.law.mu);
-            for i in 0..D {
-                for j in 0..D {
-                    tau[i][j][n] = nalgebra::convert(if i == j { a[i] } else { shear });
-                }
+        stresses(law, F, [g11, g22, g33, g12], tau);
+    }
+}
+
+#[inline(always)]
+fn stresses<T: RealField + Copy, const D: usize>(
+    law: &Plastic,
+    F: &[[[T; BLOCK]; D]; D],
+    [g11, g22, g33, g12]: [&[T; BLOCK]; 4],
+    tau: &mut [[[T; BLOCK]; D]; D],
+) {
+    let (lambda, mu) = (law.lambda, law.law.mu);
+    for n in 0..BLOCK {
+        let G = Sym {
+            a: [double(g11[n]), double(g22[n])],
+            shear: double(g12[n]),
+            across: double(g33[n]),
+        };
+        let elastic = Elastic::new(&row(F, n), &law.of_stress(G));
+        let Sym { a, shear, .. } = elastic.kirchhoff(lambda, mu);
+        for i in 0..D {
+            for j in 0..D {
+                tau[i][j][n] = nalgebra::convert(if i == j { a[i] } else { shear });
             }
         }
     }
@@ -295,6 +411,25 @@ impl<T: RealField + Copy, const D: usize> LawWithMemory<T, D> for Plastic {
             self.evolve_in_plane(increment, q);
         } else {
             self.evolve_in_space(increment, q);
+        }
+    }
+
+    fn evolve_to_kirchhoff(
+        &self,
+        increment: &Increment<'_, T, D>,
+        q: &mut [[T; BLOCK]],
+        tau: &mut [[[T; BLOCK]; D]; D],
+    ) {
+        if D > 2 {
+            self.evolve_in_space(increment, q);
+            self.kirchhoff(increment.end, q, tau);
+            return;
+        }
+        match self.evolve_in_plane(increment, q) {
+            Some(elastic) if !self.law.planted.is_any() => {
+                dispatch(OfElastic { law: self, elastic: &elastic, tau });
+            }
+            _ => self.kirchhoff(increment.end, q, tau),
         }
     }
 }

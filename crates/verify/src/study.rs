@@ -1,8 +1,9 @@
 //! Convergence studies: the same case on several grids or with several time steps.
 
-use mmsmith_measure::norms::{PerField, PerNorm};
+use mmsmith_measure::norms::{Norm, PerField, PerNorm};
 use mmsmith_runtime::AnySolution;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 use crate::case::{Arithmetic, Case};
 use crate::discretized::Discretized;
@@ -45,6 +46,25 @@ impl Study {
     pub fn new(rows: Vec<Row>, sweep: &Sweep) -> Self {
         let orders = orders(&rows, sweep);
         Self { rows, orders }
+    }
+
+    /// The observed orders of internal variables, by name.
+    #[must_use]
+    pub fn internal_orders(&self, sweep: &Sweep) -> BTreeMap<String, PerNorm<Order>> {
+        let steps: Vec<f64> = self.rows.iter().map(|row| step(row, sweep)).collect();
+        let names = self.rows.first().map_or(&[][..], |row| &row.internal);
+        let of = |(place, (name, _)): (usize, &(String, PerNorm<f64>))| {
+            let error = |row: &Row, norm: Norm| {
+                let norms = row.internal.get(place).filter(|_| row.status == Status::Ok)?;
+                Some(norms.1[norm])
+            };
+            let order = |norm: Norm| {
+                let errors: Vec<_> = self.rows.iter().map(|row| error(row, norm)).collect();
+                Order::of(&steps, &errors)
+            };
+            (name.clone(), PerNorm::from_fn(order))
+        };
+        names.iter().enumerate().map(of).collect()
     }
 }
 
@@ -98,13 +118,18 @@ pub fn converge(
     Study::measure(&cases, sweep, progress)
 }
 
-/// The orders over the rows of a sweep.
-fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
-    let step = |row: &Row| match sweep {
+/// The step that orders of a sweep are about.
+fn step(row: &Row, sweep: &Sweep) -> f64 {
+    match sweep {
         Sweep::Cells(_) => row.h,
         Sweep::Cfls(_) => row.dt,
-    };
-    let rows =
-        rows.iter().map(|row| (step(row), (row.status == Status::Ok).then_some(&row.errors)));
+    }
+}
+
+/// The orders over the rows of a sweep.
+fn orders(rows: &[Row], sweep: &Sweep) -> PerField<PerNorm<Order>> {
+    let rows = rows
+        .iter()
+        .map(|row| (step(row, sweep), (row.status == Status::Ok).then_some(&row.errors)));
     orders_of(&rows.collect::<Vec<_>>())
 }

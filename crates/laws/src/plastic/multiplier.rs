@@ -43,6 +43,7 @@ impl Yield {
 
     /// The multiplier `D` of a step of a time from a trial deviator of this size: at its end the deviator has the size `size - 2 mu D`,
     /// which is the allowed one, and an overstress where flow depends on its rate. Zero where the trial does not flow.
+    #[inline]
     pub(super) fn multiplier(&self, size: f64, alpha: f64, time: f64) -> f64 {
         let over = size - self.allowed(alpha);
         if over <= 0.0 || over.is_nan() {
@@ -55,7 +56,7 @@ impl Yield {
                 return over / (stiffness + ROOT * ROOT * self.flow.modulus);
             }
             let residual = |D: f64| size - stiffness * D - self.allowed(alpha + ROOT * D);
-            return root(residual, over / stiffness);
+            return root(residual, over / stiffness, size);
         };
         // In the overstress over the drag, in which the equation has no steep slopes: `D = time y^exponent / time of the flow`.
         let multiplier = |y: f64| time / of_flow * y.powf(exponent);
@@ -63,26 +64,28 @@ impl Yield {
             let D = multiplier(y);
             size - stiffness * D - self.allowed(alpha + ROOT * D) - drag * y
         };
-        multiplier(root(residual, over / drag))
+        multiplier(root(residual, over / drag, size))
     }
 
     /// As [`multiplier`](Self::multiplier) for a step whose size of the deviator at its end is a function of the multiplier, for flow that
     /// does not depend on its rate.
     pub(super) fn multiplier_of(&self, size: impl Fn(f64) -> f64, alpha: f64) -> f64 {
         let residual = |D: f64| size(D) - self.allowed(alpha + ROOT * D);
-        root(residual, (size(0.0) - self.allowed(alpha)) / (2.0 * self.mu))
+        let of_trial = size(0.0);
+        root(residual, (of_trial - self.allowed(alpha)) / (2.0 * self.mu), of_trial)
     }
 }
 
 /// The root of a falling function that is positive at zero and about zero or negative at `high`, by regula falsi with halved ends
-/// (Illinois).
-fn root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
+/// (Illinois). Values below the rounding of `size` are zero.
+fn root(function: impl Fn(f64) -> f64, high: f64, size: f64) -> f64 {
+    let rounding = f64::EPSILON * size;
     let (mut low, mut at_low) = (0.0, function(0.0));
     let (mut high, mut at_high) = (high, function(high));
     // The direction of the flow may have turned within the step. A little further on, but never far: the size of a deviator beyond zero
     // grows again.
     for _ in 0..8 {
-        if !(at_high > 0.0 && at_high < 0.5 * at_low) {
+        if !(at_high > rounding && at_high < 0.5 * at_low) {
             break;
         }
         let further = high + 1.5 * at_high * (high - low) / (at_low - at_high);
@@ -95,7 +98,7 @@ fn root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
     }
     let mut side = 0;
     for _ in 0..100 {
-        if high - low <= 4.0 * f64::EPSILON * high.abs() || at_high == 0.0 {
+        if high - low <= 4.0 * f64::EPSILON * high.abs() || at_high.abs() <= rounding {
             break;
         }
         let next = (low * at_high - high * at_low) / (at_high - at_low);
@@ -103,6 +106,9 @@ fn root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
             break;
         }
         let value = function(next);
+        if value.abs() <= rounding {
+            return next;
+        }
         if value > 0.0 {
             (low, at_low) = (next, value);
             if side == 1 {

@@ -126,12 +126,9 @@ struct Direction {
     across: f64,
 }
 
-/// The hyperbolic sine, by its series up to one.
+/// The hyperbolic sine; by its series where numbers are small, up to one.
 #[inline(always)]
-fn sinh(x: f64) -> f64 {
-    if x.abs() > 1.0 {
-        return x.sinh();
-    }
+fn sinh<const SMALL: bool>(x: f64) -> f64 {
     /// `1/((2 k)(2 k + 1))` from the last term that counts to the first.
     const QUOTIENTS: [f64; 8] = [
         1.0 / (16.0 * 17.0),
@@ -143,24 +140,27 @@ fn sinh(x: f64) -> f64 {
         1.0 / (4.0 * 5.0),
         1.0 / (2.0 * 3.0),
     ];
+    if !SMALL {
+        return x.sinh();
+    }
     let square = x * x;
     x * QUOTIENTS.iter().fold(1.0, |sum, quotient| 1.0 + sum * (square * quotient))
 }
 
-/// The exponential of a number that is mostly small.
+/// The exponential.
 #[inline(always)]
-fn exp(x: f64) -> f64 {
-    if x.abs() > 1.0 {
+fn exp<const SMALL: bool>(x: f64) -> f64 {
+    if !SMALL {
         return x.exp();
     }
-    let sinh = sinh(x);
+    let sinh = sinh::<true>(x);
     sinh + (1.0 + sinh * sinh).sqrt()
 }
 
 /// `sinh(x)/y`, or `otherwise` where `y` is zero.
 #[inline(always)]
-fn sinh_over(x: f64, y: f64, otherwise: f64) -> f64 {
-    if y > 0.0 { sinh(x) / y } else { otherwise }
+fn sinh_over<const SMALL: bool>(x: f64, y: f64, otherwise: f64) -> f64 {
+    if y > 0.0 { sinh::<SMALL>(x) / y } else { otherwise }
 }
 
 /// Elastic deformations side by side.
@@ -200,6 +200,12 @@ impl Elastics {
         self.size[n] = own.size();
     }
 
+    /// Whether series of small numbers hold for all.
+    #[inline(always)]
+    pub(super) fn are_small(&self) -> bool {
+        self.size.iter().fold(true, |all, size| all & (*size < 1.0))
+    }
+
     #[inline(always)]
     pub(super) fn get(&self, n: usize) -> Elastic {
         Elastic {
@@ -214,12 +220,13 @@ impl Elastics {
 }
 
 /// `G` after a step that ends at `F` and leaves the share `kept` of the logarithm's deviator.
-pub(super) fn returned(F: &F2, G: &Sym, elastic: &Elastic, kept: f64) -> Sym {
+#[inline(always)]
+pub(super) fn returned<const SMALL: bool>(F: &F2, G: &Sym, elastic: &Elastic, kept: f64) -> Sym {
     let &Elastic { theta, sinh, root, .. } = elastic;
     let across = (1.0 - kept) * elastic.deviator_across();
-    let growth = exp(0.5 * across);
-    let of_G = growth * sinh_over(kept * theta, sinh, kept);
-    let of_identity = growth * root * sinh_over((1.0 - kept) * theta, sinh, 1.0 - kept);
+    let growth = exp::<SMALL>(0.5 * across);
+    let of_G = growth * sinh_over::<SMALL>(kept * theta, sinh, kept);
+    let of_identity = growth * root * sinh_over::<SMALL>((1.0 - kept) * theta, sinh, 1.0 - kept);
     // The inverse of C = F^T F.
     let [[f11, f12], [f21, f22]] = *F;
     let J = f11 * f22 - f12 * f21;
@@ -263,12 +270,12 @@ pub(super) fn midpoint(
         0.5 * (A[0][0] * G.shear + A[0][1] * g22 + A[1][0] * g11 + A[1][1] * G.shear),
     ];
     let after = |D: f64| {
-        let (mean, x) = (exp(-2.0 * D * n.mean), 2.0 * D * n.size);
-        let (of_G, of_A) = (mean * x.cosh(), mean * sinh_over(x, n.size, 2.0 * D));
+        let (mean, x) = ((-2.0 * D * n.mean).exp(), 2.0 * D * n.size);
+        let (of_G, of_A) = (mean * x.cosh(), mean * sinh_over::<false>(x, n.size, 2.0 * D));
         Sym {
             a: [of_G * g11 - of_A * AG[0], of_G * g22 - of_A * AG[1]],
             shear: of_G * G.shear - of_A * AG[2],
-            across: G.across * exp(-2.0 * D * n.across),
+            across: G.across * (-2.0 * D * n.across).exp(),
         }
     };
     let D = if law.flow.overstress.is_some() {

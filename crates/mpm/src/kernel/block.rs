@@ -16,7 +16,7 @@ use crate::kernel::any::{Contributions, Interpolated, Receive};
 use crate::kernel::copies::{BLOCK, Kinematics};
 
 /// A law for blocks of particles.
-pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
+pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
     /// Sets the stress fluxes of particles with deformation gradients `F` and these internal variables, for the reference volumes in
     /// `contributions.volume`.
     fn stress(
@@ -46,6 +46,19 @@ pub(crate) trait BlockLaw<T, const D: usize>: Send + Sync {
         _end: &[SMatrix<T, D, D>],
         _internal: &mut [T],
     ) {
+    }
+
+    /// [`evolve`](Self::evolve) and [`stress`](Self::stress) at the end, of a whole block.
+    fn evolve_to_stress(
+        &self,
+        c: &Constants<T, D>,
+        start: &[SMatrix<T, D, D>],
+        end: &[SMatrix<T, D, D>; BLOCK],
+        internal: &mut [T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        self.evolve(c.time_step, start, end, internal);
+        self.stress(c, end, internal, contributions);
     }
 }
 
@@ -182,6 +195,19 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
     ) {
         let mut block = BlockWithMemory::at_rest(&self.variables);
         block.evolve(self.law.as_ref(), start, end, time, internal);
+    }
+
+    fn evolve_to_stress(
+        &self,
+        c: &Constants<T, D>,
+        start: &[SMatrix<T, D, D>],
+        end: &[SMatrix<T, D, D>; BLOCK],
+        internal: &mut [T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        let mut block = BlockWithMemory::at_rest(&self.variables);
+        block.evolve_to_kirchhoff(self.law.as_ref(), start, end, c.time_step, internal);
+        set_fluxes(c, end, |n, _| block.stress(n), contributions);
     }
 }
 

@@ -122,6 +122,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         let (x, v, F) = (whole(x), whole(v), whole(F));
         let &Self { c, domain, law, transfer, nodes, ref forcing, .. } = self;
         let is_with_memory = self.shares.internal > 0;
+        let mut has_stress = false;
         if c.planted.is(Fault::WeightsOfNewPosition) {
             let ahead = std::array::from_fn(|k| x[k] + v[k] * c.time_step);
             weights.compute(c, ids, Kinematics { x: &ahead, F });
@@ -149,7 +150,9 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             };
             weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
             if let Some(start) = start {
-                law.evolve(c.time_step, &start, &particles.F[..BLOCK], particles.internal);
+                let Moving { F, internal, .. } = &mut particles;
+                law.evolve_to_stress(c, &start, whole(F), internal, contributions);
+                has_stress = true;
             }
         }
         let Moving { x, F, internal, .. } = particles;
@@ -169,7 +172,9 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         if c.planted.is(Fault::LastNodeSkipped) {
             weights.skip_last_node(c, x);
         }
-        law.stress(c, F, internal, contributions);
+        if !has_stress {
+            law.stress(c, F, internal, contributions);
+        }
         weights.p2g(&c.strides, band, first, contributions, ids.len());
         Outcome::default()
     }

@@ -8,12 +8,10 @@ use mmsmith_solutions::{
 use mmsmith_solutions::{Components, Flow, Internal, Memory, Response, Stated, WithMemory};
 use mmsmith_verify::{
     Arithmetic, Case, CflSpeed, Composition, Layout, MassMatrix, Outputs, ReturnMap, Row, Scheme,
-    Status, Sweep, Total, Transfer, Updated, check, converge, run,
+    Status, Study, Sweep, Total, Transfer, Updated, check, converge, run,
 };
-use nalgebra::{SMatrix, Vector1};
+use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
-
-type X1 = Vector1<f64>;
 
 /// A solution on a line.
 trait Line: Send + Sync + 'static {
@@ -30,45 +28,56 @@ trait Line: Send + Sync + 'static {
     }
 }
 
-struct OnLine<S> {
+/// A solution along the first axis of `D` dimensions, in a unit box.
+struct AlongAxis<S, const D: usize> {
     own: S,
-    boundaries: [Boundary; 2],
+    boundaries: Vec<Boundary>,
+}
+
+fn along_axis<S: Line, const D: usize>(own: S) -> AlongAxis<S, D> {
+    let condition = own.condition();
+    let surfaces = (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]);
+    let boundaries = surfaces.map(|surface| Boundary { surface, condition }).collect();
+    AlongAxis { own, boundaries }
 }
 
 fn on_line<S: Line>(own: S) -> AnySolution<f64> {
-    let condition = own.condition();
-    let boundaries =
-        [Surface::Lower(0), Surface::Upper(0)].map(|surface| Boundary { surface, condition });
-    AnySolution::One(Box::new(OnLine { own, boundaries }))
+    AnySolution::One(Box::new(along_axis::<S, 1>(own)))
 }
 
-impl<S: Line> Solution<f64, 1> for OnLine<S> {
-    fn displacement(&self, X: &X1, t: f64) -> X1 {
-        Vector1::new(self.own.motion(X[0], t)[0])
+fn first<const D: usize, const C: usize>(value: f64) -> SMatrix<f64, D, C> {
+    let mut all = SMatrix::zeros();
+    all[(0, 0)] = value;
+    all
+}
+
+impl<S: Line, const D: usize> Solution<f64, D> for AlongAxis<S, D> {
+    fn displacement(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        first(self.own.motion(X[0], t)[0])
     }
-    fn velocity(&self, X: &X1, t: f64) -> X1 {
-        Vector1::new(self.own.motion(X[0], t)[1])
+    fn velocity(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        first(self.own.motion(X[0], t)[1])
     }
-    fn acceleration(&self, X: &X1, t: f64) -> X1 {
-        Vector1::new(self.own.motion(X[0], t)[2])
+    fn acceleration(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
+        first(self.own.motion(X[0], t)[2])
     }
-    fn displacement_gradient(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
-        Vector1::new(self.own.gradient(X[0], t))
+    fn displacement_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        first(self.own.gradient(X[0], t))
     }
-    fn deformation_gradient(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
-        Vector1::new(1.0 + self.own.gradient(X[0], t))
+    fn deformation_gradient(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        SMatrix::identity() + first(self.own.gradient(X[0], t))
     }
-    fn jacobian(&self, X: &X1, t: f64) -> f64 {
+    fn jacobian(&self, X: &SVector<f64, D>, t: f64) -> f64 {
         1.0 + self.own.gradient(X[0], t)
     }
-    fn first_piola_kirchhoff(&self, X: &X1, t: f64) -> SMatrix<f64, 1, 1> {
-        Vector1::new(self.own.stress(X[0], t)[0])
+    fn first_piola_kirchhoff(&self, X: &SVector<f64, D>, t: f64) -> SMatrix<f64, D, D> {
+        first(self.own.stress(X[0], t)[0])
     }
-    fn body_force(&self, X: &X1, t: f64) -> X1 {
+    fn body_force(&self, X: &SVector<f64, D>, t: f64) -> SVector<f64, D> {
         let [.., a] = self.own.motion(X[0], t);
-        Vector1::new(a - self.own.stress(X[0], t)[1] / self.own.density(X[0]))
+        first(a - self.own.stress(X[0], t)[1] / self.own.density(X[0]))
     }
-    fn fields(&self, X: &X1, t: f64) -> Fields<f64, 1> {
+    fn fields(&self, X: &SVector<f64, D>, t: f64) -> Fields<f64, D> {
         Fields {
             u: self.displacement(X, t),
             v: self.velocity(X, t),
@@ -80,8 +89,8 @@ impl<S: Line> Solution<f64, 1> for OnLine<S> {
             b: self.body_force(X, t),
         }
     }
-    fn domain(&self) -> Domain<f64, 1> {
-        Domain::Box { lower: Vector1::new(0.0), upper: Vector1::new(1.0) }
+    fn domain(&self) -> Domain<f64, D> {
+        Domain::Box { lower: SVector::zeros(), upper: SVector::repeat(1.0) }
     }
     fn boundaries(&self) -> &[Boundary] {
         &self.boundaries
@@ -90,18 +99,23 @@ impl<S: Line> Solution<f64, 1> for OnLine<S> {
         1.0
     }
     fn law(&self) -> Law<f64> {
-        self.own.law()
+        let mut law = self.own.law();
+        if let Law::Stated(Stated { response: Response::Stress(rows), .. }) = &mut law {
+            rows.iter_mut().for_each(|row| row.resize(D, "0".to_owned()));
+            rows.resize(D, vec!["0".to_owned(); D]);
+        }
+        law
     }
     fn density(&self) -> f64 {
         self.own.density(0.5)
     }
-    fn density_at(&self, X: &X1) -> f64 {
+    fn density_at(&self, X: &SVector<f64, D>) -> f64 {
         self.own.density(X[0])
     }
     fn internal_variables(&self) -> Vec<String> {
         self.own.internal(0.5, 0.0).iter().map(|(name, _)| (*name).to_owned()).collect()
     }
-    fn internal(&self, X: &X1, t: f64) -> Vec<f64> {
+    fn internal(&self, X: &SVector<f64, D>, t: f64) -> Vec<f64> {
         self.own.internal(X[0], t).iter().map(|(_, value)| *value).collect()
     }
     fn wave_speed(&self) -> f64 {
@@ -254,7 +268,7 @@ impl PlasticBar {
         2.0 * Self::MU * F.ln() / (3.0 * Self::MU + Self::MODULUS)
     }
 
-    /// `u = r(t) (X + X^2/2)`.
+    /// `u = r(t) (X + sin(2 X)/4)`.
     fn ramp(t: f64) -> [f64; 3] {
         [0.05 * (t + t * t), 0.05 * (1.0 + 2.0 * t), 0.1]
     }
@@ -262,14 +276,14 @@ impl PlasticBar {
 
 impl Line for PlasticBar {
     fn motion(&self, X: f64, t: f64) -> [f64; 3] {
-        Self::ramp(t).map(|r| r * (X + 0.5 * X * X))
+        Self::ramp(t).map(|r| r * (X + 0.25 * (2.0 * X).sin()))
     }
     fn gradient(&self, X: f64, t: f64) -> f64 {
-        Self::ramp(t)[0] * (1.0 + X)
+        Self::ramp(t)[0] * (1.0 + 0.5 * (2.0 * X).cos())
     }
     fn stress(&self, X: f64, t: f64) -> [f64; 2] {
         let F = 1.0 + self.gradient(X, t);
-        let slope = Self::ramp(t)[0];
+        let slope = -Self::ramp(t)[0] * (2.0 * X).sin();
         let (lambda, mu) = (Self::LAMBDA, Self::MU);
         let of_logarithm = lambda + 2.0 * mu - 4.0 * mu * mu / (3.0 * mu + Self::MODULUS);
         let tau = of_logarithm * F.ln() + 2.0 / 3.0 * Self::YIELD;
@@ -316,11 +330,22 @@ fn total(degree: usize) -> Scheme {
     })
 }
 
+/// The orders of internal variables are those of their errors.
+fn assert_orders_of_internal(study: &Study, sweep: &Sweep) {
+    let all = study.internal_orders(sweep);
+    for (k, (name, first)) in study.rows[0].internal.iter().enumerate() {
+        let own = &all[name].l2;
+        let expected = (first.l2 / study.rows[1].internal[k].1.l2).log2();
+        assert!(own.local[0].is_some_and(|order| (order - expected).abs() < 1e-9), "{own:?}");
+    }
+}
+
 fn study(solution: &AnySolution<f64>, case: &Case, cells: &[usize]) -> Vec<Row> {
     let sweep = Sweep::Cells(cells.to_vec());
-    let rows = converge(solution, Arithmetic::Double, case, &sweep, &mut |_| ())
-        .expect("cases that can be run")
-        .rows;
+    let found = converge(solution, Arithmetic::Double, case, &sweep, &mut |_| ())
+        .expect("cases that can be run");
+    assert_orders_of_internal(&found, &sweep);
+    let rows = found.rows;
     for row in &rows {
         assert_eq!(row.status, Status::Ok, "{row:?}");
     }
@@ -401,7 +426,7 @@ fn plastic_flow_in_a_bar_has_the_orders_of_splines() {
 fn several_processes_measure_internal_variables_to_the_bit() {
     let case = Case {
         scheme: Scheme::Updated(Updated { transfer: Transfer::Apic, ..Updated::default() }),
-        cells: 64,
+        cells: 40,
         cfl_speed: CflSpeed::PWave,
         periods: 0.2,
         ..Case::default()
@@ -410,7 +435,8 @@ fn several_processes_measure_internal_variables_to_the_bit() {
     let measured = |ranks| {
         let progress = &mut |_| ();
         let mut outputs = Outputs { ranks, ..Outputs::new(progress) };
-        timeless(run(&on_line(Springs), Arithmetic::Double, &case, &mut outputs).expect("a case"))
+        let solution = AnySolution::Two(Box::new(along_axis::<_, 2>(Springs)));
+        timeless(run(&solution, Arithmetic::Double, &case, &mut outputs).expect("a case"))
     };
     let alone = measured(None);
     assert!(alone.internal[0].1.l2 > 0.0);
