@@ -355,3 +355,52 @@ fn laws_of_text_have_second_order() {
         }
     }
 }
+
+/// A step that ends with stresses has the bits of its two halves, whether particles of the block flow or not.
+#[test]
+fn steps_to_stresses_have_the_bits_of_steps_and_stresses() {
+    fn check<const D: usize>(law: &WithMemory<f64>, map: ReturnMap)
+    where
+        f64: Stressed<D>,
+    {
+        let law = of_solver::<D>(law, map);
+        let Law::WithMemory(law) = &law else { panic!("{law:?}") };
+        let motion = motion(D);
+        let F = |t: f64| -> [[[f64; BLOCK]; D]; D] {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    std::array::from_fn(|n| motion(t * n as f64 / BLOCK as f64).F[i][j].value)
+                })
+            })
+        };
+        let bits = |rows: &[[f64; BLOCK]]| -> Vec<u64> {
+            rows.iter().flatten().map(|value| value.to_bits()).collect()
+        };
+        let start: Vec<[f64; BLOCK]> = law.variables().iter().map(|q| [q.at_rest; BLOCK]).collect();
+        let (mut together, mut apart) = (start.clone(), start);
+        let mut tau = [F(0.0); 2];
+        let mut before = F(0.0);
+        // Elastic at first, then some flow.
+        for step in 1..=40 {
+            let end = F(f64::from(step).powi(2) / 1600.0);
+            let increment = Increment { start: &before, end: &end, time: 0.05 };
+            law.evolve_to_kirchhoff(&increment, &mut together, &mut tau[0]);
+            law.evolve(&increment, &mut apart);
+            law.kirchhoff(&end, &apart, &mut tau[1]);
+            assert_eq!(bits(&together), bits(&apart), "{law:?} {D}D step {step}");
+            let [first, second] = tau.map(|tau| bits(tau.as_flattened()));
+            assert_eq!(first, second, "{law:?} {D}D step {step}");
+            before = end;
+        }
+    }
+    for law in [
+        flow_of(Flow { is_on_yield: false, ..PLASTIC }),
+        flow_of(Flow { yield_stress: 1e6, is_on_yield: false, ..PLASTIC }),
+    ] {
+        for map in [ReturnMap::Exponential, ReturnMap::Midpoint] {
+            check::<1>(&law, map);
+            check::<2>(&law, map);
+            check::<3>(&law, map);
+        }
+    }
+}

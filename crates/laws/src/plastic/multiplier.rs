@@ -71,8 +71,9 @@ impl Yield {
     /// does not depend on its rate.
     pub(super) fn multiplier_of(&self, size: impl Fn(f64) -> f64, alpha: f64) -> f64 {
         let residual = |D: f64| size(D) - self.allowed(alpha + ROOT * D);
-        let of_trial = size(0.0);
-        root(residual, (of_trial - self.allowed(alpha)) / (2.0 * self.mu), of_trial)
+        let stiffness = 2.0 * self.mu;
+        // Logarithms of stretches about one carry the rounding of one.
+        root(residual, (size(0.0) - self.allowed(alpha)) / stiffness, stiffness)
     }
 }
 

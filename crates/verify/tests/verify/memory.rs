@@ -418,7 +418,8 @@ fn plastic_flow_in_a_bar_has_the_orders_of_splines() {
         assert_eq!(rows[0].internal.len(), 1);
         assert_eq!(rows[0].internal[0].0, "alpha");
         let found = orders(&rows);
-        assert!(found.iter().all(|order| (order - 2.0).abs() < 0.1), "{map:?}: {found:?}");
+        // At two Gauss points a cell gradients of quadratic splines gain an order; on a line return maps have no error of their own.
+        assert!(found.iter().all(|order| (order - 3.0).abs() < 0.1), "{map:?}: {found:?}");
     }
 }
 
