@@ -473,17 +473,22 @@ impl<const D: usize> Tables<D> {
         Ok(Self { table: any(table), end, error })
     }
 
-    /// The series of places.
-    fn at_all(&self, histories: &Histories<D>, X: &[[f64; D]]) -> Vec<AtPoint> {
+    /// The series of some fields at places.
+    fn at_all(
+        &self,
+        histories: &Histories<D>,
+        X: &[[f64; D]],
+        fields: &Range<usize>,
+    ) -> Vec<AtPoint> {
         let q: Vec<[f64; D]> = X.iter().map(|X| histories.chart.coordinates(X)).collect();
         fn own<const K: usize, const D: usize>(axes: &[usize], q: &[[f64; D]]) -> Vec<[f64; K]> {
             q.iter().map(|q| std::array::from_fn(|k| q[axes[k]])).collect()
         }
         let axes = &histories.axes;
         match &self.table {
-            OverAxes::One(table) => table.at_all(&own(axes, &q)),
-            OverAxes::Two(table) => table.at_all(&own(axes, &q)),
-            OverAxes::Three(table) => table.at_all(&own(axes, &q)),
+            OverAxes::One(table) => table.at_all_of(&own(axes, &q), fields.clone()),
+            OverAxes::Two(table) => table.at_all_of(&own(axes, &q), fields.clone()),
+            OverAxes::Three(table) => table.at_all_of(&own(axes, &q), fields.clone()),
         }
     }
 
@@ -670,10 +675,10 @@ impl SeriesOfAll {
         let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
         let (mut pieces, mut coefficients) = (1, Vec::new());
         for X in X.chunks(CHUNK) {
-            for series in tables.at_all(histories, X) {
-                pieces = series.coefficients(range.start).len() / in_time;
+            for series in tables.at_all(histories, X, range) {
+                pieces = series.coefficients(0).len() / in_time;
                 for piece in 0..pieces {
-                    for quantity in range.clone() {
+                    for quantity in 0..range.len() {
                         let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
                         coefficients.extend_from_slice(own);
                         coefficients.resize(coefficients.len() + padded - in_time, 0.0);

@@ -2,7 +2,7 @@
 
 use crate::dimension::in_dimension;
 use crate::points;
-use mmsmith_runtime::{AnySolution, HistoryReport, Solution};
+use mmsmith_runtime::{AnySolution, HistoryReport, Law, Memory, Solution};
 use nalgebra::SVector;
 
 /// How the histories of internal variables go at `count` places of a body over a period; none for elastic laws.
@@ -28,4 +28,25 @@ fn of<const D: usize>(
     let places: Vec<SVector<f64, D>> =
         (0..count).filter_map(|n| Some(points::interior(&domain, period, n)?.0)).collect();
     solution.history(&places, period)
+}
+
+/// Whether the law has flow, for which a solver needs a return map.
+#[must_use]
+pub fn has_flow(solution: &AnySolution<f64>) -> bool {
+    let is_flow = |law: Law<f64>| match law {
+        Law::WithMemory(law) => matches!(law.memory, Memory::Flow(_)),
+        Law::Library(_) | Law::Stated(_) => false,
+    };
+    in_dimension!(solution, |s| is_flow(s.law()), else false)
+}
+
+/// Whether the stress depends on more than the deformation gradient.
+#[must_use]
+pub(crate) fn has_memory(solution: &AnySolution<f64>) -> bool {
+    let is_such = |law: Law<f64>| match law {
+        Law::WithMemory(_) => true,
+        Law::Stated(stated) => stated.has_memory(),
+        Law::Library(_) => false,
+    };
+    in_dimension!(solution, |s| is_such(s.law()), else false)
 }

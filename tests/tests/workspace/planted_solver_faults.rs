@@ -336,7 +336,12 @@ fn by_differences(
     let study = with(fault, measure).unwrap();
     let steps: Vec<f64> = study.rows.iter().map(|row| row.dt).collect();
     let ok = study.rows.iter().map(|row| (row.status == Status::Ok).then_some(&row.differences));
-    judged(&verdicts(&steps, &ok.collect::<Vec<_>>(), &expected_in_time(case), ORDER_TOLERANCE))
+    judged(&verdicts(
+        &steps,
+        &ok.collect::<Vec<_>>(),
+        &expected_in_time(exact, case),
+        ORDER_TOLERANCE,
+    ))
 }
 
 /// The checks among `names` that catch a fault, in their order, with the first problem that each found.

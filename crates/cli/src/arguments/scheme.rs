@@ -29,6 +29,9 @@ pub(crate) struct SchemeOptions {
     /// 6 for splines of degree 4 and 5
     #[arg(long, value_parser = one_of::<verify::Composition>())]
     pub(crate) composition: Option<verify::Composition>,
+    /// Return map of a law with flow. Default: exponential
+    #[arg(long, value_parser = one_of::<verify::ReturnMap>())]
+    pub(crate) return_map: Option<verify::ReturnMap>,
     /// Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian
     /// formulation only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls
     #[arg(long, value_enum)]

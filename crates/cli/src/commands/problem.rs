@@ -96,6 +96,9 @@ impl Problem {
         ] {
             settings[name] = value;
         }
+        if let Some(map) = settled.case.return_map {
+            settings["return_map"] = json!(map.name());
+        }
         if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
             settings["polar_angles"] = json!(POLAR_ANGLES);
         }

@@ -272,7 +272,8 @@ fn measure_differences(
         bar.show(&format!("{what}, CFL {}", cfls[progress.case]), progress);
     };
     let found = case.differences(cfls, &mut show)?;
-    let verdicts = judge_differences(&found, &expected_in_time(&base), ORDER_TOLERANCE);
+    let verdicts =
+        judge_differences(&found, &expected_in_time(&problem.model.exact, &base), ORDER_TOLERANCE);
     let report = Report {
         settings: problem.settings(case.plan().extent, cells, cfls),
         results: [("temporal".to_owned(), temporal_results(&found, &verdicts))]

@@ -4,8 +4,8 @@ use anyhow::{Result, bail};
 use mmsmith_solutions::{AnySolution, Boundary};
 use mmsmith_verify::{
     self as verify, Case, CaseError, CflSpeed, Composition, Coordinates, Formulation, GridPose,
-    Integrator, LARGEST_USUAL_CFL, MassMatrix, Named, Placement, Scheme, Shape, Start, Total,
-    Transfer, USUAL_CFL, Updated, UsualStep, usual_step,
+    Integrator, LARGEST_USUAL_CFL, MassMatrix, Named, Placement, ReturnMap, Scheme, Shape, Start,
+    Total, Transfer, USUAL_CFL, Updated, UsualStep, usual_step,
 };
 
 use crate::arguments::{Layout, Precision, SchemeOptions, Weights};
@@ -91,7 +91,7 @@ impl Settled {
             cfl_speed: step.speed,
             periods: options.periods,
             extent: options.extent,
-            return_map: None,
+            return_map: return_map(options, exact)?,
         };
         let loaded = verify::loaded_instead(exact, &case);
         let mut settled = Self {
@@ -276,6 +276,18 @@ fn refuse_pose(options: &SchemeOptions) -> Result<()> {
 }
 
 /// Refuses a start for integrators that have none to choose.
+/// The return map of a law with flow; other laws have none.
+fn return_map(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Option<ReturnMap>> {
+    match (options.return_map, verify::has_flow(exact)) {
+        (given, true) => Ok(Some(given.unwrap_or_default())),
+        (None, false) => Ok(None),
+        (Some(given), false) => bail!(
+            "--return-map {}: only a law with [material.flow] has a return map; leave --return-map out",
+            given.name()
+        ),
+    }
+}
+
 fn refuse_start(options: &SchemeOptions, is_total: bool) -> Result<()> {
     if options.start == Start::Halved {
         return Ok(());

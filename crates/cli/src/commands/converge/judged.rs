@@ -1,8 +1,9 @@
 //! Judgement of a series of errors.
 
+use mmsmith_solutions::{AnySolution, Smoothness};
 use mmsmith_verify::{
     Behaviour, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
-    Values, expected_in_space, expected_in_time, orders_above, verdicts_above,
+    Values, expected_in_space, expected_in_time, history_of, orders_above, verdicts_above,
 };
 
 use super::Converge;
@@ -16,15 +17,32 @@ pub(super) struct Judged {
     pub(super) verdicts: Verdicts,
     /// Differences between time steps and their verdicts, in a study in time.
     pub(super) differences: Option<(Temporal, Verdicts)>,
+    /// Why no order is expected of this solution, whatever the caller expects.
+    pub(super) not_judged: Option<String>,
+}
+
+/// The particles whose histories tell of fronts.
+const HISTORIES: usize = 100;
+
+/// Why no order can be expected: where particles begin to flow, the body force may jump.
+fn not_judged(exact: &AnySolution<f64>) -> Option<String> {
+    let report = history_of(exact, HISTORIES).ok()??;
+    (report.smoothness == Smoothness::Jump && report.onsets + report.unloadings > 0).then(|| {
+        "Orders are not judged: the body force jumps where particles begin to flow, and errors at such a front have no order. With \
+         yield = 'sy + K*alpha^(1/3)', or a motion that flows everywhere from the start, they have one."
+            .to_owned()
+    })
 }
 
 impl Judged {
     pub(super) fn new(asked: &Converge<'_>, rows: Vec<Row>, differences: Option<Temporal>) -> Self {
         let Converge { problem, sweep, base, cases, orders, .. } = asked;
+        let not_judged = not_judged(&problem.model.exact);
         let floors: Vec<PerField<f64>> = cases.iter().map(|case| *case.floors()).collect();
         let study = above(Study::new(rows, sweep), sweep, &floors);
         // In time the expectation is about the differences; the total error is mostly a spatial one.
         let in_space = match (sweep, orders.expected) {
+            _ if not_judged.is_some() => Expected::default(),
             (Sweep::Cells(_), Some(expected)) => expected,
             (Sweep::Cells(_), None) => expected_in_space(&problem.model.exact, base),
             (Sweep::Cfls(_), _) => Expected::default(),
@@ -36,11 +54,16 @@ impl Judged {
         };
         let verdicts = settle(judge_above(&study, sweep, &in_space, orders.tolerance, &floors));
         let differences = differences.map(|found| {
-            let expected = orders.expected.unwrap_or_else(|| expected_in_time(base));
+            let expected = match &not_judged {
+                Some(_) => Expected::default(),
+                None => {
+                    orders.expected.unwrap_or_else(|| expected_in_time(&problem.model.exact, base))
+                }
+            };
             let verdicts = settle(judge_differences(&found, &expected, orders.tolerance));
             (found, verdicts)
         });
-        Self { study, verdicts, differences }
+        Self { study, verdicts, differences, not_judged }
     }
 
     /// The verdicts on which the result of the study hangs.

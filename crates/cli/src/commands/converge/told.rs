@@ -41,6 +41,9 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
     let verdict = judged.passed();
     let mut results = results(&judged.study, &judged.verdicts);
     results.insert("passed".into(), json!(verdict));
+    if let Some(reason) = &judged.not_judged {
+        results.insert("not_judged".into(), json!(reason));
+    }
     if let Some((found, verdicts)) = &judged.differences {
         results.insert("temporal".into(), temporal_results(found, verdicts));
     }
@@ -60,7 +63,7 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
 
 /// The tables.
 fn sections(judged: &Judged, sweep: &Sweep, units: Option<Units>) -> Vec<Section> {
-    let Judged { study, verdicts, differences } = judged;
+    let Judged { study, verdicts, differences, .. } = judged;
     let (length, time) = (units.map(Units::length), units.map(Units::time));
     let mut sections = Vec::new();
     for (field, table) in tables(study, sweep, verdicts) {
@@ -84,7 +87,7 @@ fn sections(judged: &Judged, sweep: &Sweep, units: Option<Units>) -> Vec<Section
 /// Lines below the tables.
 fn notes(asked: &Converge<'_>, judged: &Judged, advice: Option<&Advice>) -> Result<String> {
     let Converge { problem, base, .. } = asked;
-    let Judged { study, verdicts, differences } = judged;
+    let Judged { study, verdicts, differences, .. } = judged;
     let mut notes = stops(study);
     if !notes.is_empty()
         && let Some(told) = inversion::measure(&problem.selection)?
@@ -94,6 +97,7 @@ fn notes(asked: &Converge<'_>, judged: &Judged, advice: Option<&Advice>) -> Resu
     if differences.is_some() {
         notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
     }
+    notes += &judged.not_judged.iter().map(|reason| format!("{reason}\n")).collect::<String>();
     notes += &way_out(&problem.model.exact, base, study);
     notes += &advice.map(Advice::text).unwrap_or_default();
     let has_range = |judged: &Verdicts| any(judged, |one| !one.asymptotic_rows.is_empty());
