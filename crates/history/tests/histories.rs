@@ -95,6 +95,21 @@ fn flow_keeps_the_yield_condition_and_the_volume() {
             let allowed = YIELD + modulus * q[6].powf(exponent);
             assert!((s.norm() - (2.0_f64 / 3.0).sqrt() * allowed).abs() < 1e-12 * YIELD);
             assert!((G.determinant() - 1.0).abs() < 1e-12);
+            // The margin is n : d/|d|.
+            let SymmetricEigen { eigenvalues, eigenvectors: Q } =
+                SymmetricEigen::new(F * G * F.transpose());
+            let logs = eigenvalues.map(f64::ln);
+            let s = Q * Matrix3::from_diagonal(&logs.add_scalar(-logs.mean())) * Q.transpose();
+            let rate = Matrix3::from_fn(|i, j| motion.at(1.0).rate[i][j].value);
+            let l = rate * F.try_inverse().unwrap();
+            let d = (l + l.transpose()) * 0.5;
+            let expected = s.dot(&d) / (s.norm() * d.norm());
+            let of = |A: Matrix3<f64>| -> Tensor<f64> {
+                std::array::from_fn(|i| std::array::from_fn(|j| A[(i, j)]))
+            };
+            let at = Kinematics { F: of(F), rate: of(rate) };
+            let margin = law.margin(&at, &constants, &z, Branch::Flowing);
+            assert!((margin - expected).abs() < 1e-11, "{margin} {expected}");
         }
     }
 }
