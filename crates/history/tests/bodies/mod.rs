@@ -75,12 +75,13 @@ pub(crate) fn block(
     let at = move |t: f64| {
         let (x, y) = (number(X[0], [1.0, 0.0]), number(X[1], [0.0, 1.0]));
         let plain = |value: f64| number(value, [0.0; 2]);
-        let ramp = |r: f64| {
-            let (r, stretch) = (plain(r), plain(0.1));
+        // Rows go by other functions of time, so that the rate does not commute with the deformation.
+        let ramp = |r: f64, q: f64| {
+            let (r, q, stretch) = (plain(r), plain(q), plain(0.1));
             let bend = plain(0.04);
             [
                 [r * (stretch + bend * x * y), r * plain(0.05) * x * x],
-                [r * bend * y * x, r * (plain(-0.08) + plain(0.02) * x)],
+                [q * bend * y * x, q * (plain(-0.08) + plain(0.02) * x)],
             ]
         };
         let of = |entries: [[Dual<f64, 2>; 2]; 2], diagonal: f64| -> Tensor<Dual<f64, 2>> {
@@ -91,7 +92,11 @@ pub(crate) fn block(
                 })
             })
         };
-        Kinematics { F: of(ramp(t + 0.3 * t * t), 1.0), rate: of(ramp(1.0 + 0.6 * t), 0.0) }
+        let (r, rate) = (t + 0.3 * t * t, 1.0 + 0.6 * t);
+        Kinematics {
+            F: of(ramp(r, r + 0.2 * r * r), 1.0),
+            rate: of(ramp(rate, rate * (1.0 + 0.4 * r)), 0.0),
+        }
     };
     (at, steady(constants))
 }
