@@ -116,6 +116,19 @@ class Solution:
         X = self._positions(X)
         return _evaluated(lambda X, t, out: self._fields.traction(surface, X, t, out), X, t, _result(out, X.shape, X))
 
+    @property
+    def internal_variables(self) -> list[str]:
+        """Names of the internal variables of the law; none for elastic laws."""
+        return self._fields.internal_variables
+
+    def internal(self, X: ArrayLike, t: float | ArrayLike) -> dict[str, Array]:
+        """Internal variables by name, each with a value a point: `alpha` is the plastic strain, `G11` and so on the entries of (F^p^T F^p)^-1."""
+        X = self._positions(X)
+        names = self.internal_variables
+        shape = (*X.shape[:-1], len(names))
+        values = _evaluated(self._fields.internal, X, t, _result(None, shape, X))
+        return {name: values[..., k] for k, name in enumerate(names)}
+
     def points(self, X: ArrayLike) -> "Points":
         """The solution at points that stay: what depends on these alone is computed once."""
         X = self._positions(X)

@@ -202,6 +202,7 @@ impl Fields {
         let name = |quantity: &Quantity| match quantity {
             Quantity::Traction(surface) => surface.to_string(),
             Quantity::Field(field) => field.letter().to_owned(),
+            Quantity::Internal => String::new(),
         };
         match surfaces.clone().find(|quantity| name(quantity) == surface) {
             Some(quantity) => self.compute(py, quantity, &X, t, out),
@@ -214,6 +215,21 @@ impl Fields {
                 )))
             }
         }
+    }
+
+    fn internal(
+        &self,
+        py: Python<'_>,
+        X: PyReadonlyArray2<'_, f64>,
+        t: f64,
+        out: PyReadwriteArrayDyn<'_, f64>,
+    ) -> PyResult<()> {
+        self.compute(py, Quantity::Internal, &X, t, out)
+    }
+
+    #[getter]
+    fn internal_variables(&self) -> Vec<String> {
+        self.arrays.internal_variables().to_vec()
     }
 
     fn at(&self, py: Python<'_>, X: PyReadonlyArray2<'_, f64>) -> PyResult<FieldsAtPoints> {

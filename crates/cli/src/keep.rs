@@ -283,7 +283,7 @@ const BUILD: &str = env!("MMS_BUILD");
 pub(crate) fn origin(solution: &str) -> Result<Value> {
     // What was compiled in is part of the build.
     let specification = match locate(solution)? {
-        Origin::BuiltIn(_) => None,
+        Origin::BuiltIn(_) | Origin::Text { .. } => None,
         Origin::File { text, .. } => Some(sum(text.as_bytes())),
     };
     Ok(json!({ "build": BUILD, "specification": specification }))

@@ -31,11 +31,42 @@ const VARIABLE: &str = "MMSMITH_SPECS";
 /// The longest specification; what is longer, such as a device, is not read to its end.
 const LONGEST: u64 = mmsmith_spec::LONGEST_FILE as u64;
 
+/// Specifications of laws that remember, or that depend on the place, which are compiled in as text.
+const WITH_MEMORY: &[(&str, &str)] = &[
+    ("bar-j2", include_str!("../../../mms-specs/with-memory/bar-j2.toml")),
+    ("bar-kelvin-voigt", include_str!("../../../mms-specs/with-memory/bar-kelvin-voigt.toml")),
+    ("bar-own-law", include_str!("../../../mms-specs/with-memory/bar-own-law.toml")),
+    ("block-graded", include_str!("../../../mms-specs/with-memory/block-graded.toml")),
+    ("block-j2", include_str!("../../../mms-specs/with-memory/block-j2.toml")),
+    ("block-j2-3d", include_str!("../../../mms-specs/with-memory/block-j2-3d.toml")),
+    ("block-maxwell", include_str!("../../../mms-specs/with-memory/block-maxwell.toml")),
+    ("block-perzyna", include_str!("../../../mms-specs/with-memory/block-perzyna.toml")),
+    ("block-warm", include_str!("../../../mms-specs/with-memory/block-warm.toml")),
+    ("ring-j2", include_str!("../../../mms-specs/with-memory/ring-j2.toml")),
+    ("ring-simo", include_str!("../../../mms-specs/with-memory/ring-simo.toml")),
+];
+
+/// The names of all solutions that can be listed: [`names`], then those of laws that remember.
+pub(crate) fn all_names() -> Vec<String> {
+    let mut all = names();
+    let others = WITH_MEMORY.iter().map(|(name, _)| (*name).to_owned());
+    let others: Vec<String> = others.filter(|name| !all.contains(name)).collect();
+    all.extend(others);
+    all
+}
+
 /// Where a solution was found.
 #[derive(Clone, Debug)]
 pub(crate) enum Origin {
     /// Among those that were compiled in.
     BuiltIn(&'static Description),
+    /// A specification that was compiled in as text: its law remembers, or depends on the place, and its fields are interpreted.
+    Text {
+        /// The name.
+        name: &'static str,
+        /// All of it.
+        text: &'static str,
+    },
     /// In a file.
     File {
         /// From the working folder where it is there or above it.
@@ -62,6 +93,7 @@ impl Origin {
     pub(crate) fn text(&self) -> &str {
         match self {
             Self::BuiltIn(description) => description.specification,
+            Self::Text { text, .. } => text,
             Self::File { text, .. } => text,
         }
     }
@@ -70,6 +102,7 @@ impl Origin {
     pub(crate) fn file(&self) -> String {
         match self {
             Self::BuiltIn(description) => format!("{}.toml", description.name),
+            Self::Text { name, .. } => format!("{name}.toml"),
             Self::File { path, .. } => path.display().to_string(),
         }
     }
@@ -84,7 +117,7 @@ impl Origin {
     /// Where other files of the specification are, if it is a file itself.
     pub(crate) fn folder(&self) -> Option<&Path> {
         match self {
-            Self::BuiltIn(_) => None,
+            Self::BuiltIn(_) | Self::Text { .. } => None,
             Self::File { path, .. } => path.parent(),
         }
     }
@@ -98,6 +131,7 @@ impl Origin {
     pub(crate) fn words(&self) -> String {
         match self {
             Self::BuiltIn(_) => "built in".into(),
+            Self::Text { .. } => "built in, interpreted".into(),
             Self::File { path, instead_of: None, .. } => path.display().to_string(),
             Self::File { path, instead_of: Some(_), .. } => {
                 format!("{}, which differs from the built-in one", path.display())
@@ -121,7 +155,10 @@ pub(crate) fn locate(name: &str) -> Result<Origin> {
     let found = folders().into_iter().map(|folder| folder.join(&file)).find(|path| path.is_file());
     let origin = match (found, built_in) {
         (None, Some(description)) => Origin::BuiltIn(description),
-        (None, None) => return Err(unknown(name)),
+        (None, None) => match WITH_MEMORY.iter().find(|(known, _)| *known == name) {
+            Some((name, text)) => Origin::Text { name, text },
+            None => return Err(unknown(name)),
+        },
         (Some(path), _) => match (Origin::read(path)?, built_in) {
             (Origin::File { text, .. }, Some(description))
                 if same_lines(&text, description.specification) =>
@@ -175,6 +212,7 @@ fn tell(name: &str, origin: &Origin) {
             path.display()
         )),
         Origin::BuiltIn(_) => terminal::detail(format_args!("{name}: built in, generated code")),
+        Origin::Text { .. } => terminal::detail(format_args!("{name}: built in, interpreted")),
         Origin::File { path, instead_of: None, .. } => {
             terminal::detail(format_args!("{name}: {}, interpreted", path.display()));
         }
@@ -204,7 +242,7 @@ pub(crate) fn names() -> Vec<String> {
 
 /// The refusal of a name that leads nowhere: what was meant perhaps, what there is, and where it was looked for.
 fn unknown(name: &str) -> anyhow::Error {
-    let names = names();
+    let names = all_names();
     let file = format!("{name}.toml");
     let hint = if Path::new(&file).is_file() {
         format!("; {file} is a file in this folder: write {file}")
@@ -251,7 +289,7 @@ impl Selection {
             }
         }
         let (source, defaults): (Source, BTreeMap<String, f64>) = match origin {
-            Origin::File { .. } => {
+            Origin::File { .. } | Origin::Text { .. } => {
                 let spec = origin.specification()?;
                 let fields = spec.derive().with_context(|| origin.file())?;
                 let pairs = spec.parameters.iter().map(|p| (p.name.clone(), p.default));

@@ -3,7 +3,8 @@
 use crate::staged::{PerPoint, Stage, coordinate};
 use crate::{InterpretError, resolve, surface};
 use mmsmith_expr::{Program, Slot};
-use mmsmith_runtime::{BLOCK, Surface};
+use mmsmith_runtime::nalgebra::SVector;
+use mmsmith_runtime::{AnySolution, BLOCK, Solution, Surface};
 use mmsmith_spec::Spec;
 use mmsmith_stage::{FieldName, Staged};
 use rayon::prelude::*;
@@ -24,6 +25,99 @@ pub struct Arrays {
     fields: Vec<(Quantity, Stage)>,
     body_force: FromKept,
     state: FromKept,
+    /// Where the law has internal variables, stresses and forces follow from histories.
+    history: Option<Remembering>,
+}
+
+/// A solution whose stresses and body forces follow from histories.
+struct Remembering {
+    solution: AnySolution<f64>,
+    surfaces: Vec<Surface>,
+    variables: Vec<String>,
+}
+
+/// More points than these are worth tables.
+const ENOUGH_FOR_TABLES: usize = 256;
+
+impl Remembering {
+    fn new<'a>(
+        spec: &Spec,
+        staged: &Staged,
+        overrides: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Result<Self, InterpretError> {
+        let solution = crate::interpret_staged(spec, staged, overrides)?;
+        let variables = match &solution {
+            AnySolution::One(solution) => solution.internal_variables(),
+            AnySolution::Two(solution) => solution.internal_variables(),
+            AnySolution::Three(solution) => solution.internal_variables(),
+            _ => Vec::new(),
+        };
+        let surfaces = spec.domain.surfaces(spec.dimension).into_iter().map(surface).collect();
+        Ok(Self { solution, surfaces, variables })
+    }
+
+    /// The numbers that a quantity has at a point; `None` for quantities that do not follow from histories.
+    fn entries(&self, quantity: Quantity, dimension: usize) -> Option<usize> {
+        match quantity {
+            Quantity::Field(FieldName::FirstPiolaKirchhoff) => Some(dimension * dimension),
+            Quantity::Field(FieldName::BodyForce) => Some(dimension),
+            Quantity::Field(_) => None,
+            Quantity::Traction(surface) => self.surfaces.contains(&surface).then_some(dimension),
+            Quantity::Internal => Some(self.variables.len()),
+        }
+    }
+
+    fn evaluate(&self, quantity: Quantity, X: &[f64], t: f64, values: &mut [f64]) {
+        match &self.solution {
+            AnySolution::One(solution) => evaluate_histories(&**solution, quantity, X, t, values),
+            AnySolution::Two(solution) => evaluate_histories(&**solution, quantity, X, t, values),
+            AnySolution::Three(solution) => {
+                evaluate_histories(&**solution, quantity, X, t, values);
+            }
+            _ => values.fill(f64::NAN),
+        }
+    }
+}
+
+fn evaluate_histories<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    quantity: Quantity,
+    X: &[f64],
+    t: f64,
+    values: &mut [f64],
+) {
+    let points: Vec<SVector<f64, D>> = X.chunks_exact(D).map(SVector::from_row_slice).collect();
+    if points.is_empty() {
+        return;
+    }
+    let entries = values.len() / points.len();
+    // Where a history cannot be followed, values are not numbers.
+    let has_tables = points.len() > ENOUGH_FOR_TABLES
+        && solution.prepare_until(t.max(solution.period())).is_ok();
+    if has_tables && quantity == Quantity::Field(FieldName::BodyForce) {
+        let mut b = vec![SVector::zeros(); points.len()];
+        solution.body_force_at(&points).evaluate(t, 0, &mut b);
+        let components = b.iter().flat_map(|b| b.iter());
+        values.iter_mut().zip(components).for_each(|(value, own)| *value = *own);
+        return;
+    }
+    values.par_chunks_mut(entries.max(1)).zip(&points).for_each(|(values, X)| {
+        let own: Vec<f64> = match quantity {
+            Quantity::Field(FieldName::BodyForce) => {
+                solution.body_force(X, t).iter().copied().collect()
+            }
+            Quantity::Field(_) => {
+                let P = solution.first_piola_kirchhoff(X, t);
+                P.transpose().iter().copied().collect()
+            }
+            Quantity::Traction(surface) => {
+                let traction = solution.traction(surface, X, t);
+                traction.unwrap_or(SVector::repeat(f64::NAN)).iter().copied().collect()
+            }
+            Quantity::Internal => solution.internal(X, t),
+        };
+        values.iter_mut().zip(own).for_each(|(value, own)| *value = own);
+    });
 }
 
 /// A quantity to compute at points.
@@ -33,6 +127,8 @@ pub enum Quantity {
     Field(FieldName),
     /// The traction `P N` on a surface, force per reference area, at points of that surface.
     Traction(Surface),
+    /// The internal variables of the law, in the order of [`Arrays::internal_variables`].
+    Internal,
 }
 
 /// Fields from values that are kept of each point.
@@ -74,6 +170,11 @@ impl Arrays {
     ) -> Result<Self, InterpretError> {
         let program = staged.program();
         let n = spec.dimension;
+        let overrides: Vec<(&str, f64)> = overrides.into_iter().collect();
+        let history = match &staged.history {
+            None => None,
+            Some(_) => Some(Remembering::new(spec, staged, overrides.iter().copied())?),
+        };
         let (axes, coordinates): (Vec<usize>, Vec<Slot>) =
             (0..n).filter_map(|axis| Some((axis, coordinate(program, axis)?))).unzip();
         let fields = FieldName::ALL.map(|name| (Quantity::Field(name), staged.field(name)));
@@ -91,6 +192,7 @@ impl Arrays {
         ];
         let body_force = [(FieldName::BodyForce, staged.body_force.outputs())];
         Ok(Arrays {
+            history,
             dimension: n,
             parameters: resolve(spec, overrides)?,
             axes,
@@ -118,7 +220,17 @@ impl Arrays {
     /// The numbers that a quantity has at a point; `None` for a surface that the body does not have.
     #[must_use]
     pub fn entries(&self, quantity: Quantity) -> Option<usize> {
+        let of_history = self.history.as_ref();
+        if let Some(entries) = of_history.and_then(|own| own.entries(quantity, self.dimension)) {
+            return Some(entries);
+        }
         self.stage(quantity).map(|stage| stage.section.output_count())
+    }
+
+    /// The names of the law's internal variables.
+    #[must_use]
+    pub fn internal_variables(&self) -> &[String] {
+        self.history.as_ref().map_or(&[], |own| &own.variables)
     }
 
     fn stage(&self, quantity: Quantity) -> Option<&Stage> {
@@ -131,6 +243,11 @@ impl Arrays {
     ///
     /// Panics where the lengths do not belong together, or there is no such surface.
     pub fn evaluate(&self, quantity: Quantity, X: &[f64], t: f64, values: &mut [f64]) {
+        let of_history = self.history.as_ref();
+        if let Some(own) = of_history.filter(|own| own.entries(quantity, self.dimension).is_some())
+        {
+            return own.evaluate(quantity, X, t, values);
+        }
         let Some(stage) = self.stage(quantity) else { panic!("there is no {quantity:?}") };
         self.of_coordinates(stage, X, t, values);
     }
@@ -206,6 +323,11 @@ impl ArraysAtPoints {
     /// Panics where `values` has not as many numbers as the field has at these points.
     pub fn evaluate(&self, field: FieldName, t: f64, values: &mut [f64]) {
         let Self { arrays, X, .. } = self;
+        if let Some(own) = &arrays.history
+            && own.entries(Quantity::Field(field), arrays.dimension).is_some()
+        {
+            return own.evaluate(Quantity::Field(field), X, t, values);
+        }
         for (of, rows) in [(&arrays.body_force, &self.body_force), (&arrays.state, &self.state)] {
             let Some((_, stage)) = of.fields.iter().find(|(name, _)| *name == field) else {
                 continue;

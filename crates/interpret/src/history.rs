@@ -335,6 +335,27 @@ impl<const D: usize> Histories<D> {
         Ok(self.turned(X, &values))
     }
 
+    /// Whether particles begin to flow, or stop, after the start and before a time, as some of them show.
+    fn has_front(&self, end: f64) -> Result<bool, HistoryError> {
+        const PLACES: usize = 24;
+        if !matches!(self.law, AnyLaw::Flow(_)) {
+            return Ok(false);
+        }
+        let changes = |n: usize| {
+            let q = std::array::from_fn(|axis| {
+                let [low, high] = self.chart.range(axis);
+                // Additive recurrences with these steps fill the body evenly.
+                let step = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.413_964_2][axis];
+                low + (high - low) * (0.5 + step * n as f64).fract()
+            });
+            let particle = self.particle(self.chart.place(q));
+            let found = Trajectory::<D>::new(&self.law, &particle, &[end], TOLERANCE)?;
+            Ok::<_, HistoryError>(!found.changes.is_empty())
+        };
+        let all: Vec<_> = (0..PLACES).into_par_iter().map(changes).collect();
+        all.into_iter().try_fold(false, |any, one| Ok(any || one?))
+    }
+
     /// How the histories of some particles go until a time.
     pub(crate) fn report(
         &self,
@@ -431,9 +452,11 @@ fn turn_tensors<const D: usize>(names: &[String], Q: &[[f64; D]; D], values: &[f
 
 /// Fields of a body in the frames of its particles, as tables over the coordinates that they depend on.
 pub(crate) struct Tables<const D: usize> {
-    table: OverAxes,
+    /// None where particles begin or stop to flow on the way: no polynomial follows such a front well, and each particle has series of its
+    /// own.
+    table: Option<OverAxes>,
     end: f64,
-    /// The largest error that random places and times showed, as a share of each quantity's largest value.
+    /// The largest error that random places and times showed, as a share of each quantity's largest value; not a number without a table.
     pub(crate) error: f64,
 }
 
@@ -445,6 +468,9 @@ enum OverAxes {
 
 impl<const D: usize> Tables<D> {
     fn new(histories: &Histories<D>, end: f64) -> Result<Self, HistoryError> {
+        if histories.has_front(end)? {
+            return Ok(Self { table: None, end, error: f64::NAN });
+        }
         match histories.axes.len() {
             1 => Self::over::<1>(histories, end, OverAxes::One),
             2 => Self::over::<2>(histories, end, OverAxes::Two),
@@ -470,7 +496,7 @@ impl<const D: usize> Tables<D> {
         };
         let kinds = histories.kinds();
         let (table, error) = Table::<K>::fine_by_kinds(range, end, TABLE_TOLERANCE, &kinds, of)?;
-        Ok(Self { table: any(table), end, error })
+        Ok(Self { table: (error <= LARGEST_ERROR).then(|| any(table)), end, error })
     }
 
     /// The series of some fields at places.
@@ -486,18 +512,20 @@ impl<const D: usize> Tables<D> {
         }
         let axes = &histories.axes;
         match &self.table {
-            OverAxes::One(table) => table.at_all_of(&own(axes, &q), fields.clone()),
-            OverAxes::Two(table) => table.at_all_of(&own(axes, &q), fields.clone()),
-            OverAxes::Three(table) => table.at_all_of(&own(axes, &q), fields.clone()),
+            None => Vec::new(),
+            Some(OverAxes::One(table)) => table.at_all_of(&own(axes, &q), fields.clone()),
+            Some(OverAxes::Two(table)) => table.at_all_of(&own(axes, &q), fields.clone()),
+            Some(OverAxes::Three(table)) => table.at_all_of(&own(axes, &q), fields.clone()),
         }
     }
 
     /// The polynomials at a time.
     fn at_time(&self, t: f64) -> AtTime {
         match &self.table {
-            OverAxes::One(table) => table.grid().at_time(t),
-            OverAxes::Two(table) => table.grid().at_time(t),
-            OverAxes::Three(table) => table.grid().at_time(t),
+            None => AtTime { piece: 0, polynomials: Vec::new() },
+            Some(OverAxes::One(table)) => table.grid().at_time(t),
+            Some(OverAxes::Two(table)) => table.grid().at_time(t),
+            Some(OverAxes::Three(table)) => table.grid().at_time(t),
         }
     }
 }
@@ -544,7 +572,7 @@ struct Place<const D: usize> {
 const SIDE_BY_SIDE: usize = 4;
 /// Particles whose series are formed at a time.
 const CHUNK: usize = 1024;
-/// Where tables have larger errors, as behind fronts of flow, each particle has series of its own.
+/// Where tables have larger errors each particle has series of its own.
 const LARGEST_ERROR: f64 = 1e-10;
 
 /// The polynomials at a time, for [`Prepared`].
@@ -567,7 +595,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
             Quantities::Internal => D + D * D..D + D * D + histories.names.len(),
         };
         let place = |X: &[f64; D]| Place { X: *X, frame: histories.particle(*X).frame };
-        let series = if tables.error <= LARGEST_ERROR {
+        let series = if tables.table.is_some() {
             SeriesOfAll::of_tables(histories, &tables, &range, X)
         } else {
             let own = |X: &[f64; D]| histories.own_series(*X, tables.end, &range);

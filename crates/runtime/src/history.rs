@@ -34,6 +34,6 @@ pub struct HistoryReport {
     /// The largest `|det G - 1|`: flow keeps the volume.
     pub volume: f64,
     /// The largest error of the tables that solvers are driven by, as a share of each field's largest value, as random places and times
-    /// show it.
+    /// show it; not a number where particles have series of their own, as behind fronts of flow.
     pub table_error: f64,
 }

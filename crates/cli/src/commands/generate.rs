@@ -1,6 +1,6 @@
 //! `mms gen`: a solution as code, anywhere and without cargo.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{Code, Names, Origin};
 
 use crate::arguments::GenerateOptions;
@@ -19,6 +19,14 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             let given = set.iter().find(|(name, _)| *name == parameter.name);
             parameter.default = given.map_or(parameter.default, |(_, value)| *value);
         }
+    }
+    if spec.has_history() {
+        bail!(
+            "{}: the stress follows from the history of each particle, which is no formula that --target {} could have; mms eval gives the \
+             fields at points and times of yours, and the package for Python has b, P and internal variables as functions",
+            found.file(),
+            options.target.name
+        );
     }
     let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };

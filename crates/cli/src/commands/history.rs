@@ -20,7 +20,7 @@ pub(super) fn text(report: &HistoryReport) -> String {
         *report;
     let mut text = String::new();
     if !report.flows {
-        return format!("  history: tables {} of each field\n", table::error(report.table_error));
+        return format!("  history: {}\n", tables(report.table_error));
     }
     if least_margin == f64::INFINITY && report.yield_condition == 0.0 && always == 0 {
         text += &format!("  history: none of {particles} particles flows: the body is elastic\n");
@@ -52,12 +52,20 @@ pub(super) fn text(report: &HistoryReport) -> String {
         };
     }
     text += &format!(
-        "    |f| of flowing particles {} of the yield stress, |det G - 1| {}, tables {} of each field\n",
+        "    |f| of flowing particles {} of the yield stress, |det G - 1| {}, {}\n",
         table::error(report.yield_condition),
         table::error(report.volume),
-        table::error(report.table_error)
+        tables(report.table_error)
     );
     text
+}
+
+/// How exact the series are that a solver is driven by.
+fn tables(error: f64) -> String {
+    match error.is_finite() {
+        true => format!("tables within {} of each field", table::error(error)),
+        false => "each particle with series of its own".into(),
+    }
 }
 
 /// The report as JSON.
@@ -72,6 +80,6 @@ pub(super) fn document(report: &HistoryReport) -> Value {
         "body_force_at_changes": word(report.smoothness),
         "yield_condition": report.yield_condition,
         "volume": report.volume,
-        "table_error": report.table_error,
+        "table_error": report.table_error.is_finite().then_some(report.table_error),
     })
 }

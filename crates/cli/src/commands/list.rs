@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::ListOptions;
 use crate::json::Output;
-use crate::library::{Origin, locate, names};
+use crate::library::{Origin, all_names, locate};
 use crate::table::Table;
 use crate::{number, terminal};
 
@@ -14,7 +14,7 @@ pub(crate) fn list(options: &ListOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
     let mut entries = Vec::new();
     let mut unreadable = Vec::new();
-    for name in names() {
+    for name in all_names() {
         match entry(&name) {
             Ok(entry) => entries.push(entry),
             // One mistake in a file does not hide the others.
@@ -161,7 +161,7 @@ impl Entry {
             })
             .collect();
         let (source, file) = match &self.origin {
-            Origin::BuiltIn(_) => ("built-in", None),
+            Origin::BuiltIn(_) | Origin::Text { .. } => ("built-in", None),
             Origin::File { path, instead_of: None, .. } => ("file", Some(path.display())),
             Origin::File { path, instead_of: Some(_), .. } => {
                 ("file-differs-from-built-in", Some(path.display()))
