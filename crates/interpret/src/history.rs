@@ -11,8 +11,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-/// The relative tolerance of trajectories.
+/// The relative tolerance of trajectories of laws with flow.
 const TOLERANCE: f64 = 1e-13;
+/// That of smooth ones, whose steps are longer, and with them the errors of values between steps.
+const TOLERANCE_OF_SMOOTH: f64 = 1e-15;
 /// What a table may leave out, as a share of each quantity's largest value.
 const TABLE_TOLERANCE: f64 = 1e-12;
 
@@ -248,6 +250,13 @@ impl<const D: usize> Histories<D> {
         })
     }
 
+    fn tolerance(&self) -> f64 {
+        match self.law {
+            AnyLaw::Flow(_) => TOLERANCE,
+            AnyLaw::Maxwell(_) | AnyLaw::Stated(_) => TOLERANCE_OF_SMOOTH,
+        }
+    }
+
     /// The kind of each quantity, in the order of [`in_frame`](Self::in_frame): components of one tensor are of one kind.
     fn kinds(&self) -> Vec<usize> {
         let mut stems: Vec<&str> = Vec::new();
@@ -267,7 +276,8 @@ impl<const D: usize> Histories<D> {
     /// The series of a particle alone, for bodies whose fields no table has well.
     fn own_series(&self, X: [f64; D], end: f64, range: &Range<usize>) -> Option<AtPoint> {
         let particle = self.particle(X);
-        let trajectory = Trajectory::<D>::new(&self.law, &particle, &[end], TOLERANCE).ok()?;
+        let trajectory =
+            Trajectory::<D>::new(&self.law, &particle, &[end], self.tolerance()).ok()?;
         let breaks: Vec<f64> = trajectory.changes.iter().map(|change| change.time).collect();
         let kinds = &self.kinds()[range.clone()];
         let of = |times: &[f64]| {
@@ -292,7 +302,7 @@ impl<const D: usize> Histories<D> {
     /// Stress, body force and internal variables in the frame of a particle at some times, quantity by quantity.
     fn in_frame(&self, X: [f64; D], times: &[f64]) -> Result<Vec<Vec<f64>>, HistoryError> {
         let particle = self.particle(X);
-        let trajectory = Trajectory::<D>::new(&self.law, &particle, times, TOLERANCE)?;
+        let trajectory = Trajectory::<D>::new(&self.law, &particle, times, self.tolerance())?;
         let density = self.density_at(&particle);
         let mut all = vec![Vec::with_capacity(times.len()); D * D + D + self.names.len()];
         for (&time, z) in times.iter().zip(&trajectory.states) {
@@ -349,7 +359,7 @@ impl<const D: usize> Histories<D> {
                 low + (high - low) * (0.5 + step * n as f64).fract()
             });
             let particle = self.particle(self.chart.place(q));
-            let found = Trajectory::<D>::new(&self.law, &particle, &[end], TOLERANCE)?;
+            let found = Trajectory::<D>::new(&self.law, &particle, &[end], self.tolerance())?;
             Ok::<_, HistoryError>(!found.changes.is_empty())
         };
         let all: Vec<_> = (0..PLACES).into_par_iter().map(changes).collect();
@@ -365,7 +375,7 @@ impl<const D: usize> Histories<D> {
         let times: Vec<f64> = (1..=32).map(|k| end * f64::from(k) / 32.0).collect();
         let follow = |X: &[f64; D]| {
             let particle = self.particle(*X);
-            Trajectory::<D>::new(&self.law, &particle, &times, TOLERANCE)
+            Trajectory::<D>::new(&self.law, &particle, &times, self.tolerance())
         };
         let all: Vec<_> = places.par_iter().map(follow).collect();
         let mut report = HistoryReport {

@@ -21,6 +21,9 @@ use crate::number;
 use crate::table::{self, Table};
 use crate::terminal;
 
+/// The points at which a solution with memory is checked.
+const OF_HISTORIES: usize = 40;
+
 /// The particles whose histories are followed to tell where the body flows.
 const HISTORIES: usize = 200;
 
@@ -28,7 +31,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     if options.thorough {
         return super::thorough::thorough(options);
     }
-    let points = options.points.unwrap_or(300);
+    let most = options.points.unwrap_or(300);
     let output = Output::prepare_if(options.json.as_ref())?;
     let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     if names.is_empty() {
@@ -49,6 +52,11 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
     for (Subject { name, solutions, parameters, selection, spec, .. }, listings) in
         subjects.iter().zip(&listings)
     {
+        // A history takes a thousand times what a formula does.
+        let points = match options.points {
+            None if spec.has_history() => OF_HISTORIES,
+            _ => most,
+        };
         let reports = solutions.iter().map(|solution| check_fields(solution, points));
         let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
@@ -94,7 +102,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "settings": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "solutions": names,
-                "points": points,
+                "points": most,
                 "own_error_factor": OWN_ERROR_FACTOR,
                 "tolerance": TOLERANCE,
                 "blunt": BLUNT,
