@@ -154,6 +154,12 @@ impl Spec {
         self.material.constants().iter().any(|(_, value)| self.is_field(*value))
     }
 
+    /// Whether the density depends on the place.
+    #[must_use]
+    pub fn has_graded_density(&self) -> bool {
+        self.is_field(self.density)
+    }
+
     /// Whether an expression depends on the place, the time, or given fields.
     pub(crate) fn is_field(&self, expr: Expr) -> bool {
         let coordinates = self.coordinates.coordinate_names(self.dimension);

@@ -28,6 +28,13 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             options.target.name
         );
     }
+    if spec.has_graded_density() {
+        bail!(
+            "{}: files of hosts have one density, and here it depends on the place; mms eval and the package for Python have b, force per \
+             mass, all the same",
+            found.file()
+        );
+    }
     let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let code = match options.fault {
