@@ -19,7 +19,7 @@ use energy::{ComponentLaw, Field};
 use kinematics::{doubled_strain, with_transpose};
 use mmsmith_expr::{Expr, Function, Graph, Node, Rule};
 use mmsmith_vocabulary::{Derivation as Formulas, Material, Volumetric};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use turn::Turn;
 
 /// The deformation of one solution, in physical components.
@@ -287,9 +287,15 @@ pub(crate) fn stress(
     let law = &spec.material;
     let mut fields: Vec<Field> =
         spec.given.iter().map(|given| Field { symbol: given.symbol, value: given.value }).collect();
+    let places = places_in(derivation, law);
+    fields.extend(places.iter().map(|(&value, &symbol)| Field { symbol, value }));
     let (W, isotropic) = match law {
         Law::Stress { P } => {
-            return Ok(ComponentLaw::of_stress(derivation, deformation, P, fields)
+            let P = P
+                .iter()
+                .map(|row| row.iter().map(|&p| derivation.graph.replace(p, &places)).collect())
+                .collect();
+            return Ok(ComponentLaw::of_stress(derivation, deformation, &P, fields)
                 .stress(derivation, deformation));
         }
         Law::Library(material) if spec.has_graded_constants() => {
@@ -323,6 +329,7 @@ pub(crate) fn stress(
         }
         Law::Energy { W } => {
             let n = deformation.H.len();
+            let W = &derivation.graph.replace(*W, &places);
             (*W, energy::uses_invariants_only(&mut derivation.graph, *W, n))
         }
         Law::Library(material) => {
@@ -404,6 +411,24 @@ pub(crate) fn stress(
     Ok(ComponentLaw::of_energy(&mut derivation.graph, deformation, W, isotropic)
         .with_fields(fields)
         .stress(derivation, deformation))
+}
+
+/// The coordinates that a stated law uses, each with a symbol for it in the law: there it is a field, apart from the place of the
+/// deformation.
+fn places_in(derivation: &mut Derivation, law: &Law) -> BTreeMap<Expr, Expr> {
+    let of_law = match law {
+        Law::Energy { W } => vec![*W],
+        Law::Stress { P } => P.concat(),
+        Law::Library(_) => Vec::new(),
+    };
+    let used = derivation.graph.symbols_in(&of_law);
+    let coordinates = derivation.geometry.coordinates.clone();
+    let used = coordinates.into_iter().filter(|coordinate| used.contains(coordinate));
+    used.map(|coordinate| {
+        let name = derivation.graph.symbol_name(coordinate).unwrap_or_default().to_owned();
+        (coordinate, energy::own_symbol(&mut derivation.graph, &name))
+    })
+    .collect()
 }
 
 /// The energy of an isochoric law without its volumetric part, in `J` and `I1`.

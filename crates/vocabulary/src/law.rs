@@ -186,10 +186,13 @@ impl<T> Stated<T> {
             Response::Energy(text) => vec![text],
             Response::Stress(rows) => rows.iter().flatten().map(String::as_str).collect(),
         };
-        let is_rate =
-            |word: &str| word.starts_with("Fdot") || word == "Jdot" || is_component_of_rate(word);
-        let has_rate = texts.iter().any(|text| words(text).any(is_rate));
-        has_rate || !self.given.is_empty() || !self.internal.is_empty()
+        let is_more = |word: &str| {
+            word.starts_with("Fdot")
+                || matches!(word, "Jdot" | "X" | "Y" | "Z" | "t")
+                || is_component_of_rate(word)
+        };
+        let uses_more = texts.iter().any(|text| words(text).any(is_more));
+        uses_more || !self.given.is_empty() || !self.internal.is_empty()
     }
 }
 
