@@ -122,6 +122,21 @@ impl Reader<'_> {
                 "leave [start] out, or give [material.flow]",
             );
         }
+        let graded = law.constants().into_iter().find(|(_, value)| self.scope.is_field(*value));
+        if let Some((constant, _)) = graded
+            && let Some(span) = table
+                .flow
+                .as_ref()
+                .map(Spanned::span)
+                .or_else(|| table.maxwell.first().map(Spanned::span))
+        {
+            let message = format!(
+                "the constants of a law with flow or Maxwell elements are the same everywhere, and '{}' depends on the place or the time",
+                constant.name
+            );
+            let help = "write it in parameters alone; a law whose constants differ from place to place is a stated law with [internal] variables";
+            return refuse(self, message, span, help);
+        }
         match (&table.flow, table.maxwell.first()) {
             (None, None) => Ok(None),
             (Some(flow), Some(_)) => {

@@ -437,6 +437,7 @@ where
     let mut together = Comparison::new("all at once", "each on its own");
     for (X, t) in samples {
         let at = (X, *t);
+        let density = solution.density_at(X);
         let own = separately(solution, X, *t);
         let reach = |axis| points::reach(&domain, X, axis).min(REACH * size);
         let reach_t = t.min(period - t).min(REACH * period);

@@ -42,7 +42,7 @@ pub fn has_flow(solution: &AnySolution<f64>) -> bool {
 
 /// Whether the stress depends on more than the deformation gradient.
 #[must_use]
-pub(crate) fn has_memory(solution: &AnySolution<f64>) -> bool {
+pub fn has_memory(solution: &AnySolution<f64>) -> bool {
     let is_such = |law: Law<f64>| match law {
         Law::WithMemory(_) => true,
         Law::Stated(stated) => stated.has_memory(),

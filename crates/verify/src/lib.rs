@@ -75,7 +75,7 @@ pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
-pub use flow::{has_flow, history_of};
+pub use flow::{has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};

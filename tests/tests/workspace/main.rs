@@ -9,6 +9,7 @@ mod hostile_text;
 mod kept_runs;
 mod laws;
 mod library;
+mod memory;
 mod new_solution;
 mod orders;
 mod planted_faults;

@@ -346,9 +346,19 @@ fn total(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Total> {
     }
     refuse_pose(options)?;
     let usual = Total::of_degree(degree);
+    // Steps of other compositions go back in time, which a material with memory does not.
+    let composition = match (options.composition, verify::has_memory(exact)) {
+        (None | Some(Composition::Order2), true) => Composition::Order2,
+        (Some(order), true) => bail!(
+            "--composition {}: steps of a law that remembers cannot go back in time, as those of this composition do; leave --composition \
+             out, or write --composition 2",
+            order.order()
+        ),
+        (given, false) => given.unwrap_or(usual.composition),
+    };
     Ok(Total {
         mass: options.mass.unwrap_or(usual.mass),
-        composition: options.composition.unwrap_or(usual.composition),
+        composition,
         layout,
         coordinates: options.grid.unwrap_or_else(|| Total::coordinates_for(exact)),
         ..usual
