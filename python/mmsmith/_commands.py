@@ -77,6 +77,7 @@ def run(
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
+    return_map: Literal["exponential", "midpoint"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
@@ -133,6 +134,9 @@ def run(
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
+        return_map: Return map of a law with flow. Default: exponential.
+            `exponential`: The direction of flow at the end of a step: first order in time.
+            `midpoint`: The direction of flow at the middle of a step: second order in time.
         layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
             only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.
@@ -224,6 +228,7 @@ def converge(
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
+    return_map: Literal["exponential", "midpoint"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
@@ -283,6 +288,9 @@ def converge(
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
+        return_map: Return map of a law with flow. Default: exponential.
+            `exponential`: The direction of flow at the end of a step: first order in time.
+            `midpoint`: The direction of flow at the middle of a step: second order in time.
         layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
             only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.
@@ -359,6 +367,7 @@ def stability(
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
+    return_map: Literal["exponential", "midpoint"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
@@ -430,6 +439,9 @@ def stability(
             `2`: Leapfrog.
             `4`: Five stages.
             `6`: Nine stages.
+        return_map: Return map of a law with flow. Default: exponential.
+            `exponential`: The direction of flow at the end of a step: first order in time.
+            `midpoint`: The direction of flow at the middle of a step: second order in time.
         layout: Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian formulation
             only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls.
             `lattice`: Centres of equal parts of a cell.

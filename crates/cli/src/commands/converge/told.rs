@@ -40,6 +40,10 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
     };
     let verdict = judged.passed();
     let mut results = results(&judged.study, &judged.verdicts);
+    let internal = judged.study.internal_orders(sweep);
+    if !internal.is_empty() {
+        results["orders"]["internal"] = json!(internal);
+    }
     results.insert("passed".into(), json!(verdict));
     if let Some(reason) = &judged.not_judged {
         results.insert("not_judged".into(), json!(reason));
@@ -69,6 +73,10 @@ fn sections(judged: &Judged, sweep: &Sweep, units: Option<Units>) -> Vec<Section
     for (field, table) in tables(study, sweep, verdicts) {
         let title = format!("error of {}", units::named(field, units));
         sections.push(Section::Table(title, table.with_unit(&["h"], length)));
+    }
+    for (name, orders) in study.internal_orders(sweep) {
+        let table = internal_table(&name, study, sweep, &orders);
+        sections.push(Section::Table(format!("error of {name}"), table));
     }
     if let Some((found, verdicts)) = differences {
         for (field, table) in difference_tables(found, verdicts) {
@@ -184,6 +192,29 @@ pub(in crate::commands) fn tables(
     });
     table::align(&mut tables);
     tables
+}
+
+/// The errors of an internal variable and their orders.
+fn internal_table(
+    name: &str,
+    study: &Study,
+    sweep: &Sweep,
+    orders: &PerNorm<ObservedOrder>,
+) -> Table {
+    let header = ["cells", step_name(sweep)].into_iter().chain(NORMS).chain(["status"]);
+    let mut table = Table::new(0, header).sparing(6..8);
+    for (index, row) in study.rows.iter().enumerate() {
+        let own = row.internal.iter().find(|(known, _)| known == name);
+        let mut cells = vec![row.cells.to_string(), table::error(step(row, sweep))];
+        for norm in Norm::ALL {
+            let local = index.checked_sub(1).and_then(|pair| orders[norm].local[pair]);
+            let error = own.map_or_else(|| "-".to_owned(), |(_, norms)| table::error(norms[norm]));
+            cells.extend([error, table::rate(local)]);
+        }
+        cells.push(status(&row.status, false));
+        table.row(cells);
+    }
+    table
 }
 
 /// As [`tables`], for differences on one grid.
