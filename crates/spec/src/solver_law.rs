@@ -9,9 +9,67 @@ use mmsmith_expr::{Expr, Graph};
 use mmsmith_vocabulary::{Components, Internal, Law as ForSolver, Response, Stated, WithMemory};
 
 impl Spec {
-    /// The law as a solver needs it: one that the specification states in text, with the parameters in it.
+    /// The law as a solver needs it: one that the specification states in text, with the parameters in it. Positions in its text are
+    /// Cartesian.
     #[must_use]
     pub fn law_for_solver(&self) -> ForSolver<Expr> {
+        match self.law_in_own_coordinates() {
+            ForSolver::Stated(stated) => ForSolver::Stated(self.with_places_given(stated)),
+            law => law,
+        }
+    }
+
+    /// A law whose text names positions and the time in given fields alone, in Cartesian coordinates.
+    fn with_places_given(&self, mut law: Stated<Expr>) -> Stated<Expr> {
+        let coordinates = self.coordinates.coordinate_names(self.dimension);
+        let places: Vec<String> =
+            coordinates.iter().copied().chain(["t"]).map(str::to_owned).collect();
+        let mut texts: Vec<&mut String> = match &mut law.response {
+            Response::Energy(text) => vec![text],
+            Response::Stress(rows) => rows.iter_mut().flatten().collect(),
+        };
+        texts.extend(law.internal.iter_mut().map(|variable| &mut variable.rate));
+        let mut used = Vec::new();
+        for text in texts {
+            let changed = replaced(text, |word| {
+                let place = places.iter().position(|place| place == word)?;
+                if !used.contains(&place) {
+                    used.push(place);
+                }
+                Some(format!("{word}_here"))
+            });
+            *text = changed;
+        }
+        used.sort_unstable();
+        let of_places =
+            used.into_iter().map(|k| (format!("{}_here", places[k]), places[k].clone()));
+        law.given = of_places.chain(law.given).collect();
+        let distance = match self.coordinates {
+            Coordinates::Cartesian => return law,
+            Coordinates::Polar | Coordinates::Cylindrical => "(sqrt(X^2 + Y^2))",
+            Coordinates::Spherical => "(sqrt(X^2 + Y^2 + Z^2))",
+        };
+        let angle = match self.coordinates {
+            Coordinates::Spherical => "(atan2(sqrt(X^2 + Y^2), Z))",
+            _ => "(atan2(Y, X))",
+        };
+        let cartesian = |word: &str| match word {
+            "R" => Some(distance.to_owned()),
+            "theta" if coordinates.contains(&"theta") => Some(angle.to_owned()),
+            "phi" if coordinates.contains(&"phi") => Some("(atan2(Y, X))".to_owned()),
+            _ => None,
+        };
+        for (_, text) in &mut law.given {
+            *text = replaced(text, cartesian);
+        }
+        for variable in &mut law.internal {
+            variable.initial = replaced(&variable.initial, cartesian);
+        }
+        law
+    }
+
+    /// As [`law_for_solver`](Self::law_for_solver), with positions in the coordinates of the specification.
+    fn law_in_own_coordinates(&self) -> ForSolver<Expr> {
         let graph = &self.graph;
         let print = |expr: Expr| graph.print(expr);
         if let (Law::Library(elastic), Some(memory)) = (&self.material, &self.memory) {
@@ -178,6 +236,11 @@ impl Spec {
 
 /// A text in which some names have a suffix.
 fn with_suffix(text: &str, names: &[String], suffix: &str) -> String {
+    replaced(text, |word| names.iter().any(|name| name == word).then(|| format!("{word}{suffix}")))
+}
+
+/// A text with other words in the place of some.
+fn replaced(text: &str, mut by: impl FnMut(&str) -> Option<String>) -> String {
     let mut changed = String::new();
     let mut word = String::new();
     for c in text.chars().chain([' ']) {
@@ -185,9 +248,9 @@ fn with_suffix(text: &str, names: &[String], suffix: &str) -> String {
             word.push(c);
             continue;
         }
-        changed.push_str(&word);
-        if names.contains(&word) {
-            changed.push_str(suffix);
+        match by(&word) {
+            Some(other) => changed.push_str(&other),
+            None => changed.push_str(&word),
         }
         word.clear();
         changed.push(c);
