@@ -42,7 +42,7 @@ pub struct TotalLagrangian<const D: usize> {
     /// The body force at the particles.
     b: Vec<SVector<f64, D>>,
     particles: Particles<f64, D>,
-    /// Of laws with memory: their internal variables, and the deformation gradients that those of the particles belong to.
+    /// With memory, the internal variables of the law, and the deformation gradients that those of the particles belong to.
     variables: Vec<InternalVariable>,
     remembered: Vec<SMatrix<f64, D, D>>,
     density: f64,

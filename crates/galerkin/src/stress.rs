@@ -20,7 +20,7 @@ pub(super) struct Places<'a, const D: usize> {
     pub(super) values: [&'a mut [f64]; D],
     pub(super) slopes: [[&'a mut [f64]; D]; D],
     pub(super) b: &'a mut [SVector<f64, D>],
-    /// Of laws with memory: the deformation gradients that the internal variables belong to, and these.
+    /// With memory, the deformation gradients that the internal variables belong to, and these.
     pub(super) F: &'a mut [SMatrix<f64, D, D>],
     pub(super) internal: &'a mut [f64],
 }

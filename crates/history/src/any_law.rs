@@ -114,7 +114,7 @@ impl AnyLaw {
     }
 }
 
-/// The same call to whatever law there is.
+/// Calls a function of whatever law there is.
 macro_rules! each {
     ($own:expr, $law:ident => $call:expr) => {
         match $own {

@@ -138,7 +138,7 @@ const E5: &[(usize, f64)] = &[
     (11, -0.022_355_307_863_886_294),
 ];
 
-/// What the formula of order three takes from the weights of the step.
+/// Weights of the step less those of the formula of order three.
 const E3: &[(usize, f64)] =
     &[(0, 0.244_094_488_188_976_4), (8, 0.733_846_688_281_611_9), (11, 0.022_058_823_529_411_766)];
 

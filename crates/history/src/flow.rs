@@ -73,7 +73,7 @@ impl<N: Number> Constants<N> {
         (power(w, inverse), power(w, inverse - N::constant(1.0)) * inverse)
     }
 
-    /// What stresses are measured by: the yield stress of the virgin material, or where there is none the shear modulus.
+    /// The unit of stresses: the yield stress of the virgin material, or where there is none the shear modulus.
     fn unit(&self) -> N {
         if self.yield_stress.value() > 0.0 { self.yield_stress } else { self.mu }
     }

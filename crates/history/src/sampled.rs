@@ -16,7 +16,7 @@ const MOST: usize = 18 * 4;
 const WIDTH: usize = 8;
 /// Coefficients below such a share are left out.
 const NOTHING: f64 = 3e-17;
-/// What series may leave out, as a share of the largest value, and of the largest slope.
+/// The part that series may leave out, as a share of the largest value, and of the largest slope.
 const TAIL: f64 = 1e-15;
 /// By how much they may be off at other times.
 const OFF: f64 = 1e-14;

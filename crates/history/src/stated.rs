@@ -41,17 +41,17 @@ pub enum StatedHistoryError {
     /// The text is no expression of what there is.
     #[error("{of}, '{text}': {message}")]
     Text {
-        /// What the text is for.
+        /// The use of the text.
         of: String,
         /// The text.
         text: String,
-        /// What is wrong.
+        /// The mistake.
         message: String,
     },
     /// A function whose slopes cannot be formed.
     #[error("{of} uses {function}, whose slope has no formula here: write the law without it")]
     NoSlope {
-        /// What the text is for.
+        /// The use of the text.
         of: String,
         /// The function.
         function: &'static str,

@@ -123,7 +123,7 @@ pub struct Table<const D: usize> {
     coefficients: Vec<Vec<f64>>,
     /// The largest value of each quantity at the nodes.
     largest: Vec<f64>,
-    /// What errors of each quantity are a share of.
+    /// The scale of the errors of each quantity.
     scales: Vec<f64>,
 }
 
@@ -423,7 +423,7 @@ impl Kinds {
         all
     }
 
-    /// What errors of each quantity are a share of, from its largest values.
+    /// The scale of the errors of each quantity, from its largest values.
     fn scales(&self, largest: &[f64]) -> Vec<f64> {
         let of = |quantity: usize| {
             if self.is_rounding[quantity] {
@@ -561,7 +561,7 @@ fn along_lines<const D: usize, E: Send>(
     const LINES: usize = 6;
     const MOST: [usize; 3] = [16, 28, 40];
     const LEAST: usize = 4;
-    /// What a field that is not smooth has.
+    /// The number of polynomials for a field that is not smooth.
     const ROUGH: usize = 24;
     let mut rough = 1.0;
     for count in MOST {

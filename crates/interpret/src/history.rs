@@ -15,7 +15,7 @@ use std::sync::{Arc, RwLock};
 const TOLERANCE: f64 = 1e-13;
 /// That of smooth ones, whose steps are longer, and with them the errors of values between steps.
 const TOLERANCE_OF_SMOOTH: f64 = 1e-15;
-/// What a table may leave out, as a share of each quantity's largest value.
+/// The part that a table may leave out, as a share of each quantity's largest value.
 const TABLE_TOLERANCE: f64 = 1e-12;
 
 /// The shape of the body as tables have it: the range of each coordinate, and the way from these to the place.
@@ -196,7 +196,7 @@ impl<const D: usize> Motion<D> for Particle<'_, D> {
 }
 
 impl<const D: usize> Histories<D> {
-    /// Of a law that has a history.
+    /// Histories of a law that has some.
     pub(crate) fn new(
         law: &Law<f64>,
         history: &History,
@@ -628,7 +628,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         size_of::<Place<D>>() + 8 * of_series
     }
 
-    /// What all particles need of a time.
+    /// The values of a time that all particles need.
     pub(crate) fn moment(&self, t: f64) -> Moment {
         let AtTime { piece, mut polynomials } = self.tables.at_time(t);
         polynomials.resize(polynomials.len().next_multiple_of(SIDE_BY_SIDE), 0.0);

@@ -63,7 +63,7 @@ impl<T: Copy + nalgebra::RealField> Viscoelastic<T> {
         product(&inverse_transpose(&in_space, determinant(&in_space)).transpose(), &P)
     }
 
-    /// What the elements add to the stress of the elastic law, of which they take their shares.
+    /// The part that the elements add to the stress of the elastic law, of which they take their shares.
     fn of_elements<const D: usize>(
         &self,
         F: &SMatrix<T, D, D>,

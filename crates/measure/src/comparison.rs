@@ -284,7 +284,7 @@ compared! {
 struct Room<T, const D: usize> {
     exact: [StateRun<f64, D>; RUNS],
     run: Run<T, D>,
-    /// Of a law with memory: the number of its variables, and where its stresses are computed.
+    /// With memory, the number of its variables, and where its stresses are computed.
     memory: Option<(usize, Box<BlockWithMemory<T, D>>)>,
 }
 

@@ -1,4 +1,4 @@
-//! What histories of internal variables tell of a solution.
+//! Findings on a solution from histories of its internal variables.
 
 /// How smooth the body force is where particles begin to flow, or stop, from worst to best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,11 +18,11 @@ pub struct HistoryReport {
     pub flows: bool,
     /// The particles that were followed.
     pub particles: usize,
-    /// Those that flow from the start to the end; all of them for laws whose internal variables always have rates.
+    /// Particles that flow from the start to the end; all of them for laws whose internal variables always have rates.
     pub always: usize,
-    /// Those that begin to flow after the start.
+    /// Particles that begin to flow after the start.
     pub onsets: usize,
-    /// Those that stop flowing.
+    /// Particles that stop flowing.
     pub unloadings: usize,
     /// The least rate at which the stress grows while a particle flows, as a share of the rate of deformation, `n : d/|d|`, or the least
     /// stress beyond the yield stress where flow depends on its rate; infinite where nothing flows.

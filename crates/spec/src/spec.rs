@@ -47,7 +47,7 @@ pub struct Spec {
     pub material: Law,
     /// Fields of position and time that the law uses.
     pub given: Vec<Given>,
-    /// What a law of the library remembers.
+    /// The memory of a law of the library.
     pub memory: Option<Memory<Expr>>,
     /// The internal variables of a law that the specification states.
     pub internal: Vec<InternalVariable>,

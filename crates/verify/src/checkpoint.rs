@@ -164,7 +164,7 @@ pub(crate) struct Reached {
     pub(crate) wall_s: f64,
     pub(crate) cpu_s: f64,
     pub(crate) errors: PerField<PerNorm<f64>>,
-    /// Of internal variables.
+    /// Errors of internal variables.
     pub(crate) internal: Vec<(String, PerNorm<f64>)>,
 }
 

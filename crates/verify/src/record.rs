@@ -27,7 +27,7 @@ pub struct Record {
     pub timed_alone: bool,
     status: End,
     errors: Norms,
-    /// Of internal variables, by name.
+    /// Errors of internal variables, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     internal: Vec<(String, PerNorm<Exact>)>,
 }

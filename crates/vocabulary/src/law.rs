@@ -22,7 +22,7 @@ pub struct WithMemory<T> {
     pub memory: Memory<T>,
 }
 
-/// What a law of the library remembers.
+/// The memory of a law of the library.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Memory<T> {
     /// Flow by von Mises, for Hencky's elastic law: multiplicative split, `tau` by the elastic part of the deformation.

@@ -1,4 +1,4 @@
-//! What histories of internal variables tell of a solution, for people and for JSON.
+//! Findings from histories of internal variables, for people and for JSON.
 
 use mmsmith_solutions::{HistoryReport, Smoothness};
 use serde_json::{Value, json};

@@ -188,7 +188,7 @@ fn internal_variables_have_the_same_bits_after_resumes_and_for_any_number_of_thr
     }
 }
 
-/// The same field of motion at the same place: stresses and internal variables are Cartesian in both.
+/// One field of motion at one place: stresses and internal variables are Cartesian in both.
 #[test]
 fn internal_variables_are_cartesian_in_curvilinear_coordinates() {
     for law in laws() {
