@@ -9,8 +9,8 @@ mod principal_stretches;
 mod st_venant_kirchhoff;
 mod turn;
 
+use crate::Law;
 use crate::derivation::Derivation;
-use crate::spec::Law;
 use crate::tensor::{
     Matrix, Vector, cofactor, determinant, matrix_product, minors_beyond_trace, transpose,
 };

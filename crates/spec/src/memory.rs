@@ -1,6 +1,7 @@
 //! Laws that remember, or depend on more than the deformation: given fields, flow, Maxwell elements, internal variables.
 
 use crate::document::{Document, FlowTable, Text};
+use crate::law::energy::rate_names;
 use crate::spec::{Law, Reader};
 use crate::{Diagnostic, Spec};
 use mmsmith_expr::{Derivatives, Expr, Graph, Node, Rational};
@@ -41,14 +42,6 @@ enum FlowKind {
 impl FlowKind {
     const NAMES: [(&'static str, Self); 3] =
         [("j2", Self::J2), ("perzyna", Self::Perzyna), ("power-law", Self::PowerLaw)];
-}
-
-/// The names of the components of the rates of the deformation.
-pub(crate) fn rate_names(dimension: usize) -> Vec<String> {
-    let components = ["Fdot", "d"]
-        .map(|letter| crate::law::energy::component_names(letter, dimension).concat())
-        .concat();
-    [vec!["Jdot".to_owned()], components].concat()
 }
 
 impl Reader<'_> {

@@ -1,10 +1,8 @@
 //! The law of a specification as a solver needs it, with texts where the library has no law of the kind.
 
-use crate::law::energy::{INVARIANTS, component_names};
+use crate::law::energy::{INVARIANTS, component_names, rate_names};
 use crate::law::energy_text;
-use crate::memory::rate_names;
-use crate::spec::Law;
-use crate::{Coordinates, Domain, Spec};
+use crate::{Coordinates, Domain, Law, Spec};
 use mmsmith_expr::{Expr, Graph};
 use mmsmith_vocabulary::{Components, Internal, Law as ForSolver, Response, Stated, WithMemory};
 

@@ -30,6 +30,13 @@ pub(crate) fn component_names(letter: &str, dimension: usize) -> Vec<Vec<String>
     (1..=dimension).map(row).collect()
 }
 
+/// The names of the components of the rates of the deformation.
+pub(crate) fn rate_names(dimension: usize) -> Vec<String> {
+    let components =
+        ["Fdot", "d"].map(|letter| component_names(letter, dimension).concat()).concat();
+    [vec!["Jdot".to_owned()], components].concat()
+}
+
 /// A law in the components of the displacement gradient.
 pub(super) struct ComponentLaw {
     /// The symbols that stand for the components.
@@ -96,7 +103,7 @@ impl ComponentLaw {
         if deformation.is_isochoric() {
             replacement.insert(graph.symbol("J"), Graph::ONE);
         }
-        let names = crate::memory::rate_names(h.len());
+        let names = rate_names(h.len());
         let used = graph.symbols_in(&P.concat());
         let uses_rates = names.iter().any(|name| used.contains(&graph.symbol(name)));
         let rates = uses_rates.then(|| rates_in_components(graph, &h, &mut replacement));
