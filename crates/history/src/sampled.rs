@@ -1,10 +1,10 @@
 //! A motion as Chebyshev series in time: steps of the integrator ask for it thousands of times, and it takes a few dozen values to know it.
 
 use crate::law::Kinematics;
+use crate::motion::Motion;
 use crate::number::Dual;
 use crate::table::{Transform, polynomials_into, roots};
 use crate::tensor::{Tensor, tensor};
-use crate::trajectory::Motion;
 
 /// Polynomials in each piece.
 const COUNT: usize = 24;

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::dormand_prince::{Errors, Step, factor};
 use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+use crate::motion::Motion;
 use crate::number::{Dual, Number};
 use crate::sampled::Sampled;
 use crate::tensor::{Tensor, tensor};
@@ -82,28 +83,6 @@ pub struct Trajectory<const K: usize> {
     pub residuals: Residuals,
     /// How often rates were evaluated.
     pub evaluations: usize,
-}
-
-/// The motion of a particle, with slopes along the particle's position.
-pub trait Motion<const K: usize>: Sync {
-    /// The deformation gradient and its rate at a time.
-    fn at(&self, time: f64) -> Kinematics<Dual<f64, K>>;
-
-    /// Writes the constants of the law at a time, in the order of its [names](LawWithHistory::constants). `constants` is empty before.
-    fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, K>>);
-}
-
-/// Kinematics as a function of time, and constants that do not change.
-impl<const K: usize, M: Fn(f64) -> Kinematics<Dual<f64, K>> + Sync> Motion<K>
-    for (M, Vec<Dual<f64, K>>)
-{
-    fn at(&self, time: f64) -> Kinematics<Dual<f64, K>> {
-        self.0(time)
-    }
-
-    fn constants(&self, _: f64, constants: &mut Vec<Dual<f64, K>>) {
-        constants.extend_from_slice(&self.1);
-    }
 }
 
 /// The kinematics without slopes.

@@ -127,17 +127,6 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
     }
 }
 
-/// Prepares the fields of solutions that follow from histories of particles, up to a time.
-pub(crate) fn prepare_until<T: Real, const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    model: &dyn Solution<T, D>,
-    end: f64,
-) -> Result<(), CaseError> {
-    let history = |reason| CaseError::History { reason };
-    exact.prepare_until(end).map_err(history)?;
-    model.prepare_until(T::nearest(end)).map_err(history)
-}
-
 /// Whether the particles of all processes make a [`Lattice`]; a call of all.
 fn is_lattice<T: Real, const D: usize>(ranks: &dyn Ranks, X: &[SVector<T, D>]) -> bool {
     let mut layers = 0;

@@ -1,8 +1,9 @@
 //! Whether bodies of materials with memory flow everywhere, from when, and how smoothly.
 
 use crate::dimension::in_dimension;
+use crate::error::CaseError;
 use crate::points;
-use mmsmith_runtime::{AnySolution, HistoryReport, Law, Memory, Solution};
+use mmsmith_runtime::{AnySolution, HistoryReport, Law, Memory, Real, Solution};
 use nalgebra::SVector;
 
 /// How the histories of internal variables go at `count` places of a body over a period; none for elastic laws.
@@ -49,4 +50,15 @@ pub fn has_memory(solution: &AnySolution<f64>) -> bool {
         Law::Library(_) => false,
     };
     in_dimension!(solution, |s| is_such(s.law()), else false)
+}
+
+/// Prepares the fields of solutions that follow from histories of particles, up to a time.
+pub(crate) fn prepare_until<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    model: &dyn Solution<T, D>,
+    end: f64,
+) -> Result<(), CaseError> {
+    let history = |reason| CaseError::History { reason };
+    exact.prepare_until(end).map_err(history)?;
+    model.prepare_until(T::nearest(end)).map_err(history)
 }

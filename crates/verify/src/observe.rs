@@ -7,8 +7,9 @@ use mmsmith_runtime::{Real, Solution};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{CflSpeed, law};
-use crate::drive::{Driven, Outcome, Stepped, prepare_until};
+use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
+use crate::flow::prepare_until;
 use crate::history::Totals;
 use crate::on_grid::{OnGrid, steps_to};
 use crate::precision::Precision;

@@ -4,8 +4,8 @@ use mmsmith_measure::norms::PerField;
 use mmsmith_runtime::Solution;
 
 use crate::case::{Case, CflSpeed, Extent, law};
-use crate::drive::prepare_until;
 use crate::error::{CaseError, MOST_STEPS};
+use crate::flow::prepare_until;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::Scheme;
