@@ -20,7 +20,6 @@
 mod any_law;
 mod dormand_prince;
 mod flow;
-mod function;
 mod law;
 mod maxwell;
 mod motion;

@@ -12,8 +12,8 @@ use mmsmith_scalar_functions::ScalarFunctions;
 use mmsmith_vocabulary::{Components, Response, Stated};
 use thiserror::Error;
 
-use crate::function::has_derivative;
 use crate::law::{Branch, Kinematics, LawWithHistory};
+use crate::number::has_derivative;
 use crate::number::{Dual, Number};
 use crate::tensor::{Space, Tensor, symmetric_product, tensor, trace};
 
