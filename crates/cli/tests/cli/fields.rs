@@ -26,7 +26,8 @@ fn check_passes_every_solution_of_the_library() {
     assert_eq!(check["passed"], true);
     let results = check["results"].as_array().unwrap();
     let specifications = concat!(env!("CARGO_MANIFEST_DIR"), "/../../mms-specs");
-    assert_eq!(results.len(), fs::read_dir(specifications).unwrap().count());
+    let files = fs::read_dir(specifications).unwrap().flatten().map(|entry| entry.path());
+    assert_eq!(results.len(), files.filter(|path| path.is_file()).count());
     assert_eq!(called.stdout.matches(": passed at").count(), results.len(), "{}", called.stdout);
     for result in results {
         let findings = result["findings"].as_array().unwrap();
