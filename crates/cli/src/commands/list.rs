@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::arguments::ListOptions;
 use crate::json::Output;
 use crate::library::{Origin, all_names, locate};
-use crate::table::Table;
+use crate::table::{self, Table};
 use crate::{number, terminal};
 
 pub(crate) fn list(options: &ListOptions) -> Result<bool> {
@@ -107,7 +107,7 @@ fn word(condition: Condition) -> Option<&'static str> {
 
 /// A line for each solution, and the files of those that have one.
 fn short(entries: &[Entry]) -> String {
-    let mut table = Table::new(5, ["name", "", "law", "sides", ""]).flowing(24);
+    let mut table = Table::new(5, ["name", "", "law", "sides", ""]).sparing(3..4).flowing(20);
     let mut files = String::new();
     for Entry { name, origin, title, dimension, law, boundaries, .. } in entries {
         let sides = boundaries.join(", ");
@@ -116,7 +116,8 @@ fn short(entries: &[Entry]) -> String {
             files += &format!("{name}: {}\n", origin.words());
         }
     }
-    format!("{}{files}{LEGEND}", table.text())
+    let left_out = table::on_left_out(std::slice::from_ref(&table), "A wider terminal has them.");
+    format!("{}{left_out}{files}{LEGEND}", table.text())
 }
 
 const LEGEND: &str = "\
