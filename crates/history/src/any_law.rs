@@ -1,10 +1,12 @@
 //! The laws of the vocabulary.
 
-use mmsmith_vocabulary::{Flow as FlowRow, Law, Material, Memory, Stated, Volumetric, WithMemory};
+use mmsmith_vocabulary::{
+    Flow as FlowRow, Law, Material, Memory, Smoothness, Stated, Volumetric, WithMemory,
+};
 use thiserror::Error;
 
 use crate::flow::Flow;
-use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+use crate::law::{Branch, Kinematics, LawWithHistory, Residuals};
 use crate::maxwell::{ElasticPart, Maxwell};
 use crate::number::Number;
 use crate::stated::{StatedHistory, StatedHistoryError};

@@ -13,7 +13,9 @@
 //! Source: J. C. Simo, "A framework for finite strain elastoplasticity based on maximum plastic dissipation and the multiplicative
 //! decomposition", CMAME 66 (1988) 199-219; P. Perzyna, "Fundamental problems in viscoplasticity", Adv. Appl. Mech. 9 (1966) 243-377.
 
-use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+use mmsmith_vocabulary::Smoothness;
+
+use crate::law::{Branch, Kinematics, LawWithHistory, Residuals};
 use crate::number::{Number, power};
 use crate::tensor::{
     ENTRIES, Logarithm, Space, Tensor, determinant, identity, symmetric_product, tensor,

@@ -1,5 +1,7 @@
 //! Laws of materials with memory: rates of internal variables, and stresses.
 
+use mmsmith_vocabulary::Smoothness;
+
 use crate::number::Number;
 use crate::tensor::Tensor;
 
@@ -19,17 +21,6 @@ pub enum Branch {
     Elastic,
     /// Internal variables have rates.
     Flowing,
-}
-
-/// How the body force behaves where particles change their branch, from worst to best.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Smoothness {
-    /// It jumps.
-    Jump,
-    /// It is continuous and its slopes are not.
-    Kink,
-    /// Its slopes are continuous.
-    Smooth,
 }
 
 /// By how much the variables of a particle miss conditions that exact ones keep.

@@ -32,11 +32,11 @@ mod trajectory;
 
 pub use any_law::{AnyLaw, UnsupportedLaw};
 pub use flow::Flow;
-pub use law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+pub use law::{Branch, Kinematics, LawWithHistory, Residuals};
 pub use maxwell::{ElasticPart, Maxwell};
 pub use motion::Motion;
 pub use number::{Dual, Number};
 pub use stated::{StatedHistory, StatedHistoryError};
-pub use table::{AtPoint, AtTime, Grid, Series, Table};
-pub use tensor::{Tensor, determinant, identity};
+pub use table::{AtPoint, AtTime, Grid, Series, Table, place};
+pub use tensor::{ENTRIES, Tensor, determinant, identity};
 pub use trajectory::{Change, HistoryError, Trajectory, divergence};

@@ -456,7 +456,8 @@ fn fraction(x: f64) -> f64 {
 }
 
 /// Positions that fill a range evenly, by their number (additive recurrence).
-fn place<const D: usize>(range: &[[f64; 2]; D], number: u32) -> [f64; D] {
+#[must_use]
+pub fn place<const D: usize>(range: &[[f64; 2]; D], number: u32) -> [f64; D] {
     const STEPS: [f64; 3] =
         [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];
     std::array::from_fn(|axis| {

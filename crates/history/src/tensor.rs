@@ -6,7 +6,7 @@ use crate::number::Number;
 pub type Tensor<N> = [[N; 3]; 3];
 
 /// The entries of a symmetric tensor, in the order of internal variables. The first four are those of a plane.
-pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+pub const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// A tensor with these entries.
 #[inline]

@@ -2,10 +2,11 @@
 
 use std::cell::Cell;
 
+use mmsmith_vocabulary::Smoothness;
 use thiserror::Error;
 
 use crate::dormand_prince::{Errors, Step, factor};
-use crate::law::{Branch, Kinematics, LawWithHistory, Residuals, Smoothness};
+use crate::law::{Branch, Kinematics, LawWithHistory, Residuals};
 use crate::motion::Motion;
 use crate::number::{Dual, Number};
 use crate::sampled::Sampled;

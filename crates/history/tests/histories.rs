@@ -7,9 +7,9 @@ mod bodies;
 use bodies::{BULK, MU, YIELD, along, block, creep, elements, flow, number, times};
 use mmsmith_history::{
     AnyLaw, AtPoint, Branch, Dual, ElasticPart, Flow, HistoryError, Kinematics, LawWithHistory,
-    Maxwell, Motion, Number, Smoothness, Table, Tensor, Trajectory, divergence,
+    Maxwell, Motion, Number, Table, Tensor, Trajectory, divergence,
 };
-use mmsmith_vocabulary::Volumetric;
+use mmsmith_vocabulary::{Smoothness, Volumetric};
 use nalgebra::{Matrix3, SymmetricEigen};
 
 /// Uniaxial strain from the yield point on: `alpha = (2 mu (e0 + ln F) - sy)/(3 mu + H)`, `2 mu e0 = sy`, with the lateral part of the

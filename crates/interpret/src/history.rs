@@ -2,10 +2,10 @@
 
 use mmsmith_expr::Program;
 use mmsmith_history::{
-    AnyLaw, AtPoint, AtTime, Dual, HistoryError, Kinematics, LawWithHistory, Motion, Number,
-    Smoothness, Table, Tensor, Trajectory, UnsupportedLaw, divergence,
+    AnyLaw, AtPoint, AtTime, Dual, ENTRIES, HistoryError, Kinematics, LawWithHistory, Motion,
+    Number, Table, Tensor, Trajectory, UnsupportedLaw, divergence, place,
 };
-use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness as Told};
+use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness};
 use mmsmith_stage::History;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -281,7 +281,7 @@ impl<const D: usize> Histories<D> {
         let breaks: Vec<f64> = trajectory.changes.iter().map(|change| change.time).collect();
         let kinds = &self.kinds()[range.clone()];
         let of = |times: &[f64]| {
-            let mut all = self.in_frame(X, times)?;
+            let mut all = self.in_frame(&particle, times)?;
             Ok::<_, HistoryError>(all.drain(range.clone()).collect())
         };
         AtPoint::fine(end, &breaks, TABLE_TOLERANCE, kinds, of).ok().map(|(series, _)| series)
@@ -300,10 +300,13 @@ impl<const D: usize> Histories<D> {
     }
 
     /// Stress, body force and internal variables in the frame of a particle at some times, quantity by quantity.
-    fn in_frame(&self, X: [f64; D], times: &[f64]) -> Result<Vec<Vec<f64>>, HistoryError> {
-        let particle = self.particle(X);
-        let trajectory = Trajectory::<D>::new(&self.law, &particle, times, self.tolerance())?;
-        let density = self.density_at(&particle);
+    fn in_frame(
+        &self,
+        particle: &Particle<'_, D>,
+        times: &[f64],
+    ) -> Result<Vec<Vec<f64>>, HistoryError> {
+        let trajectory = Trajectory::<D>::new(&self.law, particle, times, self.tolerance())?;
+        let density = self.density_at(particle);
         let mut all = vec![Vec::with_capacity(times.len()); D * D + D + self.names.len()];
         for (&time, z) in times.iter().zip(&trajectory.states) {
             let constants = particle.all_constants(time);
@@ -322,42 +325,34 @@ impl<const D: usize> Histories<D> {
     }
 
     /// From the frame of a particle to Cartesian components; `values` as [`in_frame`](Self::in_frame) orders them.
-    fn turned(&self, X: [f64; D], values: &[f64]) -> Response<D> {
-        let Q = self.particle(X).frame;
+    fn turned(&self, particle: &Particle<'_, D>, values: &[f64]) -> Response<D> {
+        let Q = &particle.frame;
         let (force, rest) = values.split_at(D);
         let (stress, internal) = rest.split_at(D * D);
         Response {
-            b: std::array::from_fn(|i| (0..D).map(|a| Q[i][a] * force[a]).sum()),
-            P: std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    let terms = (0..D * D).map(|k| Q[i][k / D] * stress[k] * Q[j][k % D]);
-                    terms.sum()
-                })
-            }),
-            internal: turn_tensors(&self.names, &Q, internal),
+            b: turn_vector(Q, |a| force[a]),
+            P: turn_tensor(Q, |k| stress[k]),
+            internal: turn_tensors(&self.names, Q, internal),
         }
     }
 
     /// At one place and time, by the trajectory of this particle.
     pub(crate) fn response(&self, X: [f64; D], t: f64) -> Result<Response<D>, HistoryError> {
-        let all = self.in_frame(X, &[t])?;
+        let particle = self.particle(X);
+        let all = self.in_frame(&particle, &[t])?;
         let values: Vec<f64> = all.iter().map(|values| values[0]).collect();
-        Ok(self.turned(X, &values))
+        Ok(self.turned(&particle, &values))
     }
 
     /// Whether particles begin to flow, or stop, after the start and before a time, as some of them show.
     fn has_front(&self, end: f64) -> Result<bool, HistoryError> {
-        const PLACES: usize = 24;
+        const PLACES: u32 = 24;
         if !matches!(self.law, AnyLaw::Flow(_)) {
             return Ok(false);
         }
-        let changes = |n: usize| {
-            let q = std::array::from_fn(|axis| {
-                let [low, high] = self.chart.range(axis);
-                // Additive recurrences with these steps fill the body evenly.
-                let step = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.413_964_2][axis];
-                low + (high - low) * (0.5 + step * n as f64).fract()
-            });
+        let range = std::array::from_fn(|axis| self.chart.range(axis));
+        let changes = |n: u32| {
+            let q = place(&range, n);
             let particle = self.particle(self.chart.place(q));
             let found = Trajectory::<D>::new(&self.law, &particle, &[end], self.tolerance())?;
             Ok::<_, HistoryError>(!found.changes.is_empty())
@@ -386,7 +381,7 @@ impl<const D: usize> Histories<D> {
             always: 0,
             onsets: 0,
             unloadings: 0,
-            smoothness: Told::Smooth,
+            smoothness: Smoothness::Smooth,
             yield_condition: 0.0,
             volume: 0.0,
         };
@@ -398,11 +393,7 @@ impl<const D: usize> Histories<D> {
             report.always += usize::from(flows && trajectory.changes.is_empty());
             report.onsets += usize::from(begins(mmsmith_history::Branch::Flowing));
             report.unloadings += usize::from(begins(mmsmith_history::Branch::Elastic));
-            report.smoothness = report.smoothness.min(match trajectory.smoothness() {
-                Smoothness::Jump => Told::Jump,
-                Smoothness::Kink => Told::Kink,
-                Smoothness::Smooth => Told::Smooth,
-            });
+            report.smoothness = report.smoothness.min(trajectory.smoothness());
             report.yield_condition =
                 report.yield_condition.max(trajectory.residuals.yield_condition);
             report.volume = report.volume.max(trajectory.residuals.volume);
@@ -429,16 +420,30 @@ impl<const D: usize> Histories<D> {
     }
 }
 
+/// The Cartesian components of a vector from those in a frame.
+#[inline]
+fn turn_vector<const D: usize>(Q: &[[f64; D]; D], own: impl Fn(usize) -> f64) -> [f64; D] {
+    std::array::from_fn(|i| (0..D).map(|a| Q[i][a] * own(a)).sum())
+}
+
+/// The Cartesian components of a tensor from those in a frame, row by row.
+#[inline]
+fn turn_tensor<const D: usize>(Q: &[[f64; D]; D], own: impl Fn(usize) -> f64) -> [[f64; D]; D] {
+    let entry = |i: usize, j: usize| (0..D * D).map(|k| Q[i][k / D] * own(k) * Q[j][k % D]).sum();
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+}
+
 /// Turns the symmetric tensors among internal variables, six names with the indices 11, 22, 33, 12, 13, 23, from a frame to Cartesian axes.
 fn turn_tensors<const D: usize>(names: &[String], Q: &[[f64; D]; D], values: &[f64]) -> Vec<f64> {
-    const INDICES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-    let rotation = |i: usize, a: usize| match i < D && a < D {
-        true => Q[i][a],
-        false => f64::from(u8::from(i == a)),
-    };
+    let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| {
+        std::array::from_fn(|a| match i < D && a < D {
+            true => Q[i][a],
+            false => f64::from(u8::from(i == a)),
+        })
+    });
     let mut turned = values.to_vec();
     for first in 0..names.len().saturating_sub(5) {
-        let is_tensor = INDICES.iter().enumerate().all(|(k, (i, j))| {
+        let is_tensor = ENTRIES.iter().enumerate().all(|(k, (i, j))| {
             let indices = format!("{}{}", i + 1, j + 1);
             let stem = |name: &String| name.strip_suffix(&indices).map(str::to_owned);
             stem(&names[first + k]).is_some()
@@ -449,12 +454,12 @@ fn turn_tensors<const D: usize>(names: &[String], Q: &[[f64; D]; D], values: &[f
         }
         let entry = |a: usize, b: usize| {
             let (a, b) = (a.min(b), a.max(b));
-            let place = INDICES.iter().position(|pair| *pair == (a, b)).unwrap_or(0);
+            let place = ENTRIES.iter().position(|pair| *pair == (a, b)).unwrap_or(0);
             values[first + place]
         };
-        for (k, &(i, j)) in INDICES.iter().enumerate() {
-            turned[first + k] =
-                (0..9).map(|m| rotation(i, m / 3) * entry(m / 3, m % 3) * rotation(j, m % 3)).sum();
+        let in_space = turn_tensor(&rotation, |k| entry(k / 3, k % 3));
+        for (k, &(i, j)) in ENTRIES.iter().enumerate() {
+            turned[first + k] = in_space[i][j];
         }
     }
     turned
@@ -502,7 +507,7 @@ impl<const D: usize> Tables<D> {
                 low + 0.37 * (high - low)
             });
             axes.iter().zip(own).for_each(|(&axis, own)| q[axis] = own);
-            histories.in_frame(chart.place(q), times)
+            histories.in_frame(&histories.particle(chart.place(q)), times)
         };
         let kinds = histories.kinds();
         let (table, error) = Table::<K>::fine_by_kinds(range, end, TABLE_TOLERANCE, &kinds, of)?;
@@ -671,7 +676,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
             return found.map_or([f64::NAN; D], |response| response.b);
         }
         let own: [f64; D] = std::array::from_fn(|a| self.value(n, a, moment));
-        std::array::from_fn(|i| (0..D).map(|a| frame[i][a] * own[a]).sum())
+        turn_vector(frame, |a| own[a])
     }
 
     pub(crate) fn stress(&self, n: usize, moment: &Moment) -> [[f64; D]; D] {
@@ -680,13 +685,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
             let nan = [[f64::NAN; D]; D];
             return self.histories.response(*X, moment.t).map_or(nan, |response| response.P);
         }
-        let own = |a: usize, b: usize| self.value(n, a * D + b, moment);
-        let values: [[f64; D]; D] = std::array::from_fn(|a| std::array::from_fn(|b| own(a, b)));
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                (0..D * D).map(|k| Q[i][k / D] * values[k / D][k % D] * Q[j][k % D]).sum()
-            })
-        })
+        let own: [[f64; D]; D] =
+            std::array::from_fn(|a| std::array::from_fn(|b| self.value(n, a * D + b, moment)));
+        turn_tensor(Q, |k| own[k / D][k % D])
     }
 
     pub(crate) fn internal(&self, n: usize, moment: &Moment) -> Vec<f64> {

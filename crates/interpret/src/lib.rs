@@ -25,6 +25,7 @@ use mmsmith_runtime::{
 use mmsmith_spec::{self as spec, Coordinates, DeriveError, Spec};
 use mmsmith_stage::{FieldName, Measures, Sides, Staged};
 use staged::PointStages;
+use std::ops::Range;
 use thiserror::Error;
 
 /// Why a specification could not be interpreted.
@@ -554,9 +555,10 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, 
 }
 
 impl<T: Interpretable, const D: usize> InternalAtPoints<T> for Prepared<'_, D> {
-    fn evaluate(&self, t: T, point: usize) -> Vec<T> {
+    fn evaluate(&self, t: T, points: Range<usize>) -> Vec<Vec<T>> {
         let moment = self.moment(t.to_f64());
-        self.internal(point, &moment).into_iter().map(T::nearest).collect()
+        let of = |point| self.internal(point, &moment).into_iter().map(T::nearest).collect();
+        points.map(of).collect()
     }
 }
 

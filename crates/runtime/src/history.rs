@@ -1,15 +1,6 @@
 //! Findings on a solution from histories of its internal variables.
 
-/// How smooth the body force is where particles begin to flow, or stop, from worst to best.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Smoothness {
-    /// It jumps.
-    Jump,
-    /// It is continuous and its slopes are not.
-    Kink,
-    /// Its slopes are continuous.
-    Smooth,
-}
+use mmsmith_vocabulary::Smoothness;
 
 /// How the histories of some particles of a body go until a time.
 #[derive(Clone, Debug, PartialEq)]

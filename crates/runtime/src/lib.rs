@@ -22,15 +22,15 @@ mod solution;
 mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
-pub use history::{HistoryReport, Smoothness};
+pub use history::HistoryReport;
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 /// Functions that the standard library lacks, which [`Real::apply`] takes.
 pub use libm;
 /// The functions that [`Real`] has beyond those of a field.
 pub use mmsmith_scalar_functions::ScalarFunctions;
 pub use mmsmith_vocabulary::{
-    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Stated,
-    Volumetric, WithMemory,
+    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Smoothness,
+    Stated, Volumetric, WithMemory,
 };
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;

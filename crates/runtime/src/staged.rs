@@ -9,6 +9,7 @@ use crate::{Real, Solution};
 use nalgebra::{SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 use std::array;
+use std::ops::Range;
 
 /// The body force at many fixed points, prepared by [`Solution::body_force_at`].
 pub trait BodyForceAtPoints<T: Real, const D: usize>: Send + Sync {
@@ -64,12 +65,12 @@ pub trait StateAtPoints<T: Real, const D: usize>: Send + Sync {
 
 /// The exact internal variables at many fixed points, prepared by [`Solution::internal_at`].
 pub trait InternalAtPoints<T: Real>: Send + Sync {
-    /// The internal variables of a point at time `t`, in the order of [`Solution::internal_variables`].
+    /// The internal variables of some points at time `t`, each in the order of [`Solution::internal_variables`].
     ///
     /// # Panics
     ///
     /// Panics where there are fewer points.
-    fn evaluate(&self, t: T, point: usize) -> Vec<T>;
+    fn evaluate(&self, t: T, points: Range<usize>) -> Vec<Vec<T>>;
 }
 
 /// The exact state at one point, to compare a simulation with.
@@ -626,7 +627,7 @@ impl<S, T: Real, const D: usize> InternalAtPoints<T> for PlainPoints<'_, S, T, D
 where
     S: Solution<T, D> + ?Sized,
 {
-    fn evaluate(&self, t: T, point: usize) -> Vec<T> {
-        self.solution.internal(&self.X[point], t)
+    fn evaluate(&self, t: T, points: Range<usize>) -> Vec<Vec<T>> {
+        self.X[points].iter().map(|X| self.solution.internal(X, t)).collect()
     }
 }

@@ -44,6 +44,11 @@ impl FlowKind {
         [("j2", Self::J2), ("perzyna", Self::Perzyna), ("power-law", Self::PowerLaw)];
 }
 
+/// The names of the internal variables, in the order of the file.
+fn internal_names(document: &Document) -> impl Iterator<Item = String> {
+    document.internal.0.iter().map(|(name, _)| name.get_ref().clone())
+}
+
 impl Reader<'_> {
     /// Reads `[given]`.
     pub(crate) fn given(&mut self, document: &Document) -> Result<Vec<Given>, Diagnostic> {
@@ -85,13 +90,17 @@ impl Reader<'_> {
         Ok(internal)
     }
 
+    /// The names that an energy may use: no rates.
+    pub(crate) fn energy_names(&self, document: &Document) -> Vec<String> {
+        self.response_names().into_iter().chain(internal_names(document)).collect()
+    }
+
     /// The names that a stress, or the rate of an internal variable, may use.
     pub(crate) fn stress_names(&self, document: &Document) -> Vec<String> {
-        let internal = document.internal.0.iter().map(|(name, _)| name.get_ref().clone());
         self.response_names()
             .into_iter()
             .chain(rate_names(self.dimension))
-            .chain(internal)
+            .chain(internal_names(document))
             .collect()
     }
 

@@ -845,9 +845,7 @@ impl<'a> Reader<'a> {
                                 W = 'mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2'";
                     return Err(missing(&self.scope, "W", help));
                 };
-                let internal = document.internal.0.iter().map(|(name, _)| name.get_ref().clone());
-                let names: Vec<String> =
-                    self.response_names().into_iter().chain(internal).collect();
+                let names = self.energy_names(document);
                 return Ok(Law::Energy { W: self.scope.response(text, "an energy", &names)? });
             }
         };

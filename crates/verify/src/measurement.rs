@@ -142,13 +142,13 @@ impl<'a, const D: usize> Measurement<'a, D> {
         let count = law.variables().len();
         let group = |g: usize| {
             let places = g * GROUP..particles.len().min((g + 1) * GROUP);
-            let of_particle = |p: usize| {
-                let exact = exact_internal.evaluate(time, p);
+            let exact = exact_internal.evaluate(time, places.clone());
+            let of_particle = |(p, exact): (usize, Vec<f64>)| {
                 let own = &particles.internal[p * count..];
                 let off = |of: &Compared| (own[of.of_law].to_f64() - exact[of.place]).abs();
                 internal.iter().map(off).collect::<Vec<f64>>()
             };
-            places.map(of_particle).collect::<Vec<_>>()
+            places.zip(exact).map(of_particle).collect::<Vec<_>>()
         };
         let magnitudes = each_group(particles.len().div_ceil(GROUP), &group).concat();
         let norms = |(k, of): (usize, &Compared)| {

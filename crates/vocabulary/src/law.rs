@@ -242,3 +242,14 @@ impl<T> Law<T> {
         }
     }
 }
+
+/// How smooth the body force is where particles begin to flow, or stop, from worst to best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Smoothness {
+    /// It jumps.
+    Jump,
+    /// It is continuous and its slopes are not.
+    Kink,
+    /// Its slopes are continuous.
+    Smooth,
+}

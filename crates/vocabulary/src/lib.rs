@@ -10,7 +10,8 @@ mod law;
 mod material;
 
 pub use law::{
-    Components, Element, Flow, Internal, Law, Memory, Overstress, Response, Stated, WithMemory,
+    Components, Element, Flow, Internal, Law, Memory, Overstress, Response, Smoothness, Stated,
+    WithMemory,
 };
 pub use material::{
     Constant, Derivation, InStretches, Material, Moduli, Row, Term, UnknownLaw, Volumetric,
