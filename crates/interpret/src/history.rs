@@ -108,11 +108,17 @@ impl<const D: usize> Chart<D> {
     }
 }
 
-/// The stress of a particle, what follows from it, and its internal variables; in Cartesian components.
+/// The stress of a particle and the body force that balances it, in Cartesian components.
 #[derive(Clone, Debug)]
 pub(crate) struct Response<const D: usize> {
     pub(crate) P: [[f64; D]; D],
     pub(crate) b: [f64; D],
+}
+
+/// The stress of a particle and its internal variables, in Cartesian components.
+#[derive(Clone, Debug)]
+pub(crate) struct Stressed<const D: usize> {
+    pub(crate) P: [[f64; D]; D],
     pub(crate) internal: Vec<f64>,
 }
 
@@ -192,6 +198,21 @@ impl<const D: usize> Motion<D> for Particle<'_, D> {
 
     fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, D>>) {
         constants.extend(self.all_constants(time));
+    }
+}
+
+/// A particle whose stress is asked for alone: without slopes its trajectory takes a third of the time.
+struct WithoutSlopes<'a, const D: usize>(&'a Particle<'a, D>);
+
+impl<const D: usize> Motion<0> for WithoutSlopes<'_, D> {
+    fn at(&self, time: f64) -> Kinematics<Dual<f64, 0>> {
+        let Kinematics { F, rate } = self.0.kinematics(time);
+        let of = |A: Tensor<Dual<f64, D>>| A.map(|row| row.map(|entry| Dual::constant(entry.value)));
+        Kinematics { F: of(F), rate: of(rate) }
+    }
+
+    fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, 0>>) {
+        constants.extend(self.0.all_constants(time).iter().map(|c| Dual::constant(c.value)));
     }
 }
 
@@ -327,12 +348,10 @@ impl<const D: usize> Histories<D> {
     /// From the frame of a particle to Cartesian components; `values` as [`in_frame`](Self::in_frame) orders them.
     fn turned(&self, particle: &Particle<'_, D>, values: &[f64]) -> Response<D> {
         let Q = &particle.frame;
-        let (force, rest) = values.split_at(D);
-        let (stress, internal) = rest.split_at(D * D);
+        let (force, stress) = values.split_at(D);
         Response {
             b: turn_vector(Q, |a| force[a]),
             P: turn_tensor(Q, |k| stress[k]),
-            internal: turn_tensors(&self.names, Q, internal),
         }
     }
 
@@ -342,6 +361,25 @@ impl<const D: usize> Histories<D> {
         let all = self.in_frame(&particle, &[t])?;
         let values: Vec<f64> = all.iter().map(|values| values[0]).collect();
         Ok(self.turned(&particle, &values))
+    }
+
+    /// The stress and the internal variables at one place and time.
+    pub(crate) fn stressed(&self, X: [f64; D], t: f64) -> Result<Stressed<D>, HistoryError> {
+        let particle = self.particle(X);
+        let motion = WithoutSlopes(&particle);
+        let trajectory = Trajectory::<0>::new(&self.law, &motion, &[t], self.tolerance())?;
+        let values = |numbers: &[Dual<f64, 0>]| numbers.iter().map(|z| z.value).collect();
+        let z: Vec<f64> = trajectory.states.first().map_or_else(Vec::new, |z| values(z));
+        let Kinematics { F, rate } = particle.kinematics(t);
+        let of = |A: Tensor<Dual<f64, D>>| A.map(|row| row.map(|entry| entry.value));
+        let at = Kinematics { F: of(F), rate: of(rate) };
+        let constants: Vec<f64> = particle.all_constants(t).iter().map(|c| c.value).collect();
+        let P = self.law.first_piola_kirchhoff(&at, &constants, &z);
+        let internal = self.law.observables(&constants, &z);
+        Ok(Stressed {
+            P: turn_tensor(&particle.frame, |k| P[k / D][k % D]),
+            internal: turn_tensors(&self.names, &particle.frame, &internal),
+        })
     }
 
     /// Whether particles begin to flow, or stop, after the start and before a time, as some of them show.
@@ -683,7 +721,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         let Place { X, frame: Q } = &self.particles[n];
         if !self.has(moment.t) {
             let nan = [[f64::NAN; D]; D];
-            return self.histories.response(*X, moment.t).map_or(nan, |response| response.P);
+            return self.histories.stressed(*X, moment.t).map_or(nan, |found| found.P);
         }
         let own: [[f64; D]; D] =
             std::array::from_fn(|a| std::array::from_fn(|b| self.value(n, a * D + b, moment)));
@@ -695,8 +733,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         let names = &self.histories.names;
         if !self.has(moment.t) {
             let nan = vec![f64::NAN; names.len()];
-            let found = self.histories.response(*X, moment.t);
-            return found.map_or(nan, |response| response.internal);
+            return self.histories.stressed(*X, moment.t).map_or(nan, |found| found.internal);
         }
         let own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
         turn_tensors(names, frame, &own)

@@ -330,7 +330,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn first_piola_kirchhoff(&self, X: &SVector<T, D>, t: T) -> SMatrix<T, D, D> {
         if let Some(history) = &self.history {
-            return stress_of(&history.response(in_double(X), t.to_f64()));
+            return stress_of(history.stressed(in_double(X), t.to_f64()).ok().map(|found| found.P));
         }
         self.matrix(&self.first_piola_kirchhoff, X, t)
     }
@@ -389,8 +389,8 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
 
     fn internal(&self, X: &SVector<T, D>, t: T) -> Vec<T> {
         let Some(history) = &self.history else { return Vec::new() };
-        match history.response(in_double(X), t.to_f64()) {
-            Ok(response) => response.internal.into_iter().map(T::nearest).collect(),
+        match history.stressed(in_double(X), t.to_f64()) {
+            Ok(found) => found.internal.into_iter().map(T::nearest).collect(),
             Err(_) => vec![T::nearest(f64::NAN); history.names.len()],
         }
     }
@@ -421,7 +421,7 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
         if let Some(history) = &self.history {
             let response = history.response(in_double(X), t.to_f64());
             return Fields {
-                P: stress_of(&response),
+                P: stress_of(response.as_ref().ok().map(|response| response.P)),
                 b: force_of(&response),
                 u: self.displacement(X, t),
                 v: self.velocity(X, t),
@@ -488,12 +488,8 @@ fn in_double<T: Real, const D: usize>(X: &SVector<T, D>) -> [f64; D] {
 }
 
 /// The stress, not a number where a history could not be followed.
-fn stress_of<T: Real, const D: usize>(
-    response: &Result<history::Response<D>, HistoryError>,
-) -> SMatrix<T, D, D> {
-    SMatrix::from_fn(|i, j| {
-        T::nearest(response.as_ref().map_or(f64::NAN, |response| response.P[i][j]))
-    })
+fn stress_of<T: Real, const D: usize>(P: Option<[[f64; D]; D]>) -> SMatrix<T, D, D> {
+    SMatrix::from_fn(|i, j| T::nearest(P.map_or(f64::NAN, |P| P[i][j])))
 }
 
 /// The body force, not a number where a history could not be followed.

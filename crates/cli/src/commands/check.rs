@@ -10,6 +10,7 @@ use mmsmith_verify::{
     BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
     history_of,
 };
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -57,8 +58,9 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             None if spec.has_history() => OF_HISTORIES,
             _ => most,
         };
-        let reports = solutions.iter().map(|solution| check_fields(solution, points));
-        let report = CheckReport::worst_of(reports.collect::<Result<_, _>>()?);
+        let reports = solutions.par_iter().map(|solution| check_fields(solution, points));
+        let reports: Vec<_> = reports.collect();
+        let report = CheckReport::worst_of(reports.into_iter().collect::<Result<_, _>>()?);
         let claims = Claims::judge(spec, listings)?;
         // The first solution has the parameters asked for.
         let history = match solutions.first() {
