@@ -127,6 +127,8 @@ pub(crate) struct Histories<const D: usize> {
     law: AnyLaw,
     /// The names of the internal variables as the solver's law has them.
     pub(crate) names: Vec<String>,
+    /// The places of the first entries of tensors among them.
+    tensors: Vec<usize>,
     /// Constants of the law, each a number or a coordinate.
     constants: Vec<Constant>,
     motion: Program,
@@ -255,10 +257,12 @@ impl<const D: usize> Histories<D> {
         };
         let axes: Vec<usize> = (0..D).filter(is_used).collect();
         let names = any.observable_names();
+        let tensors = first_entries(&names);
         let (motion, inertia) = (history.motion.clone(), history.inertia.clone());
         Ok(Self {
             law: any,
             names,
+            tensors,
             constants,
             motion,
             inertia,
@@ -375,11 +379,9 @@ impl<const D: usize> Histories<D> {
         let at = Kinematics { F: of(F), rate: of(rate) };
         let constants: Vec<f64> = particle.all_constants(t).iter().map(|c| c.value).collect();
         let P = self.law.first_piola_kirchhoff(&at, &constants, &z);
-        let internal = self.law.observables(&constants, &z);
-        Ok(Stressed {
-            P: turn_tensor(&particle.frame, |k| P[k / D][k % D]),
-            internal: turn_tensors(&self.names, &particle.frame, &internal),
-        })
+        let mut internal = self.law.observables(&constants, &z);
+        turn_tensors(&self.tensors, &particle.frame, &mut internal);
+        Ok(Stressed { P: turn_tensor(&particle.frame, |k| P[k / D][k % D]), internal })
     }
 
     /// Whether particles begin to flow, or stop, after the start and before a time, as some of them show.
@@ -471,36 +473,48 @@ fn turn_tensor<const D: usize>(Q: &[[f64; D]; D], own: impl Fn(usize) -> f64) ->
     std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
 }
 
-/// Turns the symmetric tensors among internal variables, six names with the indices 11, 22, 33, 12, 13, 23, from a frame to Cartesian axes.
-fn turn_tensors<const D: usize>(names: &[String], Q: &[[f64; D]; D], values: &[f64]) -> Vec<f64> {
+/// The places of the first entries of symmetric tensors among internal variables: six names with the indices 11, 22, 33, 12, 13, 23.
+fn first_entries(names: &[String]) -> Vec<usize> {
+    let is_tensor = |names: &[String]| {
+        let stem = names[0].strip_suffix("11");
+        let stems = names.iter().zip(ENTRIES).map(|(name, (i, j))| {
+            name.strip_suffix(format!("{}{}", i + 1, j + 1).as_str())
+        });
+        stem.is_some() && stems.into_iter().all(|own| own == stem)
+    };
+    let firsts = names.windows(ENTRIES.len()).enumerate();
+    firsts.filter(|(_, names)| is_tensor(names)).map(|(first, _)| first).collect()
+}
+
+/// Turns the symmetric tensors among internal variables, whose first entries are known, from a frame to Cartesian axes.
+fn turn_tensors<const D: usize>(firsts: &[usize], Q: &[[f64; D]; D], values: &mut [f64]) {
+    let is_cartesian = (0..D).all(|i| (0..D).all(|a| Q[i][a] == f64::from(u8::from(i == a))));
+    if is_cartesian {
+        return;
+    }
     let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| {
         std::array::from_fn(|a| match i < D && a < D {
             true => Q[i][a],
             false => f64::from(u8::from(i == a)),
         })
     });
-    let mut turned = values.to_vec();
-    for first in 0..names.len().saturating_sub(5) {
-        let is_tensor = ENTRIES.iter().enumerate().all(|(k, (i, j))| {
-            let indices = format!("{}{}", i + 1, j + 1);
-            let stem = |name: &String| name.strip_suffix(&indices).map(str::to_owned);
-            stem(&names[first + k]).is_some()
-                && stem(&names[first + k]) == names[first].strip_suffix("11").map(str::to_owned)
-        });
-        if !is_tensor {
-            continue;
-        }
-        let entry = |a: usize, b: usize| {
-            let (a, b) = (a.min(b), a.max(b));
-            let place = ENTRIES.iter().position(|pair| *pair == (a, b)).unwrap_or(0);
-            values[first + place]
-        };
-        let in_space = turn_tensor(&rotation, |k| entry(k / 3, k % 3));
-        for (k, &(i, j)) in ENTRIES.iter().enumerate() {
-            turned[first + k] = in_space[i][j];
+    for own in firsts.iter().map(|first| *first..first + ENTRIES.len()) {
+        let own = &mut values[own];
+        let in_frame: Tensor<f64> = of_entries(own);
+        let in_space = turn_tensor(&rotation, |k| in_frame[k / 3][k % 3]);
+        for (value, (i, j)) in own.iter_mut().zip(ENTRIES) {
+            *value = in_space[i][j];
         }
     }
-    turned
+}
+
+/// The symmetric tensor of six entries.
+fn of_entries(entries: &[f64]) -> Tensor<f64> {
+    let mut all = [[0.0; 3]; 3];
+    for (&entry, (i, j)) in entries.iter().zip(ENTRIES) {
+        (all[i][j], all[j][i]) = (entry, entry);
+    }
+    all
 }
 
 /// Fields of a body in the frames of its particles, as tables over the coordinates that they depend on.
@@ -735,8 +749,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
             let nan = vec![f64::NAN; names.len()];
             return self.histories.stressed(*X, moment.t).map_or(nan, |found| found.internal);
         }
-        let own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
-        turn_tensors(names, frame, &own)
+        let mut own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
+        turn_tensors(&self.histories.tensors, frame, &mut own);
+        own
     }
 }
 
