@@ -209,7 +209,8 @@ struct WithoutSlopes<'a, const D: usize>(&'a Particle<'a, D>);
 impl<const D: usize> Motion<0> for WithoutSlopes<'_, D> {
     fn at(&self, time: f64) -> Kinematics<Dual<f64, 0>> {
         let Kinematics { F, rate } = self.0.kinematics(time);
-        let of = |A: Tensor<Dual<f64, D>>| A.map(|row| row.map(|entry| Dual::constant(entry.value)));
+        let of =
+            |A: Tensor<Dual<f64, D>>| A.map(|row| row.map(|entry| Dual::constant(entry.value)));
         Kinematics { F: of(F), rate: of(rate) }
     }
 
@@ -353,10 +354,7 @@ impl<const D: usize> Histories<D> {
     fn turned(&self, particle: &Particle<'_, D>, values: &[f64]) -> Response<D> {
         let Q = &particle.frame;
         let (force, stress) = values.split_at(D);
-        Response {
-            b: turn_vector(Q, |a| force[a]),
-            P: turn_tensor(Q, |k| stress[k]),
-        }
+        Response { b: turn_vector(Q, |a| force[a]), P: turn_tensor(Q, |k| stress[k]) }
     }
 
     /// At one place and time, by the trajectory of this particle.
@@ -477,9 +475,10 @@ fn turn_tensor<const D: usize>(Q: &[[f64; D]; D], own: impl Fn(usize) -> f64) ->
 fn first_entries(names: &[String]) -> Vec<usize> {
     let is_tensor = |names: &[String]| {
         let stem = names[0].strip_suffix("11");
-        let stems = names.iter().zip(ENTRIES).map(|(name, (i, j))| {
-            name.strip_suffix(format!("{}{}", i + 1, j + 1).as_str())
-        });
+        let stems = names
+            .iter()
+            .zip(ENTRIES)
+            .map(|(name, (i, j))| name.strip_suffix(format!("{}{}", i + 1, j + 1).as_str()));
         stem.is_some() && stems.into_iter().all(|own| own == stem)
     };
     let firsts = names.windows(ENTRIES.len()).enumerate();

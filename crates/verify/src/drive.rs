@@ -14,6 +14,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::error::CaseError;
 use crate::interrupt::StepLoop;
+use crate::kept_stress::KeptStress;
 use crate::on_grid::OnGrid;
 use crate::precision::Precision;
 use crate::scheme::Scheme;
@@ -147,6 +148,8 @@ fn is_lattice<T: Real, const D: usize>(ranks: &dyn Ranks, X: &[SVector<T, D>]) -
 struct ExactBodyForce<'a, T: Real, const D: usize> {
     kept: Box<dyn BodyForceAtPoints<T, D> + 'a>,
     model: &'a dyn Solution<T, D>,
+    /// The stress on loaded boundaries.
+    stress: KeptStress<'a, T, D>,
     planted: Planted,
     /// Where several processes hold the particles, whether all of them make a lattice.
     is_lattice: Option<bool>,
@@ -165,7 +168,8 @@ impl<'a, T: Real, const D: usize> ExactBodyForce<'a, T, D> {
             model.has_form_on_lattice() && is_lattice(&**ranks, &solver.observe().0.X)
         });
         let kept = Self::keep(model, solver.forced(), is_lattice);
-        Self { kept, model, planted, is_lattice, version: None }
+        let stress = KeptStress::new(model);
+        Self { kept, model, stress, planted, is_lattice, version: None }
     }
 
     /// The body force kept for particles that started at `X`. The particles of one process may make a lattice where all do not, and
@@ -207,10 +211,14 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
     }
 
     fn boundary_stress(&self, loads: &[Load<T, D>], t: T, stress: &mut [SMatrix<T, D, D>]) {
-        for (stress, Load { X, .. }) in stress.iter_mut().zip(loads) {
+        let kept = self.stress.at(loads.iter().map(|load| load.X), t);
+        for (n, (stress, Load { X, .. })) in stress.iter_mut().zip(loads).enumerate() {
+            let P = match &kept {
+                Some(kept) => kept[n],
+                None => self.model.first_piola_kirchhoff(X, t),
+            };
             let F = self.model.deformation_gradient(X, t);
-            *stress =
-                self.model.first_piola_kirchhoff(X, t) * F.transpose() / self.model.jacobian(X, t);
+            *stress = P * F.transpose() / self.model.jacobian(X, t);
         }
     }
 

@@ -37,6 +37,7 @@ mod history;
 mod interrupt;
 mod inverse;
 mod inversion;
+mod kept_stress;
 mod measurement;
 mod named;
 mod observe;

@@ -13,6 +13,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use crate::case::{Case, CflSpeed, Extent, law_by, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
+use crate::kept_stress::KeptStress;
 use crate::named::Named;
 use crate::points;
 use crate::precision::Precision;
@@ -208,7 +209,10 @@ fn end(condition: Condition) -> End {
 }
 
 /// The exact solution on the sides of the body.
-struct ExactBoundary<'a, const D: usize>(&'a dyn Solution<f64, D>);
+struct ExactBoundary<'a, const D: usize> {
+    exact: &'a dyn Solution<f64, D>,
+    stress: KeptStress<'a, f64, D>,
+}
 
 impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
     fn evaluate(
@@ -219,22 +223,30 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
         t: f64,
         values: &mut [SVector<f64, D>],
     ) {
-        let exact = self.0;
+        let exact = self.exact;
         let surface = match (exact.domain(), side) {
             (Domain::Annulus { .. }, Side { axis: 0, upper: false }) => Surface::Inner,
             (Domain::Annulus { .. }, Side { axis: 0, upper: true }) => Surface::Outer,
             (_, Side { axis, upper: false }) => Surface::Lower(axis),
             (_, Side { axis, upper: true }) => Surface::Upper(axis),
         };
-        for (X, value) in X.iter().zip(values) {
+        let kept = match quantity {
+            Quantity::Traction => self.stress.at(X.iter().copied(), t),
+            Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration => None,
+        };
+        let nothing = SVector::repeat(f64::NAN);
+        for (n, (X, value)) in X.iter().zip(values).enumerate() {
             *value = match quantity {
                 Quantity::Displacement => exact.displacement(X, t),
                 Quantity::Velocity => exact.velocity(X, t),
                 Quantity::Acceleration => exact.acceleration(X, t),
                 // A surface that the body does not have stops the run.
-                Quantity::Traction => {
-                    exact.traction(surface, X, t).unwrap_or(SVector::repeat(f64::NAN))
-                }
+                Quantity::Traction => match &kept {
+                    Some(P) => {
+                        exact.domain().normal(surface, X).map_or(nothing, |normal| P[n] * normal)
+                    }
+                    None => exact.traction(surface, X, t).unwrap_or(nothing),
+                },
             };
         }
     }
@@ -266,7 +278,8 @@ where
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],
     };
-    T::total_lagrangian(set_up, Box::new(ExactBoundary(exact))).map_err(|error| match error {
+    let boundary = ExactBoundary { exact, stress: KeptStress::new(exact) };
+    T::total_lagrangian(set_up, Box::new(boundary)).map_err(|error| match error {
         SetupError::DoublePrecisionOnly => {
             CaseError::setting("precision", "f32", "f64 in the total Lagrangian formulation")
         }
