@@ -26,7 +26,7 @@
 //!     per_cell: 2,
 //!     layout: Layout::Lattice,
 //! };
-//! let scheme = Scheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4 };
+//! let scheme = Scheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4, volume: Volume::Pointwise };
 //! let material = Material::NeoHookean { lambda: 5769.0, mu: 3846.0 };
 //! let mut bar = TotalLagrangian::new(grid, scheme, material, 1.0, 4e-4)?;
 //! let v: Vec<_> = bar.positions().iter().map(|X| X.map(|x| (std::f64::consts::PI * x).sin())).collect();
@@ -49,6 +49,7 @@ mod composition;
 mod coordinates;
 mod fit;
 mod mass;
+mod projection;
 mod set_up;
 mod simulation;
 mod solver;
@@ -58,6 +59,7 @@ pub use axis::{Axis, End, Layout};
 pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use coordinates::Coordinates;
+pub use mmsmith_laws::Volume;
 pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;

@@ -1,12 +1,15 @@
 //! The simulation: coefficients of displacement and velocity, and the forces on them.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::{array, mem};
 
 use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_laws::{AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog};
+use mmsmith_laws::{
+    AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog, ProjectedVolume, Stressed, Volume,
+};
 use mmsmith_mpm::BodyForce;
 use mmsmith_mpm::Particles;
 use mmsmith_mpm::{SavedState, SavedStateError, replace_whole};
@@ -23,6 +26,7 @@ use super::coordinates::RowGeometry;
 use super::fit::Line;
 use super::mass::{Band, Mass};
 use super::piece;
+use super::projection::Projection;
 use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, reserve, rows};
 use super::stress::{LawOfRows, MemoryRows, OwnRows, Places, Stress, is_deformation};
 
@@ -42,6 +46,8 @@ pub struct TotalLagrangian<const D: usize> {
     /// The body force at the particles.
     b: Vec<SVector<f64, D>>,
     particles: Particles<f64, D>,
+    /// Where the change of volume is projected, the projection and the law that takes it.
+    projected: Option<ProjectedChange<D>>,
     /// With memory, the internal variables of the law, and the deformation gradients that those of the particles belong to.
     variables: Vec<InternalVariable>,
     remembered: Vec<SMatrix<f64, D, D>>,
@@ -54,7 +60,10 @@ pub struct TotalLagrangian<const D: usize> {
     planted: Planted,
 }
 
-impl<const D: usize> TotalLagrangian<D> {
+impl<const D: usize> TotalLagrangian<D>
+where
+    f64: Stressed<D>,
+{
     /// Sets up a body at rest and undeformed, of density `density` per reference volume, at time 0.
     ///
     /// Stages of compositions of higher order go back in time, where internal variables of a law with memory cannot follow: with such a
@@ -72,10 +81,12 @@ impl<const D: usize> TotalLagrangian<D> {
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         let law = law.into();
-        let (variables, mut scheme) = (law.variables(), scheme);
-        if !variables.is_empty() {
+        let mut scheme = scheme;
+        if !law.variables().is_empty() {
             scheme.composition = Composition::Order2;
         }
+        let (law, of_projection) = with_volume(law, scheme.volume)?;
+        let variables = law.variables();
         check(&grid, &scheme, density, time_step)?;
         reserve(&grid, scheme.degree, variables.len())?;
         let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
@@ -118,6 +129,12 @@ impl<const D: usize> TotalLagrangian<D> {
             masses.push(<[Mass; 2]>::from(pair_of_masses));
         }
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let projected = match of_projection {
+            Some(law) => {
+                Some(ProjectedChange { law, of: Projection::new(&grid, scheme.degree, &lines)? })
+            }
+            None => None,
+        };
         let mut particles = particles(&grid, &lines, density);
         particles.internal = initial(&law, &particles.X);
         let remembered = match variables.is_empty() {
@@ -125,6 +142,7 @@ impl<const D: usize> TotalLagrangian<D> {
             false => vec![SMatrix::identity(); particles.len()],
         };
         Ok(Self {
+            projected,
             variables,
             remembered,
             reciprocal_radius: match grid.coordinates.are_curvilinear() {
@@ -200,6 +218,12 @@ impl<const D: usize> TotalLagrangian<D> {
         }
         self.steps_done = 0;
         self.failed = None;
+        let Self { components, operators, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, Field::Displacement, true);
+        });
+        // Where there is no stress, the first step says so.
+        self.project_volume();
         Ok(())
     }
 
@@ -465,6 +489,9 @@ impl<const D: usize> TotalLagrangian<D> {
         each_component(components, &|component| {
             component.evaluate(&operators.bases, Field::Displacement, curvilinear);
         });
+        if !self.project_volume() {
+            return Err(self.describe());
+        }
         let forced = !body_force.is_absent() && !self.planted.is(Fault::NoBodyForce);
         let force = forced.then_some((body_force, time));
         let planted = self.planted;
@@ -484,7 +511,9 @@ impl<const D: usize> TotalLagrangian<D> {
             Law::Own(law) => self.stress(OwnRows(law), force),
             Law::WithMemory(law) => {
                 let variables = self.variables.clone();
-                let rows = MemoryRows { law: &*law, variables: &variables, time: increment };
+                // A projection has set the variables that it has.
+                let time = increment.filter(|_| self.projected.is_none());
+                let rows = MemoryRows { law: &*law, variables: &variables, time };
                 self.stress(rows, force)
             }
         };
@@ -510,6 +539,58 @@ impl<const D: usize> TotalLagrangian<D> {
             component.accelerate(operators, factors, faces, coupling);
         });
         Ok(())
+    }
+
+    /// Projects the change of volume of the displacements and slopes at the particles, and the mean stress that follows, if the scheme asks
+    /// for it. False where a particle has no stress.
+    fn project_volume(&mut self) -> bool {
+        let row = self.row();
+        let Self { projected, components, particles, remembered, rows, grid, .. } = self;
+        let Some(ProjectedChange { law, of }) = projected else { return true };
+        let (reciprocal_radius, planted) = (&self.reciprocal_radius, self.planted);
+        let size = piece(particles.len());
+        let (components, rows, grid) = (&*components, &*rows, &*grid);
+        each_chunk(remembered, size, &|piece, F| {
+            for (F, p) in F.iter_mut().zip(piece * size..) {
+                let mut H = SMatrix::<f64, D, D>::from_fn(|i, k| components[i].slopes[k][p]);
+                if let Some(at) = rows.get(p / row) {
+                    let local = SVector::from_fn(|i, _| components[i].values[p]);
+                    H = grid.coordinates.gradient(&local, &H, reciprocal_radius[p % row], at);
+                    H = at.frame * H * at.frame.transpose();
+                }
+                *F = SMatrix::identity() + H;
+            }
+        });
+        let remembered = &remembered[..];
+        each_chunk(of.values(), size, &|piece, values| {
+            for (J, F) in values.iter_mut().zip(&remembered[piece * size..]) {
+                *J = determinant(F);
+            }
+        });
+        if of.values().iter().any(|J| !(*J > 0.0 && *J < f64::INFINITY)) {
+            return false;
+        }
+        if !planted.is(Fault::JacobianForTheta) {
+            of.project(&particles.volume);
+        }
+        let theta = of.values().to_vec();
+        if theta.iter().any(|theta| !(*theta > 0.0)) {
+            let variables = particles.internal.chunks_exact_mut(2);
+            variables.zip(&theta).for_each(|(q, &theta)| q[0] = theta);
+            return false;
+        }
+        each_chunk(of.values(), size, &|piece, mean| {
+            let range = piece * size..piece * size + mean.len();
+            law.mean_stresses_of(&remembered[range.clone()], &theta[range], mean);
+        });
+        if !planted.is(Fault::MeanStressStays) {
+            of.project(&particles.volume);
+        }
+        let own = theta.iter().zip(of.values());
+        for (q, (&theta, &mut p)) in particles.internal.chunks_exact_mut(2).zip(own) {
+            q.copy_from_slice(&[theta, p]);
+        }
+        true
     }
 
     /// Turns displacements and their slopes at the particles into the factors of the functions' values and slopes in the
@@ -570,8 +651,16 @@ impl<const D: usize> TotalLagrangian<D> {
     fn describe(&mut self) -> StepError {
         let step = self.steps_done + 1;
         let time = self.time_step * step as f64;
+        let theta = self.projected.is_some().then(|| self.particles.internal.clone());
         let particles = self.observe();
         let is_bad = |F: &SMatrix<f64, D, D>| !is_deformation(F);
+        if let Some(theta) = theta
+            && !particles.F.iter().any(is_bad)
+        {
+            let mut all = theta.iter().step_by(2).enumerate();
+            let (particle, &theta) = all.find(|(_, theta)| !(**theta > 0.0)).unwrap_or((0, &0.0));
+            return StepError::Inverted { step, time, particle, J: theta };
+        }
         let particle = particles.F.iter().position(is_bad).unwrap_or(0);
         let J = determinant(&particles.F[particle]);
         let position = &particles.x[particle];
@@ -584,7 +673,32 @@ impl<const D: usize> TotalLagrangian<D> {
     }
 }
 
-/// The Cartesian vector with these components in row `row` of particles.
+/// The projection of the change of volume, and the law that takes it.
+#[derive(Clone, Debug)]
+struct ProjectedChange<const D: usize> {
+    law: Arc<ProjectedVolume<f64, D>>,
+    of: Projection<D>,
+}
+
+/// The law of a solver, and where it takes a projected change of volume that law as such.
+#[allow(clippy::type_complexity)]
+fn with_volume<const D: usize>(
+    law: Law<f64, D>,
+    volume: Volume,
+) -> Result<(Law<f64, D>, Option<Arc<ProjectedVolume<f64, D>>>), SetupError>
+where
+    f64: Stressed<D>,
+{
+    match volume {
+        Volume::Pointwise => Ok((law, None)),
+        Volume::Projected => {
+            let own = ProjectedVolume::new(law).ok_or(SetupError::ProjectedMemory)?;
+            let own = Arc::new(own);
+            Ok((Law::WithMemory(own.clone()), Some(own)))
+        }
+    }
+}
+
 /// The internal variables of particles at time zero, those of a particle one after the other.
 fn initial<const D: usize>(law: &Law<f64, D>, X: &[SVector<f64, D>]) -> Vec<f64> {
     match law {
@@ -593,6 +707,7 @@ fn initial<const D: usize>(law: &Law<f64, D>, X: &[SVector<f64, D>]) -> Vec<f64>
     }
 }
 
+/// The Cartesian vector with these components in row `row` of particles.
 fn cartesian<const D: usize>(
     rows: &[RowGeometry<D>],
     row: usize,
@@ -665,14 +780,21 @@ mod tests {
             ends: [[End; 2]; D],
             per_cell: usize,
             degree: usize,
-        ) {
+        ) where
+            f64: Stressed<D>,
+        {
             let axes: [Axis; D] = array::from_fn(|k| {
                 let (lower, upper) = (0.5, 1.0 + 0.5 * k as f64);
                 Axis { lower, upper, cells: cells[k], ends: ends[k] }
             });
             let grid: Grid<D> = Grid { axes, coordinates, per_cell, layout: Layout::Gauss };
             let composition = Composition::Order2;
-            let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition };
+            let scheme = Scheme {
+                degree,
+                mass: MassMatrix::Consistent,
+                composition,
+                volume: Volume::Pointwise,
+            };
             let expected = doubles(&grid, degree);
             let law = Material::NeoHookean { lambda: 6.0, mu: 4.0 };
             let mut body = TotalLagrangian::new(grid, scheme, law, 1.0, 1e-6).unwrap();

@@ -135,6 +135,14 @@ pub enum Fault {
     RelaxationTime,
     /// Maxwell elements: stresses that decay, and take up no change of shape.
     ShareDropped,
+    /// Projected volume: each particle's own J for the projected one.
+    JacobianForTheta,
+    /// Projected volume: projections that count all particles alike, whatever their volumes.
+    VolumesLeftOut,
+    /// Projected volume: each particle's own mean stress for the projected one.
+    MeanStressStays,
+    /// Projected volume, in the plane: the third root of the change of volume for the square root.
+    VolumeRoot,
 }
 
 /// A fault in a law of the library, as what it makes of constants.

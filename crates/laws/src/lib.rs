@@ -23,6 +23,7 @@ mod orthotropic;
 mod plastic;
 #[cfg(test)]
 mod printed_energies;
+mod projected;
 mod st_venant_kirchhoff;
 #[cfg(test)]
 mod tests;
@@ -43,6 +44,7 @@ pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volume
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub use plastic::{Plastic, ReturnMap};
+pub use projected::{ProjectedVolume, Volume};
 
 use crate::fault::Planted;
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};

@@ -16,7 +16,7 @@ pub enum StepError {
         time: f64,
         /// Particle id.
         particle: usize,
-        /// Its determinant of F, zero or negative.
+        /// Its determinant of F, or where the change of volume is projected that change, zero or negative.
         J: f64,
     },
     /// A position or a deformation gradient overflowed or became NaN.
@@ -154,6 +154,12 @@ pub enum SetupError {
     /// There is nothing to simulate.
     #[error("there are no particles; is the grid too coarse, or the body outside it?")]
     NoParticles,
+    /// A projected change of volume of a law with internal variables of its own.
+    #[error(
+        "--volume projected: the law has internal variables of its own, and their histories follow each particle's own change of volume; \
+         leave --volume out"
+    )]
+    ProjectedMemory,
     /// More processes than a grid can be cut for.
     #[error(
         "{ranks} processes are more than the {most} that the rows of this grid can be shared out to; start {most} at most"

@@ -1,6 +1,6 @@
 //! The settings of one simulation.
 
-use mmsmith_laws::{ReturnMap, Stressed, with_memory};
+use mmsmith_laws::{ReturnMap, Stressed, Volume, with_memory};
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{Integrator, Law, Material, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
@@ -32,6 +32,8 @@ pub struct Case {
     pub extent: Option<Extent>,
     /// How a step of a law with plastic or viscous flow finds its direction; none for other laws, and for the usual one.
     pub return_map: Option<ReturnMap>,
+    /// How the change of volume enters the stress.
+    pub volume: Volume,
 }
 
 impl Default for Case {
@@ -46,6 +48,7 @@ impl Default for Case {
             periods: 1.0,
             extent: None,
             return_map: None,
+            volume: Volume::Pointwise,
         }
     }
 }
@@ -70,6 +73,12 @@ named! {
     ReturnMap {
         Exponential = "exponential": "The direction of flow at the end of a step: first order in time";
         Midpoint = "midpoint": "The direction of flow at the middle of a step: second order in time";
+    }
+    Volume {
+        Pointwise = "pointwise": "The stress of a particle follows from its own change of volume";
+        Projected = "projected":
+            "The change of volume and the mean stress are projected onto fewer functions, as F-bar methods do: against locking next to \
+             incompressibility";
     }
     Extent {
         Quarter = "quarter":

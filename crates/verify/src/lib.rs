@@ -82,7 +82,7 @@ pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};
 pub use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
-pub use mmsmith_laws::ReturnMap;
+pub use mmsmith_laws::{ReturnMap, Volume};
 pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::StepError;
 pub use mmsmith_mpm::{Integrator, Shape, Transfer};

@@ -272,7 +272,7 @@ where
     }
     let set_up = SetUp {
         grid: total.grid(scene, case.per_cell)?,
-        scheme: Scheme { degree, mass, composition },
+        scheme: Scheme { degree, mass, composition, volume: case.volume },
         law: law_by(exact.law(), case.return_map.unwrap_or_default())?,
         density: exact.density(),
         time_step: time_step.to_f64(),

@@ -32,6 +32,9 @@ pub(crate) struct SchemeOptions {
     /// Return map of a law with flow. Default: exponential
     #[arg(long, value_parser = one_of::<verify::ReturnMap>())]
     pub(crate) return_map: Option<verify::ReturnMap>,
+    /// Change of volume: projected is against locking next to incompressibility
+    #[arg(long, value_parser = one_of::<verify::Volume>(), default_value = "pointwise")]
+    pub(crate) volume: verify::Volume,
     /// Positions of the particles. gauss: total Lagrangian formulation only; body-fitted, clipped: updated Lagrangian
     /// formulation only. Default: lattice; gauss in the total Lagrangian formulation, unless all sides are sliding walls
     #[arg(long, value_enum)]

@@ -4,6 +4,7 @@ use anyhow::Result;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Arithmetic, Case, CaseError, Coordinates, Discretized, Extent, Integrator, Named, POLAR_ANGLES,
+    Volume,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -98,6 +99,9 @@ impl Problem {
         }
         if let Some(map) = settled.case.return_map {
             settings["return_map"] = json!(map.name());
+        }
+        if settled.case.volume != Volume::Pointwise {
+            settings["volume"] = json!(settled.case.volume.name());
         }
         if scheme.total().is_some_and(|total| total.coordinates == Coordinates::Spherical) {
             settings["polar_angles"] = json!(POLAR_ANGLES);

@@ -92,6 +92,7 @@ impl Settled {
             periods: options.periods,
             extent: options.extent,
             return_map: return_map(options, exact)?,
+            volume: options.volume,
         };
         let loaded = verify::loaded_instead(exact, &case);
         let mut settled = Self {

@@ -1,7 +1,7 @@
 //! Failures inside the region believed stable, looked for by random settings.
 
 use anyhow::{Result, bail};
-use mmsmith_verify::{Case, CflSpeed, Criteria, Discretized, Named, Observed, is_stable};
+use mmsmith_verify::{Case, CflSpeed, Criteria, Discretized, Named, Observed, Volume, is_stable};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
@@ -151,7 +151,7 @@ fn draw(options: &StabilityOptions, common: &Problem, sample: usize) -> Result<P
 
 /// The command line that repeats a setting.
 fn command(options: &StabilityOptions, problem: &Problem) -> String {
-    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent, return_map } =
+    let Case { scheme, cells, per_cell, cfl, cfl_speed, periods, extent, return_map, volume } =
         problem.settled.case;
     let mut text = format!(
         "mms stability {} --at {cfl:?} --cells {cells} --ppc {per_cell} --periods {periods:?} --precision {} --error-multiple {:?} \
@@ -172,6 +172,9 @@ fn command(options: &StabilityOptions, problem: &Problem) -> String {
     }
     if let Some(map) = return_map {
         text += &format!(" --return-map {}", map.name());
+    }
+    if volume != Volume::Pointwise {
+        text += &format!(" --volume {}", volume.name());
     }
     for (name, value) in problem.selection.parameters() {
         text += &format!(" --set {name}={value:?}");

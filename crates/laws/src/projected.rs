@@ -1,0 +1,171 @@
+//! An elastic law whose change of volume and mean stress come from a projection onto fewer functions.
+//!
+//! Three fields (Simo, Taylor & Pister, "Variational and projection methods for the volume constraint in finite deformation
+//! elasto-plasticity", CMAME 51 (1985) 177-208): with the strain energy `W`, the projected change of volume `theta` and its mean stress `p`,
+//!
+//! ```text
+//! integral of W(Fb) + p (J - theta),   Fb = (theta/J)^(1/D) F
+//! theta = projection of J;   p = projection of (Pb : Fb)/(D theta),   Pb = dW/dF at Fb
+//! P = (theta/J)^(1/D) Pb - ((Pb : Fb)/D - p J) F^-T
+//! ```
+//!
+//! In the plane the stretch across it stays one, so that the change of volume is that of the plane and the root is a square root: `det Fb`
+//! is `theta` in every dimension.
+
+use mmsmith_lanes::tensor::{determinant, inverse_transpose, real};
+use mmsmith_vocabulary::Material;
+use nalgebra::SMatrix;
+
+use crate::fault::{Fault, Planted};
+use crate::memory::{Increment, InternalVariable, LawWithMemory, of_particle, set_stress};
+use crate::{BLOCK, Law, SIDE_BY_SIDE, Stressed};
+
+/// How the change of volume enters the stress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Volume {
+    /// At each particle by its own deformation gradient.
+    #[default]
+    Pointwise,
+    /// Projected, with its mean stress, onto functions that a body next to incompressibility can follow.
+    Projected,
+}
+
+/// An elastic law with a projected change of volume. Its two internal variables are `theta` and `p` above; the solver sets them, and they do
+/// not evolve.
+#[derive(Clone, Debug)]
+pub struct ProjectedVolume<T, const D: usize> {
+    law: Law<T, D>,
+    planted: Planted,
+}
+
+/// A block of tensors side by side.
+type Tensors<T, const D: usize> = [[[T; BLOCK]; D]; D];
+
+/// What the stress of a particle consists of.
+struct Parts<T, const D: usize> {
+    /// `(theta/J)^(1/D)`.
+    ratio: T,
+    J: T,
+    inverse_transpose: SMatrix<T, D, D>,
+}
+
+impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
+    /// The law with its change of volume projected; none of a law that has internal variables of its own.
+    #[must_use]
+    pub fn new(law: Law<T, D>) -> Option<Self> {
+        let is_elastic = matches!(law, Law::Library(_) | Law::Own(_));
+        is_elastic.then(|| Self { law, planted: Planted::here() })
+    }
+
+    /// The law without projection.
+    #[must_use]
+    pub fn law(&self) -> &Law<T, D> {
+        &self.law
+    }
+
+    /// Writes the mean stress `(Pb : Fb)/(D theta)` of each particle, from its deformation gradient and its projected change of volume.
+    pub fn mean_stresses_of(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
+        let blocks = F.chunks(BLOCK).zip(theta.chunks(BLOCK));
+        for ((F, theta), mean) in blocks.zip(mean.chunks_mut(BLOCK)) {
+            let mut block = [[[T::zero(); BLOCK]; D]; D];
+            let (mut of_block, mut found) = ([T::one(); BLOCK], [T::zero(); BLOCK]);
+            for n in 0..BLOCK {
+                // The last particle fills the block.
+                let own = n.min(F.len() - 1);
+                of_block[n] = theta[own];
+                set_stress(&mut block, n, &F[own]);
+            }
+            self.mean_stresses(&block, &of_block, &mut found);
+            mean.copy_from_slice(&found[..mean.len()]);
+        }
+    }
+
+    fn mean_stresses(&self, F: &Tensors<T, D>, theta: &[T; BLOCK], mean: &mut [T; BLOCK]) {
+        let mut stress = [[[T::zero(); BLOCK]; D]; D];
+        let parts = self.stresses(F, theta, &mut stress);
+        for (n, mean) in mean.iter_mut().enumerate() {
+            let work = of_particle(&stress, n).dot(&of_particle(F, n)) * parts[n].ratio;
+            *mean = work / (theta[n] * real(D as f64));
+        }
+    }
+
+    /// Stresses `Pb`, and what else the stress consists of.
+    fn stresses(
+        &self,
+        F: &Tensors<T, D>,
+        theta: &[T; BLOCK],
+        stress: &mut Tensors<T, D>,
+    ) -> [Parts<T, D>; BLOCK] {
+        let mut scaled = *F;
+        let parts = std::array::from_fn(|n| {
+            let own = of_particle(F, n);
+            let J = determinant(&own);
+            let share = theta[n] / J;
+            let ratio = match D {
+                1 => share,
+                2 if self.planted.is(Fault::VolumeRoot) => share.cbrt(),
+                2 => share.sqrt(),
+                _ => share.cbrt(),
+            };
+            set_stress(&mut scaled, n, &(own * ratio));
+            Parts { ratio, J, inverse_transpose: inverse_transpose(&own, J) }
+        });
+        self.of_law(&scaled, stress);
+        parts
+    }
+
+    fn of_law(&self, F: &Tensors<T, D>, stress: &mut Tensors<T, D>) {
+        let Law::Library(_) = &self.law else {
+            if let Law::Own(law) = &self.law {
+                law.first_piola_kirchhoff(F, stress);
+            }
+            return;
+        };
+        for first in (0..BLOCK).step_by(SIDE_BY_SIDE) {
+            let part = |i: usize, j: usize| -> [T; SIDE_BY_SIDE] {
+                std::array::from_fn(|n| F[i][j][first + n])
+            };
+            let part = std::array::from_fn(|i| std::array::from_fn(|j| part(i, j)));
+            let mut found = [[[T::zero(); SIDE_BY_SIDE]; D]; D];
+            self.law.first_piola_kirchhoff_side_by_side(&part, &mut found);
+            for i in 0..D {
+                for j in 0..D {
+                    stress[i][j][first..first + SIDE_BY_SIDE].copy_from_slice(&found[i][j]);
+                }
+            }
+        }
+    }
+}
+
+impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, D> {
+    fn variables(&self) -> Vec<InternalVariable> {
+        let of = |name: &str, at_rest: f64| InternalVariable { name: name.into(), at_rest };
+        vec![of("theta_projected", 1.0), of("p_projected", 0.0)]
+    }
+
+    fn first_piola_kirchhoff(&self, F: &Tensors<T, D>, q: &[[T; BLOCK]], P: &mut Tensors<T, D>) {
+        let [theta, p] = q else { return };
+        let mut stress = [[[T::zero(); BLOCK]; D]; D];
+        let parts = self.stresses(F, theta, &mut stress);
+        for (n, Parts { ratio, J, inverse_transpose }) in parts.iter().enumerate() {
+            let own = of_particle(&stress, n) * *ratio;
+            let mean = own.dot(&of_particle(F, n)) / real(D as f64);
+            set_stress(P, n, &(own - inverse_transpose * (mean - p[n] * *J)));
+        }
+    }
+
+    fn evolve(&self, _: &Increment<'_, T, D>, _: &mut [[T; BLOCK]]) {}
+
+    fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
+        let share = q.first().copied()? / determinant(F);
+        let ratio = if D == 2 { share.sqrt() } else { share };
+        Some(self.law.kirchhoff_in_space(&(F * ratio))?[(2, 2)])
+    }
+
+    fn elastic(&self) -> Option<Material<T>> {
+        match &self.law {
+            Law::Library(material) => Some(material.clone()),
+            Law::Own(_) | Law::WithMemory(_) => None,
+        }
+    }
+}
