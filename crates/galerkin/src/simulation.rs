@@ -8,7 +8,8 @@ use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
-    AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog, ProjectedVolume, Stressed, Volume,
+    AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog, ProjectedVolume,
+    Stressed, Volume,
 };
 use mmsmith_mpm::BodyForce;
 use mmsmith_mpm::Particles;
@@ -28,7 +29,9 @@ use super::mass::{Band, Mass};
 use super::piece;
 use super::projection::Projection;
 use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, reserve, rows};
-use super::stress::{LawOfRows, MemoryRows, OwnRows, Places, Stress, is_deformation};
+use super::stress::{
+    LawOfRows, MemoryRows, OwnRows, Places, ProjectedRows, Stress, is_deformation,
+};
 
 /// A running simulation in the reference configuration.
 ///
@@ -131,7 +134,10 @@ where
         let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
         let projected = match of_projection {
             Some(law) => {
-                Some(ProjectedChange { law, of: Projection::new(&grid, scheme.degree, &lines)? })
+                let count = lines.iter().map(|line| line.points.len()).product();
+                let of = Projection::new(&grid, scheme.degree, &lines)?;
+                let (theta, scaled) = (vec![1.0; count], vec![SMatrix::zeros(); count]);
+                Some(ProjectedChange { law, of, theta, scaled })
             }
             None => None,
         };
@@ -509,13 +515,18 @@ where
                 }
             }
             Law::Own(law) => self.stress(OwnRows(law), force),
-            Law::WithMemory(law) => {
-                let variables = self.variables.clone();
-                // A projection has set the variables that it has.
-                let time = increment.filter(|_| self.projected.is_none());
-                let rows = MemoryRows { law: &*law, variables: &variables, time };
-                self.stress(rows, force)
-            }
+            Law::WithMemory(law) => match self.projected.take() {
+                Some(projected) => {
+                    let bad = self.stress(ProjectedRows(&projected.scaled), force);
+                    self.projected = Some(projected);
+                    bad
+                }
+                None => {
+                    let variables = self.variables.clone();
+                    let rows = MemoryRows { law: &*law, variables: &variables, time: increment };
+                    self.stress(rows, force)
+                }
+            },
         };
         if bad {
             return Err(self.describe());
@@ -546,7 +557,7 @@ where
     fn project_volume(&mut self) -> bool {
         let row = self.row();
         let Self { projected, components, particles, remembered, rows, grid, .. } = self;
-        let Some(ProjectedChange { law, of }) = projected else { return true };
+        let Some(ProjectedChange { law, of, theta, scaled }) = projected else { return true };
         let (reciprocal_radius, planted) = (&self.reciprocal_radius, self.planted);
         let size = piece(particles.len());
         let (components, rows, grid) = (&*components, &*rows, &*grid);
@@ -573,15 +584,16 @@ where
         if !planted.is(Fault::JacobianForTheta) {
             of.project(&particles.volume);
         }
-        let theta = of.values().to_vec();
+        theta.copy_from_slice(of.values());
         if theta.iter().any(|theta| !(*theta > 0.0)) {
             let variables = particles.internal.chunks_exact_mut(2);
-            variables.zip(&theta).for_each(|(q, &theta)| q[0] = theta);
+            variables.zip(&*theta).for_each(|(q, &theta)| q[0] = theta);
             return false;
         }
-        each_chunk(of.values(), size, &|piece, mean| {
-            let range = piece * size..piece * size + mean.len();
-            law.mean_stresses_of(&remembered[range.clone()], &theta[range], mean);
+        let found = scaled.chunks_mut(size).zip(of.values().chunks_mut(size));
+        let states = remembered.chunks(size).zip(theta.chunks(size));
+        each(states.zip(found).collect(), &|((F, theta), (scaled, mean))| {
+            law.evaluate(F, theta, scaled, mean);
         });
         if !planted.is(Fault::MeanStressStays) {
             of.project(&particles.volume);
@@ -678,6 +690,10 @@ where
 struct ProjectedChange<const D: usize> {
     law: Arc<ProjectedVolume<f64, D>>,
     of: Projection<D>,
+    /// The projected change of volume of each particle.
+    theta: Vec<f64>,
+    /// The law's stress at the deformation gradient with this change, as [`ProjectedVolume::evaluate`] gives it.
+    scaled: Vec<SMatrix<f64, D, D>>,
 }
 
 /// The law of a solver, and where it takes a projected change of volume that law as such.

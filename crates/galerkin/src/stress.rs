@@ -6,7 +6,7 @@ use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
     BLOCK, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory,
-    LibraryLaw,
+    LibraryLaw, ProjectedVolume, Stressed,
 };
 use mmsmith_mpm::{BodyForce, Particles};
 use nalgebra::{SMatrix, SVector};
@@ -55,6 +55,7 @@ impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
             let at = self.rows.get(first / row + index);
             let (values, slopes) = (&mut values, &mut slopes);
             let mut places = RowOfPlaces {
+                first,
                 start,
                 volume,
                 values,
@@ -88,6 +89,8 @@ impl<L: LawOfRows<D>, const D: usize> Stress<'_, L, D> {
 
 /// A row of particles along axis 0: displacements and their slopes, and then the factors of values and slopes in the forces.
 pub(super) struct RowOfPlaces<'a, 'b, const D: usize> {
+    /// Index of the first particle of all places, and of the row among them.
+    first: usize,
     start: usize,
     volume: &'a [f64],
     values: &'a mut [&'b mut [f64]; D],
@@ -220,6 +223,28 @@ impl<const D: usize> LawOfRows<D> for MemoryRows<'_, D> {
                 let P = frame.map_or(P, |Q| Q.transpose() * P * Q);
                 row.set_stress(first + n, F, P);
             }
+        }
+    }
+}
+
+/// A law with a projected change of volume, evaluated before: what it gave each particle, which [`ProjectedVolume::stress`] takes.
+pub(super) struct ProjectedRows<'a, const D: usize>(pub(super) &'a [SMatrix<f64, D, D>]);
+
+impl<const D: usize> LawOfRows<D> for ProjectedRows<'_, D>
+where
+    f64: Stressed<D>,
+{
+    fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
+        let frame = row.at.map(|at| at.frame);
+        for i in 0..row.volume.len() {
+            let F = row.deformation_gradient(i);
+            let scaled = &self.0[row.first + row.start + i];
+            let p = row.internal[2 * (row.start + i) + 1];
+            let P = match frame {
+                None => ProjectedVolume::stress(&F, scaled, p),
+                Some(Q) => ProjectedVolume::stress(&F, &(Q.transpose() * scaled * Q), p),
+            };
+            row.set_stress(i, &F, P);
         }
     }
 }

@@ -41,14 +41,6 @@ pub struct ProjectedVolume<T, const D: usize> {
 /// A block of tensors side by side.
 type Tensors<T, const D: usize> = [[[T; BLOCK]; D]; D];
 
-/// What the stress of a particle consists of.
-struct Parts<T, const D: usize> {
-    /// `(theta/J)^(1/D)`.
-    ratio: T,
-    J: T,
-    inverse_transpose: SMatrix<T, D, D>,
-}
-
 impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
     /// The law with its change of volume projected; none of a law that has internal variables of its own.
     #[must_use]
@@ -63,44 +55,55 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         &self.law
     }
 
-    /// Writes the mean stress `(Pb : Fb)/(D theta)` of each particle, from its deformation gradient and its projected change of volume.
-    pub fn mean_stresses_of(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
+    /// Evaluates the law at the deformation gradients with projected changes of volume: writes `(theta/J)^(1/D) Pb` of each particle, and
+    /// its mean stress `(Pb : Fb)/(D theta)`.
+    pub fn evaluate(
+        &self,
+        F: &[SMatrix<T, D, D>],
+        theta: &[T],
+        scaled: &mut [SMatrix<T, D, D>],
+        mean: &mut [T],
+    ) {
         let blocks = F.chunks(BLOCK).zip(theta.chunks(BLOCK));
-        for ((F, theta), mean) in blocks.zip(mean.chunks_mut(BLOCK)) {
+        let found = scaled.chunks_mut(BLOCK).zip(mean.chunks_mut(BLOCK));
+        for ((F, theta), (scaled, mean)) in blocks.zip(found) {
             let mut block = [[[T::zero(); BLOCK]; D]; D];
-            let (mut of_block, mut found) = ([T::one(); BLOCK], [T::zero(); BLOCK]);
+            let mut of_block = [T::one(); BLOCK];
             for n in 0..BLOCK {
                 // The last particle fills the block.
                 let own = n.min(F.len() - 1);
                 of_block[n] = theta[own];
                 set_stress(&mut block, n, &F[own]);
             }
-            self.mean_stresses(&block, &of_block, &mut found);
-            mean.copy_from_slice(&found[..mean.len()]);
+            let mut stress = [[[T::zero(); BLOCK]; D]; D];
+            let ratios = self.stresses(&block, &of_block, &mut stress);
+            for (n, (scaled, mean)) in scaled.iter_mut().zip(mean).enumerate() {
+                *scaled = of_particle(&stress, n) * ratios[n];
+                *mean = scaled.dot(&F[n]) / (theta[n] * real(D as f64));
+            }
         }
     }
 
-    fn mean_stresses(&self, F: &Tensors<T, D>, theta: &[T; BLOCK], mean: &mut [T; BLOCK]) {
-        let mut stress = [[[T::zero(); BLOCK]; D]; D];
-        let parts = self.stresses(F, theta, &mut stress);
-        for (n, mean) in mean.iter_mut().enumerate() {
-            let work = of_particle(&stress, n).dot(&of_particle(F, n)) * parts[n].ratio;
-            *mean = work / (theta[n] * real(D as f64));
-        }
+    /// The stress of a particle from its deformation gradient, what [`evaluate`](Self::evaluate) gave, and its projected mean stress.
+    #[inline(always)]
+    #[must_use]
+    pub fn stress(F: &SMatrix<T, D, D>, scaled: &SMatrix<T, D, D>, p: T) -> SMatrix<T, D, D> {
+        let J = determinant(F);
+        let mean = scaled.dot(F) / real(D as f64);
+        scaled - inverse_transpose(F, J) * (mean - p * J)
     }
 
-    /// Stresses `Pb`, and what else the stress consists of.
+    /// Stresses `Pb`, and `(theta/J)^(1/D)`.
     fn stresses(
         &self,
         F: &Tensors<T, D>,
         theta: &[T; BLOCK],
         stress: &mut Tensors<T, D>,
-    ) -> [Parts<T, D>; BLOCK] {
+    ) -> [T; BLOCK] {
         let mut scaled = *F;
-        let parts = std::array::from_fn(|n| {
+        let ratios = std::array::from_fn(|n| {
             let own = of_particle(F, n);
-            let J = determinant(&own);
-            let share = theta[n] / J;
+            let share = theta[n] / determinant(&own);
             let ratio = match D {
                 1 => share,
                 2 if self.planted.is(Fault::VolumeRoot) => share.cbrt(),
@@ -108,10 +111,10 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
                 _ => share.cbrt(),
             };
             set_stress(&mut scaled, n, &(own * ratio));
-            Parts { ratio, J, inverse_transpose: inverse_transpose(&own, J) }
+            ratio
         });
         self.of_law(&scaled, stress);
-        parts
+        ratios
     }
 
     fn of_law(&self, F: &Tensors<T, D>, stress: &mut Tensors<T, D>) {
@@ -146,11 +149,10 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
     fn first_piola_kirchhoff(&self, F: &Tensors<T, D>, q: &[[T; BLOCK]], P: &mut Tensors<T, D>) {
         let [theta, p] = q else { return };
         let mut stress = [[[T::zero(); BLOCK]; D]; D];
-        let parts = self.stresses(F, theta, &mut stress);
-        for (n, Parts { ratio, J, inverse_transpose }) in parts.iter().enumerate() {
-            let own = of_particle(&stress, n) * *ratio;
-            let mean = own.dot(&of_particle(F, n)) / real(D as f64);
-            set_stress(P, n, &(own - inverse_transpose * (mean - p[n] * *J)));
+        let ratios = self.stresses(F, theta, &mut stress);
+        for (n, ratio) in ratios.iter().enumerate() {
+            let scaled = of_particle(&stress, n) * *ratio;
+            set_stress(P, n, &Self::stress(&of_particle(F, n), &scaled, p[n]));
         }
     }
 
