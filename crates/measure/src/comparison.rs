@@ -15,6 +15,8 @@ use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
 
 /// Number of runs of particles that share the values which depend on the time alone.
 pub const RUNS: usize = 8;
+/// Number of runs of particles that a law with memory takes at a time.
+const RUNS_OF_LAW: usize = mmsmith_laws::BLOCK / BLOCK;
 /// Particles in [`RUNS`] runs. Their fields fit into the first-level cache.
 const CHUNK: usize = RUNS * BLOCK;
 
@@ -200,10 +202,15 @@ impl<'a, const D: usize> Comparison<'a, D> {
                         (variables.len(), Box::new(BlockWithMemory::at_rest(&variables)))
                     });
                     let (count, block) = (memory.0, &mut memory.1);
-                    let q = &particles.internal[places.start * count..places.end * count];
-                    block.first_piola_kirchhoff(law.as_ref(), &particles.F[places.clone()], q);
+                    // Blocks of the law have several runs.
+                    let of_block = n % RUNS_OF_LAW * BLOCK;
+                    if of_block == 0 {
+                        let end = particles.len().min(first + RUNS_OF_LAW * BLOCK);
+                        let q = &particles.internal[first * count..end * count];
+                        block.first_piola_kirchhoff(law.as_ref(), &particles.F[first..end], q);
+                    }
                     for n in 0..BLOCK {
-                        let stress = block.stress(n.min(places.len() - 1));
+                        let stress = block.stress(of_block + n.min(places.len() - 1));
                         for i in 0..D {
                             (0..D).for_each(|j| run.P[i][j][n] = stress[(i, j)]);
                         }
