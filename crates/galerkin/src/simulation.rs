@@ -516,8 +516,11 @@ where
             }
             Law::Own(law) => self.stress(OwnRows(law), force),
             Law::WithMemory(law) => match self.projected.take() {
-                Some(projected) => {
-                    let bad = self.stress(ProjectedRows(&projected.scaled), force);
+                Some(mut projected) => {
+                    let bad = {
+                        let ProjectedChange { scaled, of, .. } = &mut projected;
+                        self.stress(ProjectedRows { scaled, p: of.values() }, force)
+                    };
                     self.projected = Some(projected);
                     bad
                 }
@@ -595,12 +598,14 @@ where
         each(states.zip(found).collect(), &|((F, theta), (scaled, mean))| {
             law.evaluate(F, theta, scaled, mean);
         });
-        if !planted.is(Fault::MeanStressStays) {
-            of.project(&particles.volume);
-        }
+        // The stress of a particle is that of the law: its own mean stress is nearer to the exact one than the projected one, which the
+        // forces need.
         let own = theta.iter().zip(of.values());
         for (q, (&theta, &mut p)) in particles.internal.chunks_exact_mut(2).zip(own) {
             q.copy_from_slice(&[theta, p]);
+        }
+        if !planted.is(Fault::MeanStressStays) {
+            of.project(&particles.volume);
         }
         true
     }

@@ -227,8 +227,13 @@ impl<const D: usize> LawOfRows<D> for MemoryRows<'_, D> {
     }
 }
 
-/// A law with a projected change of volume, evaluated before: what it gave each particle, which [`ProjectedVolume::stress`] takes.
-pub(super) struct ProjectedRows<'a, const D: usize>(pub(super) &'a [SMatrix<f64, D, D>]);
+/// A law with a projected change of volume, evaluated before, see [`ProjectedVolume::stress`].
+pub(super) struct ProjectedRows<'a, const D: usize> {
+    /// The stress of each particle, as [`ProjectedVolume::evaluate`] gives it.
+    pub(super) scaled: &'a [SMatrix<f64, D, D>],
+    /// The projected mean stress of each particle.
+    pub(super) p: &'a [f64],
+}
 
 impl<const D: usize> LawOfRows<D> for ProjectedRows<'_, D>
 where
@@ -238,8 +243,8 @@ where
         let frame = row.at.map(|at| at.frame);
         for i in 0..row.volume.len() {
             let F = row.deformation_gradient(i);
-            let scaled = &self.0[row.first + row.start + i];
-            let p = row.internal[2 * (row.start + i) + 1];
+            let place = row.first + row.start + i;
+            let (scaled, p) = (&self.scaled[place], self.p[place]);
             let P = match frame {
                 None => ProjectedVolume::stress(&F, scaled, p),
                 Some(Q) => ProjectedVolume::stress(&F, &(Q.transpose() * scaled * Q), p),
