@@ -11,6 +11,7 @@ mod diagnose;
 mod eval;
 mod explain;
 mod generate;
+mod growth;
 mod history;
 mod inversion;
 mod list;

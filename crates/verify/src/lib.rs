@@ -33,6 +33,7 @@ mod error;
 mod evaluate;
 mod flow;
 mod frames;
+mod growth;
 mod history;
 mod interrupt;
 mod inverse;
@@ -52,6 +53,7 @@ mod scene;
 mod scheme;
 mod score;
 mod stability;
+mod state_of_stress;
 mod stated_law;
 mod study;
 mod temporal;
@@ -78,6 +80,10 @@ pub use error::{CaseError, SceneError, StudyError};
 pub use evaluate::{FieldRow, WrongLength, evaluate};
 pub use flow::{has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
+pub use growth::{
+    A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,
+    WaveGrowth, extremes_of, growth, harmful_growth, lambda_over_mu,
+};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};
@@ -106,6 +112,7 @@ pub use score::{
 pub use stability::{
     Criteria, Search, SearchProgress, StabilityRow, is_stable, p_wave_limit, stability,
 };
+pub use state_of_stress::Extremes;
 pub use study::{Study, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow};
 pub use timing::Timing;

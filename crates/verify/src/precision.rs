@@ -1,8 +1,8 @@
 //! The numbers of runs.
 
-use mmsmith_galerkin::{BoundaryData, SetUp};
+use mmsmith_galerkin::{BoundaryData, Disturbed, Grid, SetUp};
 use mmsmith_measure::Compared;
-use mmsmith_mpm::{Scalar, SetupError, Solver, Stressed};
+use mmsmith_mpm::{Law, Scalar, SetupError, Solver, Stressed};
 use mmsmith_runtime::Real;
 use mmsmith_stated_law::Compiled;
 
@@ -15,6 +15,14 @@ pub(crate) trait Precision<const D: usize>:
         set_up: SetUp<'_, D>,
         boundary: Box<dyn BoundaryData<D> + 'a>,
     ) -> Result<Box<dyn Solver<Self, D> + 'a>, SetupError>;
+
+    /// No disturbance of a motion, on a grid with splines of a degree, of a body with a law and a density; in double precision alone.
+    fn undisturbed(
+        grid: &Grid<D>,
+        degree: usize,
+        law: Law<Self, D>,
+        density: f64,
+    ) -> Result<Box<dyn Disturbed<D>>, SetupError>;
 }
 
 macro_rules! precisions {
@@ -27,6 +35,15 @@ macro_rules! precisions {
                 ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
                     set_up.solver(boundary)
                 }
+
+                fn undisturbed(
+                    grid: &Grid<$D>,
+                    degree: usize,
+                    law: Law<Self, $D>,
+                    density: f64,
+                ) -> Result<Box<dyn Disturbed<$D>>, SetupError> {
+                    grid.undisturbed(degree, law, density)
+                }
             }
 
             impl Precision<$D> for f32 {
@@ -34,6 +51,15 @@ macro_rules! precisions {
                     _: SetUp<'_, $D>,
                     _: Box<dyn BoundaryData<$D> + 'a>,
                 ) -> Result<Box<dyn Solver<Self, $D> + 'a>, SetupError> {
+                    Err(SetupError::DoublePrecisionOnly)
+                }
+
+                fn undisturbed(
+                    _: &Grid<$D>,
+                    _: usize,
+                    _: Law<Self, $D>,
+                    _: f64,
+                ) -> Result<Box<dyn Disturbed<$D>>, SetupError> {
                     Err(SetupError::DoublePrecisionOnly)
                 }
             }

@@ -209,9 +209,15 @@ fn end(condition: Condition) -> End {
 }
 
 /// The exact solution on the sides of the body.
-struct ExactBoundary<'a, const D: usize> {
+pub(crate) struct ExactBoundary<'a, const D: usize> {
     exact: &'a dyn Solution<f64, D>,
     stress: KeptStress<'a, f64, D>,
+}
+
+impl<'a, const D: usize> ExactBoundary<'a, D> {
+    pub(crate) fn new(exact: &'a dyn Solution<f64, D>) -> Self {
+        Self { exact, stress: KeptStress::new(exact) }
+    }
 }
 
 impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
@@ -278,7 +284,7 @@ where
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],
     };
-    let boundary = ExactBoundary { exact, stress: KeptStress::new(exact) };
+    let boundary = ExactBoundary::new(exact);
     T::total_lagrangian(set_up, Box::new(boundary)).map_err(|error| match error {
         SetupError::DoublePrecisionOnly => {
             CaseError::setting("precision", "f32", "f64 in the total Lagrangian formulation")

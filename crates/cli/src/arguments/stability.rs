@@ -14,9 +14,15 @@ pub(crate) struct StabilityOptions {
     /// Name of a solution (mms list), or a specification file
     #[arg(value_name = "NAME|SPEC.toml")]
     pub(crate) name: String,
-    /// Number of cells along the solution's cell length
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = positive_count)]
-    pub(crate) cells: usize,
+    /// Measure how much small disturbances of the exact motion grow until the end time, whatever the scheme: by the balance of
+    /// momentum linearised about it, in waves and for the worst of all disturbances. Of the scheme's options it takes --periods,
+    /// and --shape for the splines' degree; growth for programs has a schema of its own
+    #[arg(long, conflicts_with_all = ["at", "search", "plot", "shard", "width", "lower", "upper"])]
+    pub(crate) exact: bool,
+    /// Number of cells along the solution's cell length. Default: 32; with --exact 24 in one dimension, 12 in the plane, 5 in
+    /// space
+    #[arg(long, value_name = "N", value_parser = positive_count)]
+    pub(crate) cells: Option<usize>,
     /// Setting to vary, as NAME=VALUE,VALUE,...; at most two. Names: amplitude; units (mass, length if the solution has a
     /// length L, and time change by powers of two); a parameter of the solution; cells, ppc, offset, periods, precision,
     /// shape, integrator, start
@@ -73,8 +79,13 @@ pub(crate) enum SearchKind {
 }
 
 impl StabilityOptions {
+    /// Cells of runs.
+    pub(crate) fn grid_cells(&self) -> usize {
+        self.cells.unwrap_or(32)
+    }
+
     /// A map over two settings, told as `NAME=VALUE,...`, with defaults for the rest.
     pub(crate) fn map(name: &str, cells: usize, over: [&str; 2]) -> Self {
-        Self { cells, ..parsed(&[name, "--over", over[0], "--over", over[1]]) }
+        Self { cells: Some(cells), ..parsed(&[name, "--over", over[0], "--over", over[1]]) }
     }
 }

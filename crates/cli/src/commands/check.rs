@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
+use super::growth::{MOST_GROWTH_WORK, Told};
 use super::{blind, history, inversion};
 use crate::arguments::CheckOptions;
 use crate::json::Output;
@@ -74,11 +75,14 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         let all_passed = report.passed() && claims.hold();
         let table = table(&report);
         let findings = text(name, all_passed, &report, parameters, &claims, &table);
+        let motion =
+            solutions.first().map(|solution| Told::measure(solution, 1.0, MOST_GROWTH_WORK));
         let told = inverted.as_ref().map(|told| format!("  {}\n", told.text()));
         let history_told = history.as_ref().map(history::text).unwrap_or_default();
         terminal::say(&format!(
-            "{findings}{history_told}{}{}\n",
+            "{findings}{history_told}{}{}{}\n",
             told.unwrap_or_default(),
+            motion.as_ref().map(|motion| motion.text("  ")).unwrap_or_default(),
             blind::text(&blind)
         ))?;
         tables.push(table);
@@ -93,6 +97,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "blind_spots": blind,
             "history": history.as_ref().map(history::document),
             "inverted": inverted,
+            "motion": motion.as_ref().map(Told::document),
             "surfaces": claims.surfaces.iter().map(surface_document).collect::<Vec<_>>(),
             "cross_checks": claims.listings.iter().map(Comparison::document).collect::<Vec<_>>(),
             "passed": all_passed,

@@ -3,6 +3,8 @@
 mod judged;
 mod told;
 
+use std::sync::OnceLock;
+
 use anyhow::{Result, bail};
 use mmsmith_verify::{
     Case, Discretized, Expected, ORDER_TOLERANCE, Outputs, Progress, Record, StudyError, Sweep,
@@ -11,6 +13,7 @@ use mmsmith_verify::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::growth::Warnings;
 use super::predict::announce;
 use super::problem::{Problem, extent};
 use super::remedy::Given;
@@ -45,7 +48,8 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
         ));
     }
     let given = Given::of(&options.name, &options.scheme);
-    let study = Converge { problem, given, sweep, base, cases, orders };
+    let warnings = OnceLock::new();
+    let study = Converge { problem, given, sweep, base, cases, orders, warnings };
     let files = Asked(vec![
         (Form::Json, &options.scheme.json),
         (Form::Plot, &options.plot),
@@ -103,6 +107,8 @@ struct Converge<'a> {
     base: Case,
     cases: Vec<Discretized<'a>>,
     orders: Orders,
+    /// What the errors of every scheme suffer from here.
+    warnings: OnceLock<Warnings>,
 }
 
 /// Errors of a run, or the differences between time steps.
@@ -175,6 +181,11 @@ impl Study for Converge<'_> {
 }
 
 impl Converge<'_> {
+    /// Measured once, where a report is made.
+    fn warnings(&self) -> &Warnings {
+        self.warnings.get_or_init(|| Warnings::of(self.problem))
+    }
+
     /// A figure for each case, and in time one for the differences: they take each run once more, and one with half its step.
     fn with_differences(&self, mut figures: Vec<f64>) -> Vec<f64> {
         if matches!(self.sweep, Sweep::Cfls(_)) {

@@ -12,6 +12,7 @@ use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
+use super::growth::{MOST_GROWTH_WORK, Told};
 use super::problem::Problem;
 use super::{blind, predict};
 use crate::arguments::{ExplainOptions, SchemeOptions};
@@ -36,9 +37,12 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let blind = blind::measure(selection)?;
     let deformation = Deformation::of(&options.name, model, settled)?;
     let told = deformation.as_ref().map(Deformation::text).unwrap_or_default();
+    let motion = Told::measure(&model.exact, 1.0, MOST_GROWTH_WORK);
     terminal::say(
         &(text(&spec, &exercises, &blind, &cost)
             + &told
+            + "\nthe exact motion and small disturbances of it\n"
+            + &motion.text("  ")
             + &exact_elements(degree)
             + &runs(&predicted, &words)),
     )?;
@@ -52,6 +56,7 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     if let Some(output) = output {
         let mut document = document(&spec, degree, &exercises, &cost, &predicted);
         document["blind_spots"] = json!(blind);
+        document["motion"] = motion.document();
         if let Some(deformation) = &deformation {
             document["deformation"] = deformation.document();
         }

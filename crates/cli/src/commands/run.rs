@@ -10,6 +10,7 @@ use mmsmith_verify::{
 };
 use serde_json::{Map, Value, json};
 
+use super::growth::Warnings;
 use super::picture::Picture;
 use super::predict::announce;
 use super::problem::{Model, Problem};
@@ -172,6 +173,9 @@ impl Ran {
             said += &advice.text();
             results.insert("advice".into(), advice.document());
         }
+        let warnings = Warnings::of(problem);
+        said += &warnings.text();
+        warnings.insert(&mut results);
         if let Some(folder) = &options.vtk {
             let list = folder.join(format!("{}.pvd", selection.name()));
             said += &format!("particle files: {}\n", list.display());

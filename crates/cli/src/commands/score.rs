@@ -18,6 +18,7 @@ use mmsmith_vtk::foreign::column;
 use serde_json::json;
 
 use super::blind;
+use super::growth::Warnings;
 use crate::arguments::ScoreOptions;
 use crate::expect;
 use crate::library::Selection;
@@ -135,7 +136,8 @@ fn tell(
     let mut sections = text::of_score(selection, score);
     let beside = score.rows.iter().zip(&agreements);
     sections.extend(beside.map(|(row, agreement)| text::of_agreement(options, row, agreement)));
-    sections.push(Section::Note(text::verdict(score) + &blind::text(&blind)));
+    let warnings = Warnings::until(selection, exact, options.periods).without_locking();
+    sections.push(Section::Note(text::verdict(score) + &warnings.text() + &blind::text(&blind)));
     let report = Report {
         caption: text::caption(selection),
         sections,
@@ -144,7 +146,8 @@ fn tell(
         verdict: score.verdict.passed,
         ..Report::new("score")
     };
-    let report = report.with("blind_spots", json!(blind));
+    let mut report = report.with("blind_spots", json!(blind));
+    warnings.insert(&mut report.results);
     match agreements.is_empty() {
         true => report.publish(output),
         false => report.with("against", json!(agreements)).publish(output),

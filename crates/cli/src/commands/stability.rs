@@ -1,5 +1,6 @@
 //! `mms stability`: the largest stable time step, and what becomes of it at the extremes.
 
+mod exact;
 mod random;
 mod vary;
 
@@ -63,6 +64,9 @@ impl Point {
 pub(crate) fn stability(options: &StabilityOptions) -> Result<bool> {
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
+    if options.exact {
+        return exact::exact(options);
+    }
     if let (Some(_), Some(shard)) = (options.at, options.kept.shard) {
         bail!("--at --shard {shard}: one run is one case; leave --shard out");
     }
@@ -105,7 +109,7 @@ pub(super) fn survey<R>(
     let criteria =
         Criteria { error_multiple: options.error_multiple, energy_rate: options.energy_rate };
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
-    let points = vary::points(options, &selection)?;
+    let points = vary::points(options, &options.scheme, &selection)?;
     let cases = points.iter().map(|point| match point.place(options, "=") {
         place if place.is_empty() => point.admit(),
         place => point.admit().with_context(|| format!("--over {place}")),
@@ -169,7 +173,7 @@ impl Study for Survey<'_> {
         let extent = self.cases[0].plan().extent;
         let mut said = self.definition();
         if !self.names().contains(&"cells") {
-            said = format!("{} cells\n{said}", options.cells);
+            said = format!("{} cells\n{said}", options.grid_cells());
         }
         let title = format!("largest stable CFL number, to {} on P-waves", search.width);
         let mut results = Map::new();
@@ -191,7 +195,7 @@ impl Study for Survey<'_> {
                 Section::Sheet(self.sheet(&rows)),
                 Section::Plot(picture(&common.selection, options, &rows)),
             ],
-            settings: common.settings(extent, options.cells, Value::Null),
+            settings: common.settings(extent, options.grid_cells(), Value::Null),
             results,
             verdict: None,
         })
@@ -203,7 +207,7 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let scheme = SchemeOptions { cfl: Some(cfl), ..options.scheme.clone() };
     let files = Asked(vec![(Form::Json, &scheme.json)]).prepare()?;
-    let Point { problem, .. } = Point::new(Vec::new(), selection, &scheme, options.cells)?;
+    let Point { problem, .. } = Point::new(Vec::new(), selection, &scheme, options.grid_cells())?;
     let cases = problem.model.admit(&[problem.settled.case])?;
     let extent = extent(&cases);
     with_threads(scheme.threads, || {
@@ -218,7 +222,7 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
             preface: problem.settled.choice(),
             caption: problem.caption(extent),
             sections: vec![Section::Note(definition(criteria) + &said)],
-            settings: problem.settings(extent, options.cells, cfl),
+            settings: problem.settings(extent, options.grid_cells(), cfl),
             results: results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect(),
             verdict: Some(found.failure.is_none()),
         };

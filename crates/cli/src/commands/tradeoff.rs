@@ -19,13 +19,14 @@ use serde_json::{Value, json};
 
 use self::measured::{Measure, Measured};
 use self::time::Time;
+use super::growth::Warnings;
 use super::problem::Model;
 use crate::arguments::{Precision, TradeoffOptions};
 use crate::json::Output;
 use crate::keep::{Found, Keep, Order, Part};
 use crate::library::Selection;
 use crate::progress::Bar;
-use crate::report::{Asked, Form};
+use crate::report::{Asked, Form, Section};
 use crate::{machine, memory, terminal};
 
 /// The CFL number that ladders begin with.
@@ -141,7 +142,12 @@ pub(crate) fn tradeoff(options: &TradeoffOptions) -> Result<bool> {
         Swept::All(found) => found,
         Swept::Part(part) => return terminal::say(&part.to_string()).map(|()| true),
     };
-    let holds = found.report()?.publish(outputs)?;
+    let mut report = found.report()?;
+    let exact = found.selection.build()?;
+    let warnings = Warnings::until(&found.selection, &exact, options.periods);
+    warnings.insert(&mut report.results);
+    report.sections.push(Section::Note(warnings.text()));
+    let holds = report.publish(outputs)?;
     if let Some(file) = advice {
         file.write_text(&found.advice())?;
     }

@@ -223,3 +223,60 @@ fn a_study_of_convergence_is_kept_to_the_bit() {
     assert_eq!(mms(place, &format!("{call} --set A=0.05")).status, 1);
     assert_eq!(kept(place).len(), 8);
 }
+
+#[test]
+fn growth_of_the_exact_motion_is_told_as_a_table_and_as_json() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let call = "stability swirl --exact --cells 6 --periods 0.25 --set A=0.1 --over nu=0.3,0.4999 --json g.json --csv g.csv";
+    let called = mms(place, call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let found = read_json(&place.join("g.json"));
+    assert_eq!(keys(&found), "over rows schema settings");
+    assert_eq!(found["schema"], "mmsmith.growth/1");
+    let factor = |row: usize| found["rows"][row]["factor"].as_f64().expect("a factor");
+    assert!(factor(0) < 2.0 && factor(1) > 10.0, "{} {}", factor(0), factor(1));
+    assert_eq!(found["rows"][1]["nu"], 0.4999);
+    assert!(found["rows"][1]["extremes"]["pressure_over_mu"].as_f64().expect("p") > 20.0);
+    // A row for each of three waves and for the worst, and the header.
+    let csv = std::fs::read_to_string(place.join("g.csv")).expect("a table");
+    assert_eq!(csv.lines().count(), 9, "{csv}");
+
+    refuses(place, "stability swirl --exact --at 0.5", &["--exact", "--at"]);
+    refuses(place, "stability swirl --exact --over shape=gimp", &["the exact motion has no shape"]);
+    refuses(place, "stability swirl --exact --shape gimp", &["bspline2 to bspline5"]);
+    refuses(place, "stability block-j2 --exact", &["the law has memory"]);
+}
+
+#[test]
+fn commands_warn_of_motions_that_are_unstable_and_of_none_that_are_not() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let of = |nu: &str, amplitude: &str| {
+        let call = format!(
+            "run swirl --cells 8 --periods 0.25 --set nu={nu} --set A={amplitude} --json r.json"
+        );
+        let called = mms(place, &call);
+        (called.stdout, read_json(&place.join("r.json")))
+    };
+    let (told, found) = of("0.4999", "0.1");
+    assert!(told.contains("errors grow") && told.contains("--set A="), "{told}");
+    assert!(told.contains("lambda/mu is 5000"), "{told}");
+    assert!(found["growth"]["factor"].as_f64().expect("a factor") > 100.0);
+    // Three times is less than a digit.
+    let (told, found) = of("0.4999", "0.02");
+    assert!(!told.contains("errors grow") && found["growth"].is_null(), "{told}");
+    let (told, found) = of("0.3", "0.1");
+    assert!(!told.contains("warning") && found["growth"].is_null(), "{told}");
+    assert!(found["locking"].is_null());
+
+    let call = "converge swirl --cells 4,8,12 --periods 0.25 --set nu=0.4999 --set A=0.1 --formulation total-lagrangian \
+                --shape bspline3 --json c.json";
+    let called = mms(place, call);
+    let found = read_json(&place.join("c.json"));
+    let reason = found["not_judged"].as_str().expect("a reason");
+    assert!(reason.contains("errors grow"), "{reason}");
+    // Errors above the motion fail all the same.
+    assert!(called.stdout.contains("error exceeds the motion"), "{}", called.stdout);
+    assert_eq!(called.status, 1);
+}

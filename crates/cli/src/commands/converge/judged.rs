@@ -2,8 +2,9 @@
 
 use mmsmith_solutions::{AnySolution, Smoothness};
 use mmsmith_verify::{
-    Behaviour, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
-    Values, expected_in_space, expected_in_time, history_of, orders_above, verdicts_above,
+    Behaviour, Discretized, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep,
+    Temporal, Values, expected_in_space, expected_in_time, history_of, orders_above,
+    verdicts_above,
 };
 
 use super::Converge;
@@ -36,9 +37,35 @@ fn not_judged(exact: &AnySolution<f64>) -> Option<String> {
 
 impl Judged {
     pub(super) fn new(asked: &Converge<'_>, rows: Vec<Row>, differences: Option<Temporal>) -> Self {
+        let reason = not_judged(&asked.problem.model.exact);
+        let judged = Self::unless(asked, rows, differences, reason);
+        // A missed order proves nothing where errors grow by themselves; one that is met does.
+        if !any(judged.decisive(), |one| one.passed == Some(false)) {
+            return judged;
+        }
+        match asked.warnings().not_judged() {
+            None => judged,
+            reason => {
+                let Self { study, differences, .. } = judged;
+                let differences = differences.map(|(found, _)| found);
+                Self::unless(asked, study.rows, differences, reason)
+            }
+        }
+    }
+
+    /// With no orders expected where there is a reason.
+    fn unless(
+        asked: &Converge<'_>,
+        rows: Vec<Row>,
+        differences: Option<Temporal>,
+        not_judged: Option<String>,
+    ) -> Self {
         let Converge { problem, sweep, base, cases, orders, .. } = asked;
-        let not_judged = not_judged(&problem.model.exact);
-        let floors: Vec<PerField<f64>> = cases.iter().map(|case| *case.floors()).collect();
+        // Rounding is among what grows.
+        let grown = asked.warnings().factor();
+        let floor =
+            |case: &Discretized<'_>| PerField::from_fn(|field| grown * case.floors()[field]);
+        let floors: Vec<PerField<f64>> = cases.iter().map(floor).collect();
         let study = above(Study::new(rows, sweep), sweep, &floors);
         // In time the expectation is about the differences; the total error is mostly a spatial one.
         let in_space = match (sweep, orders.expected) {

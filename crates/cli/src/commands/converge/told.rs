@@ -48,6 +48,7 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
     if let Some(reason) = &judged.not_judged {
         results.insert("not_judged".into(), json!(reason));
     }
+    asked.warnings().insert(&mut results);
     if let Some((found, verdicts)) = &judged.differences {
         results.insert("temporal".into(), temporal_results(found, verdicts));
     }
@@ -106,6 +107,7 @@ fn notes(asked: &Converge<'_>, judged: &Judged, advice: Option<&Advice>) -> Resu
         notes += "A difference is that of a run and the run with half its time step: what the time step alone does.\n";
     }
     notes += &judged.not_judged.iter().map(|reason| format!("{reason}\n")).collect::<String>();
+    notes += &asked.warnings().text();
     notes += &way_out(&problem.model.exact, base, study);
     notes += &advice.map(Advice::text).unwrap_or_default();
     let has_range = |judged: &Verdicts| any(judged, |one| !one.asymptotic_rows.is_empty());

@@ -16,6 +16,7 @@ use mmsmith_spec::Condition;
 use mmsmith_verify::Quantity;
 use serde_json::{Value, json};
 
+use super::growth::Warnings;
 use crate::arguments::DiagnoseOptions;
 use crate::expect;
 use crate::json::Output;
@@ -68,7 +69,10 @@ pub(crate) fn diagnose(options: &DiagnoseOptions) -> Result<bool> {
         })
     };
     let work = || {
-        let told = examine(solver(&[], "given")?, &solver, options, &expected)?;
+        let mut told = examine(solver(&[], "given")?, &solver, options, &expected)?;
+        let selection = Selection::new(name, &options.parameters.set)?;
+        let warnings = Warnings::until(&selection, &selection.build()?, 1.0).without_locking();
+        told.notes.extend(warnings.text().lines().map(|line| line.trim().to_owned()));
         terminal::say(&told.text(options))?;
         if let Some(output) = output {
             output.write(&told.document(name, options))?;

@@ -16,7 +16,11 @@ struct Draft {
 }
 
 /// Every combination of the varied settings' values, the last setting changing fastest.
-pub(super) fn points(options: &StabilityOptions, selection: &Selection) -> Result<Vec<Point>> {
+pub(super) fn points(
+    options: &StabilityOptions,
+    scheme: &SchemeOptions,
+    selection: &Selection,
+) -> Result<Vec<Point>> {
     if options.over.len() > 2 {
         bail!("--over: one makes a line and two make a map; {} were given", options.over.len());
     }
@@ -37,7 +41,7 @@ pub(super) fn points(options: &StabilityOptions, selection: &Selection) -> Resul
     combinations
         .into_iter()
         .map(|values| {
-            let (scheme, cells) = (options.scheme.clone(), options.cells);
+            let (scheme, cells) = (scheme.clone(), options.grid_cells());
             let mut draft = Draft { selection: selection.clone(), scheme, cells };
             let mut place = String::new();
             for ((name, _), value) in options.over.iter().zip(&values) {

@@ -1,0 +1,232 @@
+//! Growth of disturbances of the exact motion, as commands tell it that do not measure it alone.
+
+use mmsmith_solutions::AnySolution;
+use mmsmith_verify::{
+    A_DIGIT, Extremes, Growth, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH, Volume,
+    extremes_of, growth, harmful_growth, lambda_over_mu,
+};
+use serde_json::{Map, Value, json};
+
+use super::problem::Problem;
+use crate::library::Selection;
+use crate::number;
+
+/// Digits of numbers in sentences.
+const DIGITS: usize = 2;
+
+/// Solutions whose volume does not change, which have no large pressure at any Poisson's ratio.
+const ISOCHORIC: &str = "shears, vortex or torsion";
+
+/// Points times steps of a run that a command takes which does something else: about half a second.
+pub(crate) const MOST_GROWTH_WORK: f64 = 2.5e6;
+
+/// A factor in words: `1600 times`.
+pub(crate) fn times(factor: f64) -> String {
+    match factor {
+        factor if factor > MOST_GROWTH => "more than 1e16 times".to_owned(),
+        factor if factor >= 1e5 => format!("{factor:.1e} times"),
+        factor => format!("{} times", number::rounded(factor, DIGITS)),
+    }
+}
+
+/// A motion with less pressure, in words.
+pub(crate) fn instead(selection: &Selection, periods: f64) -> String {
+    let own = smaller(selection, periods);
+    let own = own.map(|A| {
+        format!("--set A={} (a pressure of two shear moduli at most), or ", number::rounded(A, 1))
+    });
+    format!("{}a motion with J = 1, as {ISOCHORIC}", own.unwrap_or_default())
+}
+
+/// The largest amplitude, rounded down, whose pressure stays harmless.
+fn smaller(selection: &Selection, periods: f64) -> Option<f64> {
+    const HALVINGS: usize = 12;
+    let (_, present) = selection.parameters().iter().find(|(name, _)| *name == "A")?;
+    let is_harmless = |share: f64| {
+        let changed = selection.with(&[("A".to_owned(), share * present)]).ok()?;
+        let found = extremes_of(&changed.build().ok()?, periods)?;
+        Some(found.pressure_over_mu <= HARMLESS_PRESSURE)
+    };
+    let (mut harmless, mut harmful) = (1e-6, 1.0);
+    if !is_harmless(harmless)? || is_harmless(harmful)? {
+        return None;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * f64::sqrt(harmless * harmful) + 0.25 * (harmless + harmful);
+        if is_harmless(middle)? { harmless = middle } else { harmful = middle }
+    }
+    Some(0.9 * harmless * present)
+}
+
+/// What the errors of every scheme suffer from in a motion, apart from the scheme: disturbances that grow, and locking next to
+/// incompressibility. Nothing in ordinary motions.
+pub(crate) struct Warnings {
+    growth: Option<(Harm, String)>,
+    /// Lame's constants' quotient, where it is large.
+    locking: Option<f64>,
+}
+
+/// Lame's constants' quotient lambda/mu from which on schemes without a cure are said to lock: `nu = 0.495`.
+const LOCKING: f64 = 100.0;
+
+/// What cures locking, as a sentence.
+const CURE: &str = "--formulation total-lagrangian --volume projected is against it.";
+
+impl Warnings {
+    /// Measures them for a problem, once.
+    pub(crate) fn of(problem: &Problem) -> Self {
+        let Problem { selection, model, settled } = problem;
+        let found = Self::until(selection, &model.exact, settled.case.periods);
+        match settled.case.volume {
+            Volume::Pointwise => found,
+            Volume::Projected => found.without_locking(),
+        }
+    }
+
+    /// As [`of`](Self::of), until so many periods.
+    pub(crate) fn until(selection: &Selection, exact: &AnySolution<f64>, periods: f64) -> Self {
+        let growth = harmful_growth(exact, periods);
+        Self {
+            growth: growth.map(|found| (found, instead(selection, periods))),
+            locking: lambda_over_mu(exact).filter(|quotient| *quotient > LOCKING),
+        }
+    }
+
+    /// Those of a scheme that has a cure for locking, or may have one.
+    pub(crate) fn without_locking(self) -> Self {
+        Self { locking: None, ..self }
+    }
+
+    /// How much errors grow; one where they do not.
+    pub(crate) fn factor(&self) -> f64 {
+        self.growth.as_ref().map_or(1.0, |(found, _)| found.factor)
+    }
+
+    /// Why orders that are missed prove nothing, where errors grow.
+    pub(crate) fn not_judged(&self) -> Option<String> {
+        let (found, instead) = self.growth.as_ref()?;
+        Some(format!(
+            "Orders are not judged: errors grow {} in this motion, whatever the scheme. Judge by {instead}.",
+            grown(found)
+        ))
+    }
+
+    /// Lines of them.
+    pub(crate) fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some((found, instead)) = &self.growth {
+            text += &format!(
+                "warning: errors grow {} in this motion, whatever the scheme: its pressure of up to {} shear moduli drives every disturbance \
+                 on. Errors and orders below that floor tell of the motion, and are not judged.\n  Judge by {instead}; mms stability --exact tells more.\n",
+                grown(found),
+                number::rounded(found.extremes.pressure_over_mu, DIGITS),
+            );
+        }
+        if let Some(quotient) = self.locking {
+            text += &format!(
+                "warning: lambda/mu is {}: without a projected change of volume schemes lock, so that errors of u are several times, and those of P \
+                 thousands of times, what they are at nu = 0.3.\n  {}\n",
+                number::rounded(quotient, DIGITS),
+                CURE
+            );
+        }
+        text
+    }
+
+    /// Puts them among results, where there are some.
+    pub(crate) fn insert(&self, results: &mut Map<String, Value>) {
+        if let Some((found, instead)) = &self.growth {
+            let mut document = json!(found);
+            document["instead"] = json!(instead);
+            results.insert("growth".into(), document);
+        }
+        if let Some(quotient) = self.locking {
+            results.insert("locking".into(), json!({ "lambda_over_mu": quotient }));
+        }
+    }
+}
+
+/// A factor of growth in words, and whether it is measured.
+fn grown(found: &Harm) -> String {
+    match found.measured {
+        true => times(found.factor),
+        false => format!("up to {} (an estimate)", times(found.factor)),
+    }
+}
+
+/// Pressure, shear and the growth of a coarse wave, as `check` and `explain` tell them.
+pub(crate) struct Told {
+    extremes: Option<Extremes>,
+    growth: Result<Growth, String>,
+}
+
+impl Told {
+    /// Until so many periods, with at most so much work; beyond it it is said that it was left out.
+    pub(crate) fn measure(exact: &AnySolution<f64>, periods: f64, most_work: f64) -> Self {
+        let settings = GrowthSettings {
+            periods,
+            cells: None,
+            degree: None,
+            waves: 1,
+            iterations: 0,
+            most_work: Some(most_work),
+        };
+        Self {
+            extremes: extremes_of(exact, periods),
+            growth: growth(exact, &settings).map_err(|error| error.to_string()),
+        }
+    }
+
+    /// Lines of it.
+    pub(crate) fn text(&self, margin: &str) -> String {
+        let mut text = String::new();
+        if let Some(extremes) = &self.extremes {
+            text += &format!("{margin}{}\n", of_extremes(extremes));
+        }
+        text += &match &self.growth {
+            Ok(found) if found.factor < A_DIGIT => format!(
+                "{margin}the exact motion is stable: a disturbance in one wave grows {} in a period\n",
+                times(found.factor)
+            ),
+            Ok(found) => format!(
+                "{margin}the exact motion is UNSTABLE: a disturbance in one wave grows {} in a period, which costs every scheme {:.1} digits\n",
+                times(found.factor),
+                found.digits
+            ),
+            Err(reason) => format!(
+                "{margin}growth of disturbances of the exact motion not measured: {reason} (mms stability --exact does)\n"
+            ),
+        };
+        text
+    }
+
+    /// It for programs.
+    pub(crate) fn document(&self) -> Value {
+        let mut document = Map::new();
+        if let Some(extremes) = &self.extremes {
+            document.insert("extremes".into(), json!(extremes));
+        }
+        match &self.growth {
+            Ok(found) => {
+                document.insert("factor".into(), json!(found.factor));
+                document.insert("digits".into(), json!(found.digits));
+            }
+            Err(reason) => {
+                document.insert("not_measured".into(), json!(reason));
+            }
+        }
+        document.into()
+    }
+}
+
+/// Largest pressure and shear in words.
+pub(crate) fn of_extremes(extremes: &Extremes) -> String {
+    let Extremes { pressure, pressure_over_mu, shear, change_of_volume, .. } = extremes;
+    format!(
+        "largest pressure {}, {} shear moduli; largest shear {}; largest |J - 1| {}",
+        number::rounded(*pressure, DIGITS),
+        number::rounded(*pressure_over_mu, DIGITS),
+        number::rounded(*shear, DIGITS),
+        number::rounded(*change_of_volume, DIGITS)
+    )
+}

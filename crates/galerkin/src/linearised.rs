@@ -1,0 +1,403 @@
+//! Small disturbances of a given motion: the balance of momentum, linearised about it.
+//!
+//! Two motions of a body under one dead load differ by a field `w`. While that is small it obeys
+//!
+//! ```text
+//! rho0 w'' = Div(A : grad w),  A = dP/dF at the deformation gradient F(X, t) of the given motion
+//! ```
+//!
+//! with `w = 0` on sides whose motion is given, and no traction on sides whose traction is given. The discretisation is that of
+//! [`TotalLagrangian`](super::TotalLagrangian) with consistent mass and leapfrog. `A : grad w` is a difference of the law's own stress along
+//! `grad w`, of second order with a strain of 1e-5 at most: good to nine digits of the moduli, and for any law.
+//!
+//! Kick, drift and kick are the transposes of each other, so that the steps backwards are the adjoint of the steps forwards to rounding: what
+//! grows most is found by powers of one after the other.
+//!
+//! Source: Ogden, "Non-Linear Elastic Deformations" (1984), section 6.2 (small deformations superposed on finite ones).
+
+use std::array;
+
+use mmsmith_laws::{
+    BLOCK, BlockOfStresses, BlockWithMemory, InternalVariable, Law, SIDE_BY_SIDE, Stressed, Volume,
+};
+use mmsmith_mpm::SetupError;
+use nalgebra::{SMatrix, SVector};
+
+use super::basis::Basis;
+use super::boundary::Face;
+use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
+use super::composition::Composition;
+use super::coordinates::{Coordinates, RowGeometry};
+use super::fit::Line;
+use super::mass::{Band, Mass};
+use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, rows};
+
+/// The largest strain of the difference that stands for the tangent.
+const STRAIN: f64 = 1e-5;
+
+/// A disturbance of a motion, and its velocity.
+pub trait Disturbed<const D: usize> {
+    /// Reference positions of the quadrature points, Cartesian.
+    fn positions(&self) -> &[SVector<f64, D>];
+
+    /// Starts without displacement, from the velocity nearest to that given at the [positions](Self::positions), Cartesian, in the mean of
+    /// squares.
+    fn start(&mut self, velocity: &[SVector<f64, D>]);
+
+    /// Starts anew without displacement, from a velocity that is the displacement now times `factor`.
+    fn start_from_displacement(&mut self, factor: f64);
+
+    /// Follows the disturbance over steps of equal length, `F` writing the deformation gradients of the motion at the
+    /// [positions](Self::positions) at the end of a step, of step 0 those before the first one; `seen` is called after each step and says whether to go on.
+    fn advance(
+        &mut self,
+        time_step: f64,
+        steps: usize,
+        F: &mut dyn FnMut(usize, &mut Vec<SMatrix<f64, D, D>>),
+        seen: &mut dyn FnMut(usize, &mut dyn Disturbed<D>) -> bool,
+    );
+
+    /// How large the displacement is.
+    fn displacement(&mut self) -> Magnitude;
+
+    /// How large the velocity is.
+    fn velocity(&mut self) -> Magnitude;
+}
+
+/// Not generic, so that it is compiled with this crate.
+macro_rules! disturbed {
+    ($($D:literal)*) => {
+        $(
+            impl Grid<$D> {
+                /// No disturbance, of a body on this grid with the law and the reference density, by splines of a degree.
+                ///
+                /// Internal variables of a law stay what they are at time zero: where they follow the motion, the result has no meaning.
+                ///
+                /// # Errors
+                ///
+                /// As [`TotalLagrangian::new`](super::TotalLagrangian::new).
+                pub fn undisturbed(
+                    &self,
+                    degree: usize,
+                    law: Law<f64, $D>,
+                    density: f64,
+                ) -> Result<Box<dyn Disturbed<$D>>, SetupError> {
+                    Ok(Box::new(Disturbance::<$D>::new(self, degree, law, density)?))
+                }
+            }
+
+            impl Disturbed<$D> for Disturbance<$D> {
+                fn positions(&self) -> &[SVector<f64, $D>] {
+                    &self.X
+                }
+
+                fn start(&mut self, velocity: &[SVector<f64, $D>]) {
+                    self.fit(velocity);
+                }
+
+                fn start_from_displacement(&mut self, factor: f64) {
+                    for Component { u, v, .. } in &mut self.components {
+                        v.iter_mut().zip(&*u).for_each(|(v, u)| *v = factor * u);
+                        u.fill(0.0);
+                    }
+                }
+
+                fn advance(
+                    &mut self,
+                    time_step: f64,
+                    steps: usize,
+                    F: &mut dyn FnMut(usize, &mut Vec<SMatrix<f64, $D, $D>>),
+                    seen: &mut dyn FnMut(usize, &mut dyn Disturbed<$D>) -> bool,
+                ) {
+                    let mut now = vec![SMatrix::identity(); self.X.len()];
+                    F(0, &mut now);
+                    self.accelerate(&now);
+                    for step in 1..=steps {
+                        self.kick_and_drift(time_step);
+                        F(step, &mut now);
+                        self.accelerate(&now);
+                        self.kick(time_step);
+                        if !seen(step, self) {
+                            break;
+                        }
+                    }
+                }
+
+                fn displacement(&mut self) -> Magnitude {
+                    self.magnitude(Field::Displacement)
+                }
+
+                fn velocity(&mut self) -> Magnitude {
+                    self.magnitude(Field::Velocity)
+                }
+            }
+        )*
+    };
+}
+
+disturbed! { 1 2 3 }
+
+/// A disturbance on a grid.
+#[derive(Clone, Debug)]
+struct Disturbance<const D: usize> {
+    operators: Operators<D>,
+    components: [Component<D>; D],
+    /// Sides whose motion is given.
+    held: Vec<Face<D>>,
+    coordinates: Coordinates,
+    rows: Vec<RowGeometry<D>>,
+    reciprocal_radius: Vec<f64>,
+    /// Quadrature points, Cartesian, and the volumes that they stand for.
+    X: Vec<SVector<f64, D>>,
+    volume: Vec<f64>,
+    law: Law<f64, D>,
+    variables: Vec<InternalVariable>,
+    /// Values of the law that depend on the place, those of a point one after the other.
+    given: Vec<f64>,
+}
+
+/// How large a field is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Magnitude {
+    /// The largest magnitude at the quadrature points.
+    pub largest: f64,
+    /// The root of the mean square over the volume.
+    pub mean: f64,
+}
+
+impl<const D: usize> Disturbance<D>
+where
+    f64: Stressed<D>,
+{
+    fn new(
+        grid: &Grid<D>,
+        degree: usize,
+        law: Law<f64, D>,
+        density: f64,
+    ) -> Result<Self, SetupError> {
+        const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
+        let (mass, composition) = (MassMatrix::Consistent, Composition::Order2);
+        let volume = Volume::Pointwise;
+        check(grid, &Scheme { degree, mass, composition, volume }, density, 1.0)?;
+        let lines: [Line; D] = array::from_fn(|k| line(grid, k));
+        let (mut bases, mut masses) = (Vec::with_capacity(D), Vec::with_capacity(D));
+        let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
+        for (k, axis) in grid.axes.iter().enumerate() {
+            let basis =
+                |normal: bool| {
+                    Basis::new(axis, degree, normal, &lines[k].points)
+                        .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
+                };
+            let pair = [basis(false)?, basis(true)?];
+            // The density belongs to the product over the axes, so to one of them.
+            let factor = if k == 0 { density } else { 1.0 };
+            let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
+            let mass = |basis| Mass::consistent(axis, &Band::consistent(basis, &weights));
+            let both = mass(&pair[0]).zip(mass(&pair[1])).ok_or_else(|| singular(k))?;
+            masses.push(<[Mass; 2]>::from(both));
+            bases.push(pair);
+        }
+        let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
+        let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let fits = Ok(fits(grid, &bases, &lines).map_err(singular)?);
+        let bodies = particles(grid, &lines, density);
+        let given = match &law {
+            Law::WithMemory(law) => bodies.X.iter().flat_map(|X| law.initial(X)).collect(),
+            Law::Library(_) | Law::Own(_) => Vec::new(),
+        };
+        Ok(Self {
+            held: faces(grid, &lines).into_iter().filter(|face| face.moved).collect(),
+            components: array::from_fn(|index| Component::new(index, &bases)),
+            operators: Operators { bases, mass, fits },
+            coordinates: grid.coordinates,
+            rows: rows(grid, &lines),
+            reciprocal_radius: lines[0].points.iter().map(|R| R.recip()).collect(),
+            X: bodies.X,
+            volume: bodies.volume,
+            variables: law.variables(),
+            law,
+            given,
+        })
+    }
+
+    /// See [`Disturbed::start`].
+    fn fit(&mut self, velocity: &[SVector<f64, D>]) {
+        let row = self.row();
+        for (p, value) in velocity.iter().enumerate() {
+            let value = self.rows.get(p / row).map_or(*value, |row| row.frame.tr_mul(value));
+            for component in &mut self.components {
+                component.values[p] = value[component.index] * self.volume[p];
+            }
+        }
+        let Self { operators: Operators { bases, fits, .. }, held, components, .. } = self;
+        let Ok(fits) = fits else { return };
+        for component in components {
+            let index = component.index;
+            let functions = component.functions(bases);
+            let mut v = vec![0.0; component.v.len()];
+            component.integrate(bases, Factors::Values, &mut v);
+            solve(&functions, |k| &along(fits, k, index).mass, &mut v);
+            for face in held.iter() {
+                face.copy(&functions, &component.given, &mut v);
+            }
+            component.v = v;
+            component.u.fill(0.0);
+        }
+    }
+
+    fn kick_and_drift(&mut self, time_step: f64) {
+        for component in &mut self.components {
+            component.kick(0.5 * time_step);
+            component.drift(time_step);
+        }
+    }
+
+    fn kick(&mut self, time_step: f64) {
+        self.components.iter_mut().for_each(|component| component.kick(0.5 * time_step));
+    }
+
+    fn magnitude(&mut self, field: Field) -> Magnitude {
+        let Self { components, operators, volume, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, field, true);
+        });
+        let (mut largest, mut sum, mut whole) = (0.0_f64, 0.0, 0.0);
+        for (p, volume) in volume.iter().enumerate() {
+            let square: f64 = components.iter().map(|c| c.values[p] * c.values[p]).sum();
+            largest = if square.is_nan() { f64::NAN } else { largest.max(square) };
+            sum += volume * square;
+            whole += volume;
+        }
+        Magnitude { largest: largest.sqrt(), mean: (sum / whole).sqrt() }
+    }
+
+    /// Particles along axis 0.
+    fn row(&self) -> usize {
+        self.operators.bases[0][0].points
+    }
+
+    /// The accelerations of the displacement, with the motion's deformation gradients.
+    fn accelerate(&mut self, F: &[SMatrix<f64, D, D>]) {
+        let curvilinear = self.coordinates.are_curvilinear();
+        let Self { components, operators, .. } = self;
+        each_component(components, &|component| {
+            component.evaluate(&operators.bases, Field::Displacement, curvilinear);
+        });
+        let gradients = self.gradients();
+        let changes = self.changes_of_stress(F, &gradients);
+        self.set_forces(&changes);
+        let factors = if curvilinear { Factors::Both } else { Factors::Slopes };
+        let Self { components, operators, held, .. } = self;
+        let held = &held[..];
+        each_component(components, &|component| {
+            component.accelerate(operators, factors, held, None);
+        });
+    }
+
+    /// Gradients of what stands at the points, Cartesian.
+    fn gradients(&self) -> Vec<SMatrix<f64, D, D>> {
+        let (row, components) = (self.row(), &self.components);
+        let of = |p: usize| {
+            let H = SMatrix::from_fn(|c, k| components[c].slopes[k][p]);
+            let Some(at) = self.rows.get(p / row) else { return H };
+            let u = SVector::from_fn(|c, _| components[c].values[p]);
+            let H = self.coordinates.gradient(&u, &H, self.reciprocal_radius[p % row], at);
+            at.frame * H * at.frame.transpose()
+        };
+        (0..self.X.len()).map(of).collect()
+    }
+
+    /// `A : grad w` at the points.
+    fn changes_of_stress(
+        &self,
+        F: &[SMatrix<f64, D, D>],
+        gradients: &[SMatrix<f64, D, D>],
+    ) -> Vec<SMatrix<f64, D, D>> {
+        let largest = gradients.iter().fold(0.0_f64, |largest, H| largest.max(H.amax()));
+        if largest == 0.0 {
+            return vec![SMatrix::zeros(); F.len()];
+        }
+        let step = STRAIN / largest;
+        let mut changes = Vec::with_capacity(F.len());
+        for first in (0..F.len()).step_by(BLOCK) {
+            let range = first..(first + BLOCK).min(F.len());
+            let moved = |by: f64| -> Vec<SMatrix<f64, D, D>> {
+                let both = F[range.clone()].iter().zip(&gradients[range.clone()]);
+                both.map(|(F, H)| F + H * by).collect()
+            };
+            let above = self.stresses(first, &moved(step));
+            let below = self.stresses(first, &moved(-step));
+            changes.extend(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)));
+        }
+        changes
+    }
+
+    /// Stresses of a block of points.
+    fn stresses(&self, first: usize, F: &[SMatrix<f64, D, D>]) -> Vec<SMatrix<f64, D, D>> {
+        match &self.law {
+            law @ Law::Library(_) => side_by_side(law, F),
+            Law::Own(law) => {
+                let mut block = BlockOfStresses::at_rest();
+                F.iter().enumerate().for_each(|(n, F)| block.set(n, F));
+                block.evaluate(law.as_ref());
+                (0..F.len()).map(|n| block.stress(n)).collect()
+            }
+            Law::WithMemory(law) => {
+                let count = self.variables.len();
+                let mut block = BlockWithMemory::at_rest(&self.variables);
+                let given = &self.given[first * count..(first + F.len()) * count];
+                block.first_piola_kirchhoff(law.as_ref(), F, given);
+                (0..F.len()).map(|n| block.stress(n)).collect()
+            }
+        }
+    }
+
+    /// Puts the factors of the forces where the gradients stood.
+    fn set_forces(&mut self, changes: &[SMatrix<f64, D, D>]) {
+        let row = self.row();
+        let Self { components, coordinates, rows, reciprocal_radius, volume, .. } = self;
+        for (p, change) in changes.iter().enumerate() {
+            let mut force = change * -volume[p];
+            if let Some(at) = rows.get(p / row) {
+                let local = at.frame.transpose() * force * at.frame;
+                let of_values;
+                (of_values, force) =
+                    coordinates.transposed_gradient(&local, reciprocal_radius[p % row], at);
+                for (c, component) in components.iter_mut().enumerate() {
+                    component.values[p] = of_values[c];
+                }
+            }
+            for (c, component) in components.iter_mut().enumerate() {
+                for k in 0..D {
+                    component.slopes[k][p] = force[(c, k)];
+                }
+            }
+        }
+    }
+}
+
+/// The stresses of a law of the library.
+fn side_by_side<const D: usize>(
+    law: &Law<f64, D>,
+    F: &[SMatrix<f64, D, D>],
+) -> Vec<SMatrix<f64, D, D>>
+where
+    f64: Stressed<D>,
+{
+    let mut stresses = Vec::with_capacity(F.len());
+    for F in F.chunks(SIDE_BY_SIDE) {
+        let of = |n: usize| F.get(n).copied().unwrap_or_else(SMatrix::identity);
+        let (mut lanes, mut P) = ([[[0.0; SIDE_BY_SIDE]; D]; D], [[[0.0; SIDE_BY_SIDE]; D]; D]);
+        for n in 0..SIDE_BY_SIDE {
+            let F = of(n);
+            for i in 0..D {
+                for j in 0..D {
+                    lanes[i][j][n] = F[(i, j)];
+                }
+            }
+        }
+        law.first_piola_kirchhoff_side_by_side(&lanes, &mut P);
+        stresses.extend((0..F.len()).map(|n| SMatrix::from_fn(|i, j| P[i][j][n])));
+    }
+    stresses
+}
