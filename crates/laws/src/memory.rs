@@ -90,6 +90,15 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
         self.kirchhoff(increment.end, q, tau);
     }
 
+    /// Whether the change of volume is projected: solvers set the internal variables then, the projected change of volume and the projected
+    /// mean stress. Default: it is not.
+    fn is_projected(&self) -> bool {
+        false
+    }
+
+    /// Writes the mean stresses of particles with these deformation gradients and projected changes of volume, where these are projected.
+    fn mean_stresses(&self, _F: &[SMatrix<T, D, D>], _theta: &[T], _mean: &mut [T]) {}
+
     /// The normal Kirchhoff stress of a particle along the axes that F leaves out, where the stretch is one; `None` where it is not known.
     fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>, _q: &[T]) -> Option<T> {
         None

@@ -158,6 +158,15 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
 
     fn evolve(&self, _: &Increment<'_, T, D>, _: &mut [[T; BLOCK]]) {}
 
+    fn is_projected(&self) -> bool {
+        true
+    }
+
+    fn mean_stresses(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
+        let mut scaled = vec![SMatrix::zeros(); F.len()];
+        self.evaluate(F, theta, &mut scaled, mean);
+    }
+
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
         let share = q.first().copied()? / determinant(F);
         let ratio = if D == 2 { share.sqrt() } else { share };

@@ -191,12 +191,13 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         Some(SharedCorners::new(mesh, at_corner))
     });
     let shares = fill(&mut particles, &*law, transfer.is_affine())?;
-    let fused = is_fused(integrator, transfer);
+    let projects = law.is_projected();
+    let fused = is_fused(integrator, transfer) && !projects;
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
     // Sums for the next step are on a grid of their own, unless they are at corners.
     let ahead = filtered || (fused && corners.is_none());
-    let grids = 1 + usize::from(reprojects) + usize::from(ahead);
+    let grids = 1 + usize::from(reprojects) + usize::from(ahead) + usize::from(projects);
     let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
     let mut layout = Layout::new(grid, bytes_per_node)?;
@@ -216,6 +217,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         })
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
+    let means = nodes(projects)?;
     let Particles { mass, volume, .. } = &particles;
     let least = |numbers: &mut dyn Iterator<Item = T>| {
         let least = numbers.reduce(|least, number| least.min(number));
@@ -237,6 +239,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         nodes: now,
         reprojected,
         next,
+        means,
         is_ahead: false,
         filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
         layout,

@@ -165,6 +165,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         state.sort();
         state.start_affine();
+        if state.law.is_projected() {
+            state.project_volume(false);
+        }
         Ok(Self { grid, law, settings, state, steps_done: 0, failed: None, own: None })
     }
 

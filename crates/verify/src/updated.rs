@@ -5,9 +5,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
-use mmsmith_laws::Volume;
+use mmsmith_laws::{ProjectedVolume, Volume};
 use mmsmith_mpm::{
-    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share, Solver,
+    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, SetupError, Shape, Share,
+    Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
@@ -220,11 +221,13 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_density(&mut body.particles, exact);
-    if case.volume != Volume::Pointwise {
-        let instead = "total-lagrangian, or leave --volume out";
-        return Err(CaseError::setting("formulation", "updated-lagrangian", instead));
-    }
     let law = law_by::<T, D>(model.law(), case.return_map.unwrap_or_default())?;
+    let law = match case.volume {
+        Volume::Pointwise => law,
+        Volume::Projected => {
+            Law::with_memory(ProjectedVolume::new(law).ok_or(SetupError::ProjectedMemory)?)
+        }
+    };
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());
     if let Some(Mesh { X, x, .. }) = &mut body.mesh {

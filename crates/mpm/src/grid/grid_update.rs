@@ -35,6 +35,12 @@ pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
     /// Updates some nodes.
     fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]);
 
+    /// A node's mirror image, across a wall along the axis if there is one.
+    #[inline(always)]
+    fn flipped(self, node: Node<T, D>, axis: Option<usize>) -> Node<T, D> {
+        node.flipped(axis)
+    }
+
     /// Whether masses are among the sums.
     fn brings_mass(self) -> bool {
         true
@@ -173,6 +179,28 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Reprojection {
     }
 }
 
+/// A scalar in the place of the first component of a momentum, to its mean: the same on both sides of a wall.
+#[derive(Clone, Copy)]
+pub(crate) struct ScalarMean;
+
+impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for ScalarMean {
+    #[inline(always)]
+    fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]) {
+        for node in nodes {
+            let inverse = c.inverse_mass(node);
+            node.values[0] *= inverse;
+        }
+    }
+
+    #[inline(always)]
+    fn on_wall(self, _: &Constants<T, D>, _: &mut Node<T, D>, _: usize) {}
+
+    #[inline(always)]
+    fn flipped(self, node: Node<T, D>, _: Option<usize>) -> Node<T, D> {
+        node
+    }
+}
+
 /// The sums that another update begins with, of the body and its mirror images, and no update.
 #[derive(Clone, Copy)]
 pub(crate) struct Sums<S>(S);
@@ -191,8 +219,13 @@ impl<T: RealField + Copy, S: NodeUpdate<T, D>, const D: usize> NodeUpdate<T, D> 
 
     /// Half of what reaches a node on a plane of symmetry comes from the mirror image.
     fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
-        let mirrored = node.flipped(Some(axis));
+        let mirrored = self.0.flipped(*node, Some(axis));
         self.0.add(node, &mirrored);
+    }
+
+    #[inline(always)]
+    fn flipped(self, node: Node<T, D>, axis: Option<usize>) -> Node<T, D> {
+        self.0.flipped(node, axis)
     }
 }
 
@@ -319,7 +352,9 @@ where
         let skipped = (to_update.start - rows.start) * layout.row();
         self.complete(&mut nodes[skipped..][..to_update.len() * layout.row()], to_update.start);
         for edge in edges.iter().filter(|edge| edge.is_within(&rows)) {
-            layout.unfold_edge(&edge.rows, rows.start, nodes, &Node::flipped);
+            layout.unfold_edge(&edge.rows, rows.start, nodes, &|n: Node<T, D>, a| {
+                self.update.flipped(n, a)
+            });
             edge.is_updated.store(true, Ordering::Relaxed);
         }
     }
@@ -333,14 +368,17 @@ where
             self.fold_edge(edge, nodes, rows.start);
             let (start, end) = (edge.rows.start - rows.start, edge.rows.end - rows.start);
             self.complete(&mut nodes[start * row..end * row], edge.rows.start);
-            self.layout.unfold_edge(&edge.rows, rows.start, nodes, &Node::flipped);
+            self.layout.unfold_edge(&edge.rows, rows.start, nodes, &|n: Node<T, D>, a| {
+                self.update.flipped(n, a)
+            });
         }
     }
 
     /// Folds a ghost node beyond a wall to its mirror image. The component along the axis `flip` changes its sign.
     #[inline(always)]
     fn fold(&self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
-        self.update.add(image, &self.c.ghost(ghost).flipped(flip));
+        let mirrored = self.update.flipped(self.c.ghost(ghost), flip);
+        self.update.add(image, &mirrored);
     }
 
     /// Updates one of the edges, among the rows from row `first` on.
@@ -360,7 +398,7 @@ where
     pub(crate) fn on_walls(&self, nodes: &mut [Node<T, D>], first: usize) {
         let &Self { layout, c, update, .. } = self;
         layout.on_walls(first, nodes, |node, axis| update.on_wall(c, node, axis));
-        layout.unfold_rows(nodes, &Node::flipped);
+        layout.unfold_rows(nodes, &|node: Node<T, D>, axis| update.flipped(node, axis));
     }
 }
 

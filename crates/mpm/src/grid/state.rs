@@ -23,6 +23,8 @@ pub(crate) struct GridState<T, const D: usize> {
     pub(crate) next: Vec<Node<T, D>>,
     /// The fused pass: whether `nodes` has the velocities and accelerations of the next step, with no factor on the latter.
     pub(crate) is_ahead: bool,
+    /// Means of scalars, where a change of volume is projected. One per node.
+    pub(crate) means: Vec<Node<T, D>>,
     /// XPIC: the filtered velocity at each node.
     pub(crate) filtered: Vec<SVector<T, D>>,
 }
@@ -45,7 +47,9 @@ impl<T: Lanes, const D: usize> GridState<T, D> {
                 *nodes = vec![Node::zero(); layout.nodes];
             }
         };
-        [&mut self.nodes, &mut self.reprojected, &mut self.next].into_iter().for_each(resize);
+        [&mut self.nodes, &mut self.reprojected, &mut self.next, &mut self.means]
+            .into_iter()
+            .for_each(resize);
         if !self.filtered.is_empty() {
             self.filtered = vec![SVector::zeros(); layout.nodes];
         }

@@ -37,6 +37,14 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
         Vec::new()
     }
 
+    /// Whether the change of volume is projected: the solver sets the internal variables then, `theta` and `p`.
+    fn is_projected(&self) -> bool {
+        false
+    }
+
+    /// Writes the mean stresses of particles with these deformation gradients and projected changes of volume.
+    fn mean_stresses(&self, _F: &[SMatrix<T, D, D>], _theta: &[T], _mean: &mut [T]) {}
+
     /// Advances the internal variables of no more than a block of particles, whose deformation gradient goes from `start` to `end` in a
     /// time.
     fn evolve(
@@ -184,6 +192,14 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
         self.law.initial(X)
+    }
+
+    fn is_projected(&self) -> bool {
+        self.law.is_projected()
+    }
+
+    fn mean_stresses(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
+        self.law.mean_stresses(F, theta, mean);
     }
 
     fn evolve(

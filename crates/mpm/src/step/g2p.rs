@@ -32,7 +32,7 @@ use crate::step::state::{EarlyState, State, invalidity};
 use mmsmith_threads::each;
 
 /// Particles handed to a thread at a time; fixed, so that nothing depends on the number of threads.
-const CHUNK: usize = 1024;
+pub(crate) const CHUNK: usize = 1024;
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
@@ -189,15 +189,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
 }
 
 /// G2P of successive particles, block by block.
-struct FromGrid<'a, T, const D: usize> {
+pub(crate) struct FromGrid<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     values: GridValues<'a, T, D>,
     copies: Copies<T, D>,
-    buffers: Box<Buffers<T, D>>,
+    pub(crate) buffers: Box<Buffers<T, D>>,
 }
 
 impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
-    fn new(
+    pub(crate) fn new(
         c: &'a Constants<T, D>,
         values: GridValues<'a, T, D>,
         buffers: Box<Buffers<T, D>>,
@@ -206,7 +206,7 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
     }
 
     /// Interpolated values of the particles from the id `first` on, no more than a block.
-    fn g2p(
+    pub(crate) fn g2p(
         &mut self,
         first: usize,
         x: &[SVector<T, D>],

@@ -11,6 +11,7 @@ pub(crate) mod g2p2g;
 pub(crate) mod health;
 pub(crate) mod p2g;
 pub(crate) mod state;
+pub(crate) mod volume;
 pub(crate) mod xpic;
 
 use mmsmith_lanes::simd::Lanes;
@@ -50,7 +51,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Some(corners) = &mut self.corners {
             corners.shared.recompute_shares();
         }
-        if is_fused(integrator, self.transfer) {
+        let projects = self.law.is_projected();
+        if is_fused(integrator, self.transfer) && !projects {
             return match self.corners {
                 Some(_) => self.step_at_corners(body_force, times),
                 None => self.fused_step(body_force, times),
@@ -66,6 +68,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
             if outcome.failure.is_some() {
                 std::mem::swap(&mut self.particles.F, &mut self.early.F);
                 return outcome;
+            }
+            if projects {
+                self.project_volume(true);
             }
             self.p2g_force(body_force, times);
         } else {
@@ -83,7 +88,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.g2p(late)
         };
         let outcome = self.reduce_outcome(outcome);
-        self.resort_if(outcome)
+        let outcome = self.resort_if(outcome);
+        // Where F has not followed since forces were computed, its change of volume has been projected.
+        if projects && early < 1.0 && outcome.failure.is_none() {
+            self.project_volume(false);
+        }
+        outcome
     }
 
     /// The corners that particles share move with the grid; their new positions are stored beside the old.

@@ -171,9 +171,10 @@ fn momenta<'a, T: Lanes, const D: usize>(
 }
 
 /// Corners that particles share, and their exchange with particles and grid.
-type TwoStages<'a, T, const D: usize> = (&'a SharedCorners<T, D>, &'a mut Exchange<T, D>);
+pub(crate) type TwoStages<'a, T, const D: usize> =
+    (&'a SharedCorners<T, D>, &'a mut Exchange<T, D>);
 
-fn two_stages<T, const D: usize>(
+pub(crate) fn two_stages<T, const D: usize>(
     corners: &mut Option<Box<Corners<T, D>>>,
 ) -> Option<TwoStages<'_, T, D>> {
     let Corners { shared, exchange, .. } = &mut **corners.as_mut()?;
@@ -181,19 +182,19 @@ fn two_stages<T, const D: usize>(
 }
 
 /// P2G of all particles.
-struct P2g<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
-    domain: &'a dyn Domain<T, D>,
-    buffers: &'a BufferPool<T, D>,
-    is_affine: bool,
-    x: &'a [SVector<T, D>],
-    F: &'a [SMatrix<T, D, D>],
+pub(crate) struct P2g<'a, T, const D: usize> {
+    pub(crate) c: &'a Constants<T, D>,
+    pub(crate) domain: &'a dyn Domain<T, D>,
+    pub(crate) buffers: &'a BufferPool<T, D>,
+    pub(crate) is_affine: bool,
+    pub(crate) x: &'a [SVector<T, D>],
+    pub(crate) F: &'a [SMatrix<T, D, D>],
 }
 
 impl<T: Lanes, const D: usize> P2g<'_, T, D> {
     /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and by
     /// way of corners where particles share them, with the loads on these.
-    fn to_grid<S: NodeUpdate<T, D>>(
+    pub(crate) fn to_grid<S: NodeUpdate<T, D>>(
         &self,
         update: &GridUpdate<'_, T, S, D>,
         (bins, stages, loading): (&mut Bins, Option<TwoStages<'_, T, D>>, Loading<'_, T, D>),
