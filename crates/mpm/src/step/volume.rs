@@ -39,9 +39,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let F = if is_early { &self.early.F } else { &self.particles.F };
         let mut theta: Vec<T> = F.iter().map(determinant).collect();
         if !planted.is(Fault::JacobianForTheta) {
-            let momenta: Vec<T> =
-                theta.iter().zip(&self.particles.mass).map(|(J, m)| *J * *m).collect();
-            self.project(&momenta, &mut theta);
+            self.project(&mut theta);
         }
         let F = if is_early { &self.early.F } else { &self.particles.F };
         let mut p = vec![T::zero(); F.len()];
@@ -49,11 +47,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let pieces = F.chunks(CHUNK).zip(theta.chunks(CHUNK)).zip(p.chunks_mut(CHUNK));
         each(pieces.collect(), &|((F, theta), p)| law.mean_stresses(F, theta, p));
         if !planted.is(Fault::MeanStressStays) {
-            let Particles { mass, volume, .. } = &self.particles;
-            let forces: Vec<T> = p.iter().zip(volume).map(|(p, V)| *p * *V).collect();
-            let densities: Vec<T> = mass.iter().zip(volume).map(|(m, V)| *m / *V).collect();
-            self.project(&forces, &mut p);
-            p.iter_mut().zip(densities).for_each(|(p, density)| *p *= density);
+            let densities = |particles: &Particles<T, D>| -> Vec<T> {
+                let Particles { mass, volume, .. } = particles;
+                mass.iter().zip(volume).map(|(m, V)| *m / *V).collect()
+            };
+            let densities = densities(&self.particles);
+            p.iter_mut().zip(&densities).for_each(|(p, density)| *p /= *density);
+            self.project(&mut p);
+            p.iter_mut().zip(&densities).for_each(|(p, density)| *p *= *density);
         }
         let internal = match is_early {
             true => &mut self.early.internal,
@@ -64,13 +65,31 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
     }
 
-    /// Sums what belongs to each particle at the nodes, divides by their masses, and interpolates at the particles.
-    fn project(&mut self, sums: &[T], values: &mut [T]) {
+    /// `2 A - A^2` of values at the particles, `A` being the mean to the nodes and back: means alone smooth by `h^2`. Particles that share
+    /// corners are smoothed by `A`: of the corners' own values `2 A - A^2` leaves too many for a body next to incompressibility to follow.
+    fn project(&mut self, values: &mut [T]) {
+        if self.corners.is_some() {
+            return self.smooth(values);
+        }
+        let mut means = values.to_vec();
+        self.smooth(&mut means);
+        for (value, mean) in values.iter_mut().zip(&means) {
+            *value -= *mean;
+        }
+        self.smooth(values);
+        for (value, mean) in values.iter_mut().zip(&means) {
+            *value += *mean;
+        }
+    }
+
+    /// Means of the particles' values at the nodes, weighted with masses, and these interpolated at the particles.
+    fn smooth(&mut self, values: &mut [T]) {
         let Self { particles, grid, corners, domain, buffers, .. } = self;
         let GridState { constants, layout, bins, means, .. } = grid;
         let (domain, buffers) = (&**domain, &*buffers);
         let Particles { x, F, mass, .. } = &*particles;
         let c = *constants;
+        let sums = &*values;
         let update = GridUpdate::new(layout, &c, ScalarMean);
         let p2g = P2g { c: &c, domain, buffers, is_affine: false, x, F };
         let set = |Buffers { contributions, .. }: &mut Buffers<T, D>,
@@ -80,7 +99,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             for (value, &p) in contributions.value.iter_mut().zip(ids) {
                 let p = p as usize;
                 let mut sum = SVector::zeros();
-                sum[0] = sums[p];
+                sum[0] = sums[p] * mass[p];
                 *value = Node::new(&sum, &SVector::zeros(), mass[p]);
             }
         };
