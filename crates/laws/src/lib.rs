@@ -176,6 +176,15 @@ pub trait Stressed<const D: usize>: Lanes {
     /// [`with_memory`].
     #[doc(hidden)]
     fn with_memory(law: WithMemory<Self>, map: ReturnMap) -> Option<Law<Self, D>>;
+
+    /// [`with_projected_volume`].
+    #[doc(hidden)]
+    fn with_projected_volume(law: Law<Self, D>) -> Option<Law<Self, D>>;
+}
+
+/// A law with its change of volume projected, see [`ProjectedVolume`]; none of a law that has internal variables of its own.
+pub fn with_projected_volume<T: Stressed<D>, const D: usize>(law: Law<T, D>) -> Option<Law<T, D>> {
+    T::with_projected_volume(law)
 }
 
 /// The law as stresses are formed of it: another with a planted fault alone.
@@ -230,6 +239,10 @@ macro_rules! stressed {
 
             fn with_memory(law: WithMemory<Self>, map: ReturnMap) -> Option<Law<Self, $D>> {
                 memory_of_library(law, map)
+            }
+
+            fn with_projected_volume(law: Law<Self, $D>) -> Option<Law<Self, $D>> {
+                ProjectedVolume::new(law).map(Law::with_memory)
             }
         })*)*
     };

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
-use mmsmith_laws::{ProjectedVolume, Volume};
+use mmsmith_laws::{Volume, with_projected_volume};
 use mmsmith_mpm::{
     Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, SetupError, Shape, Share,
     Solver,
@@ -224,9 +224,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     let law = law_by::<T, D>(model.law(), case.return_map.unwrap_or_default())?;
     let law = match case.volume {
         Volume::Pointwise => law,
-        Volume::Projected => {
-            Law::with_memory(ProjectedVolume::new(law).ok_or(SetupError::ProjectedMemory)?)
-        }
+        Volume::Projected => with_projected_volume(law).ok_or(SetupError::ProjectedMemory)?,
     };
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());

@@ -16,6 +16,7 @@ mod planted_faults;
 mod planted_law_faults;
 mod planted_memory_faults;
 mod planted_solver_faults;
+mod projected_volume;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;
 mod staged;
