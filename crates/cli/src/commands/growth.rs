@@ -70,7 +70,7 @@ pub(crate) struct Warnings {
 const LOCKING: f64 = 100.0;
 
 /// What cures locking, as a sentence.
-const CURE: &str = "--formulation total-lagrangian --volume projected is against it.";
+const CURE: &str = "--volume projected is against it.";
 
 impl Warnings {
     /// Measures them for a problem, once.
