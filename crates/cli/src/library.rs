@@ -46,10 +46,23 @@ const WITH_MEMORY: &[(&str, &str)] = &[
     ("ring-simo", include_str!("../../../mms-specs/with-memory/ring-simo.toml")),
 ];
 
-/// The names of all solutions that can be listed: [`names`], then those of laws that remember.
+/// Specifications of motions without a change of volume, for tests next to incompressibility, which are compiled in as text.
+const INCOMPRESSIBLE: &[(&str, &str)] = &[
+    ("ring-isochoric", include_str!("../../../mms-specs/incompressible/ring-isochoric.toml")),
+    ("shears", include_str!("../../../mms-specs/incompressible/shears.toml")),
+    ("shears-3d", include_str!("../../../mms-specs/incompressible/shears-3d.toml")),
+    ("shears-loaded", include_str!("../../../mms-specs/incompressible/shears-loaded.toml")),
+];
+
+/// All specifications that are compiled in as text.
+fn texts() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    WITH_MEMORY.iter().chain(INCOMPRESSIBLE)
+}
+
+/// The names of all solutions that can be listed: [`names`], then those whose fields are interpreted.
 pub(crate) fn all_names() -> Vec<String> {
     let mut all = names();
-    let others = WITH_MEMORY.iter().map(|(name, _)| (*name).to_owned());
+    let others = texts().map(|(name, _)| (*name).to_owned());
     let others: Vec<String> = others.filter(|name| !all.contains(name)).collect();
     all.extend(others);
     all
@@ -155,7 +168,7 @@ pub(crate) fn locate(name: &str) -> Result<Origin> {
     let found = folders().into_iter().map(|folder| folder.join(&file)).find(|path| path.is_file());
     let origin = match (found, built_in) {
         (None, Some(description)) => Origin::BuiltIn(description),
-        (None, None) => match WITH_MEMORY.iter().find(|(known, _)| *known == name) {
+        (None, None) => match texts().find(|(known, _)| *known == name) {
             Some((name, text)) => Origin::Text { name, text },
             None => return Err(unknown(name)),
         },

@@ -47,6 +47,10 @@ pub trait Disturbed<const D: usize> {
     /// Starts anew without displacement, from a velocity that is the displacement now times `factor`.
     fn start_from_displacement(&mut self, factor: f64);
 
+    /// The largest angular frequency of waves on the grid about a motion with deformation gradients `F`, by so many powers of the operator, from
+    /// the displacement that an earlier call has left: leapfrog is stable with steps of up to two over it. It is found from below.
+    fn largest_frequency(&mut self, F: &[SMatrix<f64, D, D>], powers: usize) -> f64;
+
     /// Follows the disturbance over steps of equal length, `F` writing the deformation gradients of the motion at the
     /// [positions](Self::positions) at the end of a step, of step 0 those before the first one; `seen` is called after each step and says whether to go on.
     fn advance(
@@ -100,6 +104,14 @@ macro_rules! disturbed {
                         v.iter_mut().zip(&*u).for_each(|(v, u)| *v = factor * u);
                         u.fill(0.0);
                     }
+                }
+
+                fn largest_frequency(
+                    &mut self,
+                    F: &[SMatrix<f64, $D, $D>],
+                    powers: usize,
+                ) -> f64 {
+                    (0..powers).map(|_| self.power(F)).fold(0.0, f64::max).sqrt()
                 }
 
                 fn advance(
@@ -243,6 +255,28 @@ where
             component.v = v;
             component.u.fill(0.0);
         }
+    }
+
+    /// Replaces the displacement by its acceleration, scaled to one; how much larger that was.
+    fn power(&mut self, F: &[SMatrix<f64, D, D>]) -> f64 {
+        let all = |of: fn(&Component<D>) -> &Vec<f64>, components: &[Component<D>; D]| -> f64 {
+            components.iter().flat_map(of).map(|x| x * x).sum::<f64>().sqrt()
+        };
+        if all(|of| &of.u, &self.components) == 0.0 {
+            // A part of every wave.
+            let mut state = 1_u32;
+            for u in self.components.iter_mut().flat_map(|of| &mut of.u) {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                *u = f64::from(state) / f64::from(u32::MAX) - 0.5;
+            }
+        }
+        let before = all(|of| &of.u, &self.components);
+        self.accelerate(F);
+        let after = all(|of| &of.a, &self.components);
+        for Component { u, a, .. } in &mut self.components {
+            u.iter_mut().zip(&*a).for_each(|(u, a)| *u = a / after);
+        }
+        after / before
     }
 
     fn kick_and_drift(&mut self, time_step: f64) {

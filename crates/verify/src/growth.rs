@@ -23,7 +23,7 @@ use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{AnySolution, BLOCK, Domain, Solution, StateAtPoints, StateRun};
 use serde::Serialize;
 
-use self::disturbance::{disturbance, mixed, scales};
+use self::disturbance::{disturbance, mixed};
 use crate::case::{Case, law};
 use crate::dimension::in_dimension;
 use crate::error::{CaseError, SceneError};
@@ -32,7 +32,6 @@ use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Scheme, Total};
 use crate::state_of_stress::{Extremes, Rates, extremes, largest_pressure, moduli};
-use crate::usual_step::fastest_p_wave;
 
 /// A factor by which no digit of double precision is left: growth is not followed beyond it.
 pub const MOST_GROWTH: f64 = 1e16;
@@ -281,7 +280,7 @@ where
     if start.positions().iter().any(|X| exact.density_at(X) != middle) {
         return Err(GrowthError::Density);
     }
-    let steps = steps(exact, &grid, degree, settings.periods)?;
+    let steps = steps(exact, start.as_mut(), settings.periods)?;
     let points = start.positions().len();
     if settings.most_work.is_some_and(|most| points as f64 * steps as f64 > most) {
         return Err(GrowthError::Work { steps, points });
@@ -353,28 +352,30 @@ fn grid<const D: usize>(
     Ok((total.grid(&scene, degree + 1)?, cells))
 }
 
-/// Steps of leapfrog that are stable, from the fastest waves of the motion in the narrowest cells.
+/// Steps of leapfrog that are stable, from the fastest waves on the grid at some times of the motion.
 fn steps<const D: usize>(
     exact: &dyn Solution<f64, D>,
-    grid: &Grid<D>,
-    degree: usize,
+    places: &mut dyn Disturbed<D>,
     periods: f64,
-) -> Result<usize, CaseError>
-where
-    f64: Precision<D>,
-{
-    // The largest CFL number on P-waves is about 1.3 over the degree.
-    const TIMES_DEGREE: f64 = 0.9;
-    // And in slow solids steps have to follow the motion.
+) -> Result<usize, CaseError> {
+    // Powers find frequencies from below, and between the times the body may be stiffer.
+    const SHARE_OF_STABLE: f64 = 0.8;
+    const POWERS: usize = 24;
+    const TIMES: usize = 8;
+    // In slow solids steps have to follow the motion.
     const FEWEST_IN_A_PERIOD: f64 = 200.0;
-    let fastest = fastest_p_wave(exact, periods)?;
-    let least = SVector::<f64, D>::from_fn(|k, _| grid.axes[k].lower);
-    let scales = scales(grid, &least);
-    let narrowest = (0..D).map(|k| grid.axes[k].spacing() * scales[k]).fold(f64::MAX, f64::min);
     let end = periods * exact.period();
-    let longest = TIMES_DEGREE / degree as f64 * narrowest / fastest;
+    let span = end.min(exact.period());
+    let motion = Motion::new(exact, places.positions(), span, TIMES);
+    let mut F = Vec::new();
+    let mut fastest = 0.0_f64;
+    for time in 0..=TIMES {
+        motion.gradients(time, &mut F);
+        fastest = fastest.max(places.largest_frequency(&F, POWERS));
+    }
+    let longest = SHARE_OF_STABLE * 2.0 / fastest;
     let steps = (end / longest).max(FEWEST_IN_A_PERIOD * periods).ceil();
-    if !(steps < 1e7) {
+    if steps.is_nan() || steps > 1e7 {
         return Err(CaseError::TooManySteps { end, dt: longest, steps });
     }
     Ok(steps as usize)

@@ -242,6 +242,11 @@ fn growth_of_the_exact_motion_is_told_as_a_table_and_as_json() {
     let csv = std::fs::read_to_string(place.join("g.csv")).expect("a table");
     assert_eq!(csv.lines().count(), 9, "{csv}");
 
+    // Splines at loaded sides have faster waves than those at held ones, and steps follow them.
+    let call = "stability shears-loaded --exact --cells 6 --periods 0.1 --json g.json";
+    let called = mms(place, call);
+    assert!(called.stdout.contains("The motion is stable"), "{}", called.stdout);
+
     refuses(place, "stability swirl --exact --at 0.5", &["--exact", "--at"]);
     refuses(place, "stability swirl --exact --over shape=gimp", &["the exact motion has no shape"]);
     refuses(place, "stability swirl --exact --shape gimp", &["bspline2 to bspline5"]);

@@ -6,15 +6,6 @@ use mmsmith_galerkin::{Coordinates, Grid};
 use mmsmith_runtime::Solution;
 use mmsmith_runtime::nalgebra::SVector;
 
-/// Lengths per unit of each coordinate.
-pub(super) fn scales<const D: usize>(grid: &Grid<D>, place: &SVector<f64, D>) -> SVector<f64, D> {
-    SVector::from_fn(|k, _| match (grid.coordinates, k) {
-        (Coordinates::Cartesian, _) | (_, 0) => 1.0,
-        (Coordinates::Polar, _) | (Coordinates::Spherical, 1) => place[0],
-        (Coordinates::Spherical, _) => place[0] * place[1].sin(),
-    })
-}
-
 /// Coordinates of a place on a grid.
 fn coordinates<const D: usize>(grid: &Grid<D>, X: &SVector<f64, D>) -> SVector<f64, D> {
     match grid.coordinates {

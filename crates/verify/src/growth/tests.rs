@@ -24,13 +24,13 @@ where
     let settings = GrowthSettings { cells: None, ..settings };
     let (grid, cells) = grid(exact, degree, cells, &settings).unwrap();
     let law = law::<f64, D>(exact.law()).unwrap();
-    let places = f64::undisturbed(&grid, degree, law.clone(), exact.density()).unwrap();
+    let mut places = f64::undisturbed(&grid, degree, law.clone(), exact.density()).unwrap();
     let disturbance = disturbance(exact, &grid, places.positions(), 1);
     let largest = disturbance.iter().map(SVector::norm).fold(0.0, f64::max);
     let size = SIZE * exact.wave_speed() / largest;
     // The solver asks for the motion at these places in their order.
     let end = periods * exact.period();
-    let steps = 2 * steps(exact, &grid, degree, periods).unwrap();
+    let steps = 2 * steps(exact, places.as_mut(), periods).unwrap();
     let solver = |size: f64| {
         let at = std::cell::Cell::new(0);
         let motion = |X: &SVector<f64, D>| {
