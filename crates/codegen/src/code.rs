@@ -1,6 +1,7 @@
 //! A solution that is ready to be written down.
 
 use crate::fault::{Fault, NoEffect};
+use crate::tabulated::Tabulated;
 use mmsmith_expr::{Function, Operation};
 use mmsmith_spec::{DeriveError, Fields, Spec};
 use mmsmith_stage::Staged;
@@ -12,6 +13,8 @@ pub struct Code<'a> {
     pub(crate) origin: Origin,
     /// The mistake that the fields have on purpose, if any.
     pub(crate) wrong: Option<String>,
+    /// The table of the fields that follow from histories, if there are such fields.
+    pub(crate) table: Option<Tabulated>,
 }
 
 /// The origin of a solution, as its files state it.
@@ -44,7 +47,7 @@ impl<'a> Code<'a> {
     /// Stages `fields`, which are those of `spec`.
     #[must_use]
     pub fn of(spec: &'a Spec, fields: Fields, origin: Origin) -> Self {
-        Code { spec, staged: Staged::of(spec, fields), origin, wrong: None }
+        Code { spec, staged: Staged::of(spec, fields), origin, wrong: None, table: None }
     }
 
     /// Stages `fields` with a fault planted in them, which the head of the code states.

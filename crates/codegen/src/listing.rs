@@ -2,11 +2,12 @@
 
 use crate::code::Code;
 use crate::runtime::{Routine, WithRuntime, routines};
+use crate::tabulated::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};
 use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
-use mmsmith_stage::{Block, Measures, Shape};
+use mmsmith_stage::{Block, FieldName, Measures, Shape};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeSet;
 
@@ -17,6 +18,8 @@ pub(crate) struct Item {
     pub(crate) about: String,
     pub(crate) shape: Shape,
     pub(crate) given: Given,
+    /// What it takes from the table; its values are computed otherwise.
+    pub(crate) of_table: Option<OfTable>,
     outputs: Vec<Slot>,
 }
 
@@ -37,6 +40,12 @@ impl Item {
 }
 
 impl Item {
+    /// A function of position and time whose values are those of the table.
+    pub(crate) fn of_table(name: String, about: String, shape: Shape, of_table: OfTable) -> Self {
+        let (given, outputs) = (Given::PositionAndTime, Vec::new());
+        Item { name, about, shape, given, of_table: Some(of_table), outputs }
+    }
+
     /// The slots of its entries, row by row.
     pub(crate) fn outputs(&self) -> &[Slot] {
         &self.outputs
@@ -71,11 +80,18 @@ impl Code<'_> {
             about,
             shape,
             given: Given::PositionAndTime,
+            of_table: None,
             outputs,
         };
         let fields = staged.fields.iter().map(|field| {
             let (letter, about) = (field.name.letter(), field.name.in_words());
-            at_points(letter.into(), about.into(), field.name.shape(), field.outputs.clone())
+            let mut item =
+                at_points(letter.into(), about.into(), field.name.shape(), field.outputs.clone());
+            if self.is_tabulated(field.name) {
+                let is_force = field.name == FieldName::BodyForce;
+                item.of_table = Some(if is_force { OfTable::BodyForce } else { OfTable::Stress });
+            }
+            item
         });
         let energy = staged.energy.map(|energy| {
             let about = "strain energy per reference volume";
@@ -93,11 +109,13 @@ impl Code<'_> {
             about: about.into(),
             shape: if slots.len() == 1 { Shape::Scalar } else { Shape::Vector },
             given: Given::Nothing,
+            of_table: None,
             outputs: slots.to_vec(),
         };
         let corner =
             |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
         let mut all: Vec<Item> = fields.chain(energy).chain(tractions).collect();
+        all.extend(self.tabulated_items());
         all.extend([
             constant(
                 "cell_length",
@@ -166,6 +184,7 @@ impl Code<'_> {
         }
         lines.push(String::new());
         lines.extend(host.lines().map(str::to_owned));
+        lines.extend(self.about_table());
         lines.extend(
             "
 force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/J. The balance \
@@ -217,6 +236,15 @@ In two dimensions the deformation is plane strain. Units are those of the parame
                 message += &format!(" {}", parameter.range);
             }
             lines += &with(refusal.lines, [&condition, &(refusal.string)(&message)]);
+            if self.table.is_some() {
+                let held = target.literal(parameter.default);
+                let message = format!(
+                    "the table of {} holds for {} = {} alone; write it anew by mms gen {} --set {}=...",
+                    spec.name, parameter.name, parameter.default, spec.name, parameter.name
+                );
+                let condition = format!("{name} == {held}");
+                lines += &with(refusal.lines, [&condition, &(refusal.string)(&message)]);
+            }
         }
         let written = target.block(&self.staged.fixed_stage(), margin, places);
         lines += &written.lines;

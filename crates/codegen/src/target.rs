@@ -1,6 +1,7 @@
 //! How languages spell programs, and the hosts that files are written for.
 
 use crate::code::Code;
+use crate::targets::readers_of_tables;
 use crate::text::{push_index, spell};
 use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
 use mmsmith_stage::{Block, Operand};
@@ -147,6 +148,8 @@ pub struct Host {
     pub about: &'static str,
     /// The end of a file's name, after the name of the module.
     pub ending: &'static str,
+    /// Whether its files read tables of fields that follow from histories.
+    pub reads_tables: bool,
     /// The text of the file.
     pub(crate) write: fn(&Code<'_>) -> Result<String, Unwritable>,
 }
@@ -164,6 +167,12 @@ impl Host {
     ///
     /// [`Unwritable`] where the host cannot express a part of the solution.
     pub fn source(&self, code: &Code<'_>) -> Result<String, Unwritable> {
+        if code.spec.has_history() && (code.table.is_none() || !self.reads_tables) {
+            return Err(Unwritable::History {
+                target: self.name,
+                solution: code.spec.name.clone(),
+            });
+        }
         (self.write)(code)
     }
 }
@@ -181,6 +190,19 @@ pub enum Unwritable {
         target: &'static str,
         /// The function, as specifications call it.
         function: String,
+        /// The solution.
+        solution: String,
+    },
+    /// Stresses that no expression has.
+    #[error(
+        "--target {target}: the stress of {solution} follows from the history of each particle, for which {target} has no expression; \
+         write a source with a table, mms gen {solution} --target numpy --out DIR (there are {readers}), or take the fields at \
+         points of yours, mms eval {solution} --points points.csv --csv fields.csv",
+        readers = readers_of_tables()
+    )]
+    History {
+        /// The host.
+        target: &'static str,
         /// The solution.
         solution: String,
     },

@@ -342,6 +342,11 @@ impl<const D: usize> Table<D> {
         self.largest[quantity]
     }
 
+    /// The coefficients of the nodes, axis 0 fastest, for each polynomial in time of each piece, and for each quantity in turn.
+    pub fn columns(&self) -> impl Iterator<Item = &[f64]> {
+        self.coefficients.iter().map(Vec::as_slice)
+    }
+
     /// The largest coefficient among the last two polynomials of an axis or of a piece in time, as a share of the quantity's largest
     /// value: how much the series leaves out, in space and in time.
     #[must_use]
@@ -649,6 +654,24 @@ fn piece_of(knots: &[f64], time: f64) -> usize {
 }
 
 impl AtPoint {
+    /// Series with these pieces, of coefficients piece by piece for each quantity.
+    #[must_use]
+    pub fn new(knots: Vec<f64>, in_time: usize, coefficients: Vec<Vec<f64>>) -> Self {
+        Self { knots, in_time, coefficients }
+    }
+
+    /// Where pieces begin and end.
+    #[must_use]
+    pub fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    /// Polynomials in each piece.
+    #[must_use]
+    pub fn in_time(&self) -> usize {
+        self.in_time
+    }
+
     /// The coefficients of a quantity, piece by piece.
     #[must_use]
     pub fn coefficients(&self, quantity: usize) -> &[f64] {

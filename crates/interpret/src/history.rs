@@ -60,7 +60,8 @@ impl<const D: usize> Chart<D> {
         })
     }
 
-    fn range(&self, axis: usize) -> [f64; 2] {
+    /// The range of a coordinate.
+    pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
         use std::f64::consts::{PI, TAU};
         match self {
             Self::Box { lower, upper } => [lower[axis], upper[axis]],
@@ -136,9 +137,9 @@ pub(crate) struct Histories<const D: usize> {
     parameters: Vec<f64>,
     density: f64,
     density_here: Option<Program>,
-    chart: Chart<D>,
+    pub(crate) chart: Chart<D>,
     /// The coordinates of the chart that fields depend on.
-    axes: Vec<usize>,
+    pub(crate) axes: Vec<usize>,
     tables: RwLock<Option<Arc<Tables<D>>>>,
 }
 
@@ -301,6 +302,33 @@ impl<const D: usize> Histories<D> {
 
     /// The series of a particle alone, for bodies whose fields no table has well.
     fn own_series(&self, X: [f64; D], end: f64, range: &Range<usize>) -> Option<AtPoint> {
+        self.own_series_and_tail(X, end, range).map(|(series, _)| series)
+    }
+
+    /// The series of a particle alone in Cartesian components, with the part that it leaves out.
+    pub(crate) fn cartesian_series(&self, X: [f64; D], end: f64) -> Option<(AtPoint, f64)> {
+        let count = D + D * D + self.names.len();
+        let (series, tail) = self.own_series_and_tail(X, end, &(0..count))?;
+        let particle = self.particle(X);
+        let mut turned = vec![Vec::new(); count];
+        for term in 0..series.coefficients(0).len() {
+            let own: Vec<f64> = (0..count).map(|q| series.coefficients(q)[term]).collect();
+            let Response { P, b } = self.turned(&particle, &own);
+            let mut internal = own[D + D * D..].to_vec();
+            turn_tensors(&self.tensors, &particle.frame, &mut internal);
+            let all = b.into_iter().chain(P.into_iter().flatten()).chain(internal);
+            turned.iter_mut().zip(all).for_each(|(turned, value)| turned.push(value));
+        }
+        Some((AtPoint::new(series.knots().to_vec(), series.in_time(), turned), tail))
+    }
+
+    /// As [`own_series`](Self::own_series), with the part that it leaves out.
+    fn own_series_and_tail(
+        &self,
+        X: [f64; D],
+        end: f64,
+        range: &Range<usize>,
+    ) -> Option<(AtPoint, f64)> {
         let particle = self.particle(X);
         let trajectory =
             Trajectory::<D>::new(&self.law, &particle, &[end], self.tolerance()).ok()?;
@@ -310,7 +338,7 @@ impl<const D: usize> Histories<D> {
             let mut all = self.in_frame(&particle, times)?;
             Ok::<_, HistoryError>(all.drain(range.clone()).collect())
         };
-        AtPoint::fine(end, &breaks, TABLE_TOLERANCE, kinds, of).ok().map(|(series, _)| series)
+        AtPoint::fine(end, &breaks, TABLE_TOLERANCE, kinds, of).ok()
     }
 
     fn particle(&self, X: [f64; D]) -> Particle<'_, D> {
@@ -472,7 +500,7 @@ fn turn_tensor<const D: usize>(Q: &[[f64; D]; D], own: impl Fn(usize) -> f64) ->
 }
 
 /// The places of the first entries of symmetric tensors among internal variables: six names with the indices 11, 22, 33, 12, 13, 23.
-fn first_entries(names: &[String]) -> Vec<usize> {
+pub(crate) fn first_entries(names: &[String]) -> Vec<usize> {
     let is_tensor = |names: &[String]| {
         let stem = names[0].strip_suffix("11");
         let stems = names
@@ -520,20 +548,21 @@ fn of_entries(entries: &[f64]) -> Tensor<f64> {
 pub(crate) struct Tables<const D: usize> {
     /// None where particles begin or stop to flow on the way: no polynomial follows such a front well, and each particle has series of its
     /// own.
-    table: Option<OverAxes>,
-    end: f64,
+    pub(crate) table: Option<OverAxes>,
+    pub(crate) end: f64,
     /// The largest error that random places and times showed, as a share of each quantity's largest value; not a number without a table.
     pub(crate) error: f64,
 }
 
-enum OverAxes {
+/// A table over as many coordinates as fields depend on.
+pub(crate) enum OverAxes {
     One(Table<1>),
     Two(Table<2>),
     Three(Table<3>),
 }
 
 impl<const D: usize> Tables<D> {
-    fn new(histories: &Histories<D>, end: f64) -> Result<Self, HistoryError> {
+    pub(crate) fn new(histories: &Histories<D>, end: f64) -> Result<Self, HistoryError> {
         if histories.has_front(end)? {
             return Ok(Self { table: None, end, error: f64::NAN });
         }

@@ -9,8 +9,10 @@ mod arrays;
 mod history;
 mod lattice;
 mod staged;
+mod table_file;
 
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
+pub use table_file::{FieldShape, TableFile, TableFileError, TabulatedField};
 
 use history::{Chart, Histories, HistoryProblem, Prepared, Quantities};
 use lattice::LatticeStages;

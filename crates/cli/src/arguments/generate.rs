@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mmsmith_codegen::{Fault, HOSTS, Host};
 
 use super::shared::ParameterOptions;
+use super::values::positive_number;
 
 #[derive(Args)]
 pub(crate) struct GenerateOptions {
@@ -21,6 +22,13 @@ pub(crate) struct GenerateOptions {
     /// Folder of the file; made if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// For laws with a history: the end of the table that is written beside the file, in periods of the solution [default: 1]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
+    pub(crate) periods: Option<f64>,
+    /// For laws with a history: positions (CSV with the columns X,Y,Z, or JSON as of mms eval) that the table has series of, instead of one
+    /// over the body. Needed where particles begin or stop to flow on the way
+    #[arg(long, value_name = "FILE")]
+    pub(crate) points: Option<PathBuf>,
     /// Plant this mistake in the fields, to see whether your tests find it
     #[arg(long, value_name = "NAME", value_parser = faults())]
     pub(crate) fault: Option<Fault>,

@@ -1,6 +1,6 @@
 //! `mms eval`: exact fields at the caller's points.
 
-mod points;
+pub(super) mod points;
 
 use std::iter;
 use std::path::Path;

@@ -1,12 +1,21 @@
 //! `mms gen`: a solution as code, anywhere and without cargo.
 
 use anyhow::{Context, Result, bail};
-use mmsmith_codegen::{Code, Names, Origin};
+use mmsmith_codegen::{Code, Names, Origin, Tabulated};
+use mmsmith_interpret::{TableFile, TableFileError};
+use mmsmith_spec::Spec;
+use mmsmith_stage::Staged;
+use sha2::{Digest, Sha256};
 
+use super::eval::points::positions;
 use crate::arguments::GenerateOptions;
+use crate::input::Source;
 use crate::json::{self, Output};
 use crate::library::{Selection, locate};
 use crate::terminal;
+
+/// Hexadecimal digits of the sign that a source and its table have in common.
+const DIGITS_OF_DIGEST: usize = 16;
 
 pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let found = locate(&options.name)?;
@@ -20,14 +29,7 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             parameter.default = given.map_or(parameter.default, |(_, value)| *value);
         }
     }
-    if spec.has_history() {
-        bail!(
-            "{}: the stress follows from the history of each particle, which is no formula that --target {} could have; mms eval gives the \
-             fields at points and times of yours, and the package for Python has b, P and internal variables as functions",
-            found.file(),
-            options.target.name
-        );
-    }
+    refuse_what_does_not_fit(options, &spec, &found.file())?;
     if spec.has_graded_density() {
         bail!(
             "{}: files of hosts have one density, and here it depends on the place; mms eval and the package for Python have b, force per \
@@ -37,15 +39,97 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     }
     let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
+    let mut table = None;
     let code = match options.fault {
+        None if spec.has_history() && options.target.reads_tables => {
+            let staged = Staged::of(&spec, fields.clone());
+            let file = tabulate(options, &spec, &staged).with_context(|| found.file())?;
+            let digest = digest(&file);
+            let code = Code::of(&spec, fields, origin).with_table(beside(&file, &digest));
+            table = Some(file.text(&digest));
+            code
+        }
         None => Code::of(&spec, fields, origin),
         Some(fault) => Code::with_fault(&spec, fields, origin, fault)
             .context("--fault: choose another solution or another fault")?,
     };
     let text = options.target.source(&code)?;
     json::make_folder(&options.out)?;
-    let path = options.out.join(options.target.file_name(&Names::of(&spec.name).module));
-    Output::write_at_once(&path, &text)?;
-    terminal::say(&format!("wrote {}\n", path.display()))?;
+    let module = Names::of(&spec.name).module;
+    let files = [
+        Some((options.target.file_name(&module), text)),
+        table.map(|text| (format!("{module}.table"), text)),
+    ];
+    for (name, text) in files.into_iter().flatten() {
+        let path = options.out.join(name);
+        Output::write_at_once(&path, &text)?;
+        terminal::say(&format!("wrote {}\n", path.display()))?;
+    }
     Ok(true)
+}
+
+/// Options of tables are for laws that need one, and faults for formulas.
+fn refuse_what_does_not_fit(options: &GenerateOptions, spec: &Spec, file: &str) -> Result<()> {
+    if spec.has_history() {
+        if options.fault.is_some() {
+            bail!(
+                "--fault: faults are planted in formulas, and the stress of {file} follows from histories; choose an elastic solution, such as \
+                 mms gen skew-2d --target {} --out DIR --fault NAME",
+                options.target.name
+            );
+        }
+        return Ok(());
+    }
+    let given = [("--periods", options.periods.is_some()), ("--points", options.points.is_some())];
+    if let Some((option, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+        bail!(
+            "{option} is for the tables of laws with a history; the fields of {file} are formulas, which hold everywhere and at all times: leave \
+             it out"
+        );
+    }
+    Ok(())
+}
+
+/// The table of the fields that follow from histories.
+fn tabulate(options: &GenerateOptions, spec: &Spec, staged: &Staged) -> Result<TableFile> {
+    let points = match &options.points {
+        None => None,
+        Some(file) => Some(positions(Source::of(file), spec.dimension)?),
+    };
+    if points.as_ref().is_some_and(Vec::is_empty) {
+        bail!("--points: there is no point in the file");
+    }
+    let points = points.as_deref();
+    let periods = options.periods.unwrap_or(1.0);
+    TableFile::new(spec, staged, [], periods, points).map_err(|error| match error {
+        TableFileError::Rough => anyhow::anyhow!(
+            "no table over the body is accurate, because particles begin or stop to flow on the way, or layers are thin; give the points of your \
+             host, and the file has a series for each: mms gen {} --target {} --out DIR --points points.csv, a line X,Y,Z and then a position a \
+             line",
+            options.name,
+            options.target.name
+        ),
+        other => other.into(),
+    })
+}
+
+/// A digest of all that a table has.
+fn digest(file: &TableFile) -> String {
+    let all: String =
+        Sha256::digest(file.content()).iter().map(|byte| format!("{byte:02x}")).collect();
+    all[..DIGITS_OF_DIGEST].to_owned()
+}
+
+/// What the source knows of the table.
+fn beside(file: &TableFile, digest: &str) -> Tabulated {
+    // After b and P, whose sizes sources know.
+    let internal = file.fields.iter().skip(2);
+    Tabulated {
+        digest: digest.to_owned(),
+        end: file.end,
+        error: file.error,
+        sizes: internal.map(|field| field.shape.size(file.dimension)).collect(),
+        variables: file.variables.clone(),
+        in_time: file.in_time,
+    }
 }

@@ -110,3 +110,42 @@ fn values_that_are_set_become_the_defaults_of_the_file() {
     refuses(empty.path(), "gen skew-2d --target c --out code --set B=1", &["--set", "B"]);
     refuses(empty.path(), "gen skew-2d --target cobol --out code", &["fortran", "febio"]);
 }
+
+/// A material with memory has a table beside the source, by which both know each other.
+#[test]
+fn histories_come_with_a_table() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let called = mms(place, "gen bar-own-law --target c --out code --set A=0.01 --periods 0.5");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let read = |name: &str| fs::read_to_string(place.join("code").join(name)).unwrap();
+    let (source, table) = (read("bar_own_law.h"), read("bar_own_law.table"));
+    let after = |name: &str| table.lines().find_map(|line| line.strip_prefix(name)).unwrap();
+    assert!(source.contains(&format!("\"{}\"", after("digest "))));
+    assert_eq!((after("A "), after("end ")), ("1e-2", "1e-2"));
+    assert!(table.starts_with("mmsmith-table 1\n") && table.contains("\nq scalar\n"));
+    assert!(source.contains("bar_own_law_internal_q("));
+    // Once more, to the bit.
+    assert_eq!(
+        mms(place, "gen bar-own-law --target c --out code --set A=0.01 --periods 0.5").status,
+        0
+    );
+    assert_eq!(table, read("bar_own_law.table"));
+    // A law of rates alone is a formula.
+    assert_eq!(mms(place, "gen bar-kelvin-voigt --target moose --out formula").status, 0);
+    assert_eq!(names(&place.join("formula")), ["bar_kelvin_voigt.i"]);
+}
+
+#[test]
+fn tables_are_refused_where_they_are_of_no_use() {
+    let place = tempfile::tempdir().unwrap();
+    let refused = |line: &str, parts: &[&str]| refuses(place.path(), line, parts);
+    let parts = ["moose has no expression", "mms gen bar-j2 --target numpy", "mms eval bar-j2"];
+    refused("gen bar-j2 --target moose --out x", &parts);
+    refused(
+        "gen bar-j2 --target c --out x --fault body-force-sign",
+        &["--fault", "formulas", "skew-2d"],
+    );
+    refused("gen skew-2d --target c --out x --periods 2", &["--periods", "leave it out"]);
+    refused("gen ring-j2 --target c --out x", &["begin or stop to flow", "--points points.csv"]);
+}

@@ -19,11 +19,10 @@ Parameters are those of the type `parameters`; change the defaults there, or wri
 /// The module with the user subroutines of Abaqus.
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let tractions: String = code
-        .staged
-        .tractions
-        .iter()
-        .map(|traction| {
-            let surface = surface_name(traction.surface).replace('-', "_");
+        .surfaces()
+        .into_iter()
+        .map(|surface| {
+            let surface = surface_name(surface).replace('-', "_");
             let capital = surface.to_ascii_uppercase();
             format!("    if (index(surface, \"{capital}\") > 0) traction = {surface}_traction(s, X, t)\n")
         })

@@ -31,7 +31,7 @@ MMSMITH_FN double mmsmith_nearest(double x)
 
 #endif
 
-@routines@/* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
+@routines@@table_reader@/* Space dimensions, and the numbers of parameters and of values that the stages of b keep. */
 enum {
     @NAME@_dimension = @d@,
     @NAME@_parameter_count = @parameter_count@,
@@ -46,7 +46,7 @@ typedef struct @NAME@_parameters {
 typedef struct @NAME@_solution {
     @NAME@_parameters par;
     double fixed[@fixed_length@];
-} @NAME@_solution;
+@table_member@} @NAME@_solution;
 
 /* What the body force needs of the time alone. */
 typedef struct @NAME@_time_values {
@@ -69,12 +69,12 @@ MMSMITH_FN const char *@NAME@_prepare(@NAME@_solution *s, const @NAME@_parameter
 @prepare@    return 0;
 }
 
-@fields@/* all fields */
+@read_table@@fields@/* all fields */
 MMSMITH_FN void @NAME@_fields(const @NAME@_solution *s, const double X[@d@], double t, @NAME@_field_values *out)
 {
 @all_fields@}
 
-/* What the body force needs of the time alone. */
+@series@/* What the body force needs of the time alone. */
 MMSMITH_FN @NAME@_time_values @NAME@_at_time(const @NAME@_solution *s, double t)
 {
     @NAME@_time_values time;

@@ -1,10 +1,12 @@
 //! The C header of a solution: `c.h` with the solution's own parts between its signs `@`.
 
+use super::tables::c::{TABLE, kept_of_series};
 use crate::c_names::members;
 use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Line, Primitive, Routine, WithRuntime};
+use crate::tabulated::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{c_number, c_string, filled, push_index};
 use mmsmith_expr::{Function, RustCall};
@@ -38,13 +40,17 @@ impl Code<'_> {
     pub fn header_source(&self) -> String {
         let (spec, staged) = (self.spec, &self.staged);
         let (name, force) = (Names::of(&spec.name).module, &staged.body_force);
-        let (times, points) = (force.time_count(), force.point_count());
+        let [times, points] = match &self.table {
+            None => [force.time_count(), force.point_count()],
+            Some(table) => kept_of_series(table, spec.dimension),
+        };
         let c = C { members: members(&spec.parameters) };
         let items = |given: Given| -> String {
             let items = self.functions().into_iter().filter(|item| item.given == given);
             items.map(|item| c.item(self, &item, &name)).collect()
         };
         let results = staged.fields.iter().flat_map(|field| match field.name.shape() {
+            _ if self.is_tabulated(field.name) => Vec::new(),
             Shape::Scalar => vec![format!("out->{} = ", field.name.letter())],
             _ => entries(&format!("out->{}", field.name.letter()), field.outputs.len()),
         });
@@ -73,8 +79,8 @@ impl Code<'_> {
                 .collect(),
             "field_values" => (staged.fields.iter())
                 .map(|field| {
-                    let argument =
-                        argument(field.name.letter(), field.name.shape(), field.outputs.len());
+                    let (shape, d) = (field.name.shape(), spec.dimension);
+                    let argument = argument(field.name.letter(), shape, entry_count(shape, d));
                     format!("    {argument}; /* {} */\n", field.name.in_words())
                 })
                 .collect(),
@@ -82,13 +88,32 @@ impl Code<'_> {
                 let named = |index: usize| format!("p->{}", c.members[index]);
                 let Written { lines, outputs } = self.admitted(&c, "    ", "p->", &REFUSAL, named);
                 let fixed = results_in(&outputs, entries("s->fixed", outputs.len().max(1)));
-                format!("{lines}    s->par = *p;\n{fixed}")
+                let no_table = match &self.table {
+                    None => "",
+                    Some(_) => "    memset(&s->table, 0, sizeof s->table);\n",
+                };
+                format!("{lines}    s->par = *p;\n{fixed}{no_table}")
             }
             "fields" => items(Given::PositionAndTime),
             "constants" => items(Given::Nothing),
-            "all_fields" => {
-                c.body(&["s", "X", "t"], &staged.all_fields(), results.clone().collect())
+            "table_reader" | "table_member" | "read_table" | "series" if self.table.is_none() => {
+                String::new()
             }
+            "table_reader" => TABLE.into(),
+            "table_member" => "    mmsmith_table table;\n".into(),
+            "read_table" => self.c_read_table(&name),
+            "series" => self.c_series(&name),
+            "all_fields" => {
+                let formulas =
+                    c.body(&["s", "X", "t"], &staged.all_fields(), results.clone().collect());
+                let tabulated = staged.fields.iter().filter(|f| self.is_tabulated(f.name));
+                let call = |field: &mmsmith_stage::Field| {
+                    let letter = field.name.letter();
+                    format!("    {name}_{letter}(s, X, t, out->{letter});\n")
+                };
+                formulas + &tabulated.map(call).collect::<String>()
+            }
+            "at_time" | "at_point" | "b_staged" if self.table.is_some() => self.c_stage(place),
             "at_time" => {
                 c.body(&["s", "t"], &staged.time_stage(force), entries("time.values", times.max(1)))
             }
@@ -163,6 +188,15 @@ fn results_in(values: &[String], places: Vec<String>) -> String {
     places.iter().zip(values).map(|(place, value)| format!("    {place}{value};\n")).collect()
 }
 
+/// How many entries a field has.
+fn entry_count(shape: Shape, dimension: usize) -> usize {
+    match shape {
+        Shape::Scalar => 1,
+        Shape::Vector => dimension,
+        Shape::Matrix => dimension * dimension,
+    }
+}
+
 /// C, with the names of the parameters as members of their structure.
 struct C {
     members: Vec<String>,
@@ -181,7 +215,12 @@ impl C {
 
     /// A function of the solution; it takes a position and a time where its values depend on them.
     fn item(&self, code: &Code<'_>, item: &Item, prefix: &str) -> String {
-        let (name, d, count) = (&item.name, code.spec.dimension, item.outputs().len());
+        let (name, d) = (&item.name, code.spec.dimension);
+        let count = match item.of_table {
+            None => item.outputs().len(),
+            Some(OfTable::Internal) => code.variable_count(),
+            Some(_) => entry_count(item.shape, d),
+        };
         // The argument for results has the name of the quantity.
         let result = name.rsplit('_').next().unwrap_or(name);
         let joint = if result == name { ", " } else { ",\n    " };
@@ -200,7 +239,10 @@ impl C {
         format!(
             "/* {} */\nMMSMITH_FN {returned} {prefix}_{name}(const {prefix}_solution *s{given}{argument})\n{{\n{}}}\n\n",
             item.about,
-            self.body(read, &item.block(code), places)
+            match item.of_table {
+                None => self.body(read, &item.block(code), places),
+                Some(of_table) => code.c_of_table(of_table, prefix),
+            }
         )
     }
 }

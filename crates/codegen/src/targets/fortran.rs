@@ -1,5 +1,6 @@
 //! Fortran 2008 source: a module.
 
+use super::tables;
 use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
@@ -87,7 +88,7 @@ fn members(parameters: &[Parameter]) -> Vec<String> {
 }
 
 /// A string in pieces that fit into lines.
-fn string(text: &str) -> String {
+pub(super) fn string(text: &str) -> String {
     let safe = |c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' };
     let safe: Vec<char> = one_line(text).chars().take(500).map(safe).collect();
     if safe.is_empty() {
@@ -127,6 +128,7 @@ pub(super) fn with_head(code: &Code<'_>, remarks: &str, start: &str) -> String {
 pub(super) fn user_subroutines(code: &Code<'_>, template: &str) -> String {
     template
         .replace("  PREPARED\n", include_str!("prepared.f90"))
+        .replace("    TABLE\n", &tables::fortran::reading(code))
         .replace("MODULE", &module_name(code))
         .replace("DIMENSION", &code.spec.dimension.to_string())
 }
@@ -145,6 +147,7 @@ pub(super) fn module(code: &Code<'_>) -> String {
 "
     );
     text += &items.iter().map(|item| format!("  public :: {}\n", item.name)).collect::<String>();
+    text += &tables::fortran::public_names(code);
     text += &format!(
         "
   integer, parameter, public :: dimension_of_space = {}
@@ -163,12 +166,14 @@ pub(super) fn module(code: &Code<'_>) -> String {
     text += &format!(
         "  end type
 
-  type :: solution
+{}  type :: solution
     type(parameters) :: par
     real(dp) :: fixed({}) = 0.0_dp
-  end type
+{}  end type
 ",
-        code.staged.fixed_count().max(1)
+        tables::fortran::types(code),
+        code.staged.fixed_count().max(1),
+        if code.table.is_some() { "    type(table) :: fields_of_histories\n" } else { "" }
     );
     let body = fortran.body(code, &items);
     for name in ["log1p", "expm1"] {
@@ -232,8 +237,12 @@ impl Fortran {
             text += &format!("    s%fixed({}) = {value}\n", index + 1);
         }
         text += "  end subroutine\n";
+        text += &tables::fortran::procedures(code);
         for item in items {
-            text += &self.item(code, item);
+            text += &match item.of_table {
+                None => self.item(code, item),
+                Some(of_table) => tables::fortran::item(code, item, of_table),
+            };
         }
         text + &format!(
             "

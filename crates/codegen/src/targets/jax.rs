@@ -1,6 +1,6 @@
 //! JAX source.
 
-use super::python::{Python, own_call};
+use super::python::{Arrays, Python, own_call};
 use crate::code::Code;
 use crate::runtime::Primitive;
 use crate::target::{Called, Unwritable};
@@ -44,6 +44,11 @@ def _matrix(x, t, rows):
             raise RuntimeError('JAX computes in single precision; call jax.config.update(\"jax_enable_x64\", True) first')\n",
     cauchy: "        return jnp.einsum(\"...ik,...jk->...ij\", P, F) / J[..., None, None]\n",
     second: "        return jnp.linalg.solve(F, P)\n",
+    arrays: Some(Arrays {
+        name: "jnp",
+        portions: "        return self.at(self.series([jnp.broadcast_to(x, shape) for x in X], field), t)
+",
+    }),
 };
 
 fn function(called: Called) -> Cow<'static, str> {

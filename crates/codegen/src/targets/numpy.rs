@@ -1,6 +1,6 @@
 //! NumPy source.
 
-use super::python::{Python, own_call};
+use super::python::{Arrays, Python, own_call};
 use crate::code::Code;
 use crate::runtime::Primitive;
 use crate::target::{Called, Unwritable};
@@ -43,6 +43,15 @@ def _matrix(x, t, rows):
     demands: "",
     cauchy: "        return np.einsum(\"...ik,...jk->...ij\", P, F) / J[..., None, None]\n",
     second: "        return np.linalg.solve(F, P)\n",
+    arrays: Some(Arrays {
+        name: "np",
+        portions: "        X, t = [np.broadcast_to(x, shape).ravel() for x in X], np.broadcast_to(t, shape).ravel()
+        portion = max(1, 2**22 // self.nodes)
+        begins = range(0, max(t.size, 1), portion)
+        parts = [self.at(self.series([x[k : k + portion] for x in X], field), t[k : k + portion]) for k in begins]
+        return np.concatenate(parts).reshape(*shape, -1)
+",
+    }),
 };
 
 fn function(called: Called) -> Cow<'static, str> {

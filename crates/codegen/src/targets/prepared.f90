@@ -12,6 +12,7 @@ contains
       write (*, "(a)") message
       error stop 2
     end if
+    TABLE
     is_ready = .true.
   end subroutine
 

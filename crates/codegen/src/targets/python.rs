@@ -25,6 +25,16 @@ pub(crate) struct Python {
     pub(crate) cauchy: &'static str,
     /// The second Piola-Kirchhoff stress from `F` and `P`.
     pub(crate) second: &'static str,
+    /// How tables of fields are read and evaluated, where the host can.
+    pub(crate) arrays: Option<Arrays>,
+}
+
+/// The array library that evaluates tables.
+pub(crate) struct Arrays {
+    /// Its name in the file.
+    pub(crate) name: &'static str,
+    /// The last statements of the function that evaluates a field at positions `X` and times `t` which have the shape `shape` together.
+    pub(crate) portions: &'static str,
 }
 
 impl Target for Python {
@@ -72,7 +82,7 @@ pub(crate) fn own_call(function: Called, name: &str) -> Cow<'static, str> {
 }
 
 /// A string literal.
-fn string(text: &str) -> String {
+pub(super) fn string(text: &str) -> String {
     let mut literal = String::from("\"");
     for c in one_line(text).chars() {
         match c {
@@ -100,6 +110,7 @@ impl Python {
         let mut text = String::from("# -*- coding: utf-8 -*-\n");
         text += &commented(&code.head_for_host(self.remarks), "#", 118);
         text += self.preamble;
+        text += &self.table_reader(code);
         for routine in code.routines(self) {
             text += &self.routine(&routine);
         }
@@ -126,8 +137,12 @@ impl Python {
             code.admitted(self, "        ", (), &REFUSAL, |index| format!("par[{index}]"));
         text += &lines;
         text += &format!("        self.fixed = [float(x) for x in [{}]]\n", fixed.join(", "));
+        text += &self.table_of_solution(code);
         for item in code.functions() {
-            text += &self.item(code, &item);
+            text += &match item.of_table {
+                None => self.item(code, &item),
+                Some(of_table) => self.item_of_table(code, &item, of_table),
+            };
         }
         text += "\n    def rho0_b(self, X, t):\n        # body force per unit reference volume\n        return self.density() * self.b(X, t)\n";
         text += "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \

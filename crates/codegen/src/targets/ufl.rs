@@ -42,6 +42,7 @@ def _matrix(x, t, rows):
     demands: "",
     cauchy: "        return P * ufl.transpose(F) / J\n",
     second: "        return ufl.inv(F) * P\n",
+    arrays: None,
 };
 
 fn function(called: Called) -> Cow<'static, str> {

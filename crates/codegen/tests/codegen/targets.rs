@@ -54,7 +54,9 @@ fn every_host_writes_or_says_which_function_it_lacks() {
                     );
                 }
                 Err(error) => {
-                    let Unwritable::Function { target, function, solution } = &error;
+                    let Unwritable::Function { target, function, solution } = &error else {
+                        panic!("{error}")
+                    };
                     assert_eq!((*target, solution), (host.name, &spec.name));
                     let message = error.to_string();
                     assert!(

@@ -31,11 +31,19 @@ pub(super) fn place(file: Source, index: usize) -> String {
 
 /// The points of a file: JSON where it begins as a list or an object does, else CSV.
 pub(super) fn read(file: Source, selection: &Selection) -> Result<Vec<Point>> {
-    let text = file.short_text(LONGEST)?;
     // Where nothing moves no time needs to be given.
-    let usual_time = selection.is_static().then_some(0.0);
+    read_with(file, selection.dimension(), selection.is_static().then_some(0.0))
+}
+
+/// Positions in `dimension` dimensions of a file of such points, whose times do not matter and may be left out.
+pub(crate) fn positions(file: Source, dimension: usize) -> Result<Vec<Vec<f64>>> {
+    Ok(read_with(file, dimension, Some(0.0))?.into_iter().map(|point| point.X).collect())
+}
+
+fn read_with(file: Source, dimension: usize, usual_time: Option<f64>) -> Result<Vec<Point>> {
+    let text = file.short_text(LONGEST)?;
     if !text.trim_start().starts_with(['[', '{']) {
-        return of_csv(&text, selection.dimension(), usual_time).with_context(|| file.to_string());
+        return of_csv(&text, dimension, usual_time).with_context(|| file.to_string());
     }
     let value: Value =
         serde_json::from_str(&text).with_context(|| format!("{file} is not valid JSON"))?;

@@ -1,0 +1,5 @@
+//! Readers of tables, and the functions of a file that take values from them: a module for each language.
+
+pub(super) mod c;
+pub(super) mod fortran;
+mod python;
