@@ -70,7 +70,10 @@ static void write(const std::array<std::array<double, N>, N> &matrix)
 int main()
 {
     constexpr int d = SPACE::Solution::dimension;
-    const SPACE::Solution s;
+    SPACE::Solution s;
+#ifdef TABLE
+    s.read_table(TABLE);
+#endif
     double n = 0;
     if (std::fread(&n, sizeof n, 1, stdin) != 1) {
         return 2;
@@ -90,6 +93,24 @@ int main()
         write(s.static_force(point, t));
         write(s.sigma(point, t));
         write(s.S(point, t));
+#ifdef TABLE
+        // Series have the same fields.
+        const auto series = s.series(point);
+        const auto b = s.b(point, t), of_series = series.b(t);
+        const auto internal = s.internal(point, t);
+        for (int i = 0; i < d; ++i) {
+            if (!(std::abs(b[i] - of_series[i]) <= 1e-12 * (1e4 + std::abs(b[i])))) {
+                std::fprintf(stderr, "b_%d of a series is %.17g, not %.17g\n", i, of_series[i], b[i]);
+                return 1;
+            }
+        }
+        for (std::size_t k = 0; k < internal.size(); ++k) {
+            if (!(std::abs(series.internal(t)[k] - internal[k]) <= 1e-9 + 1e-12 * std::abs(internal[k]))) {
+                return 1;
+            }
+        }
+        write(internal);
+#endif
 #ifdef DUALS
         // The derivatives of u are H.
         const auto H = s.H(point, t);
@@ -111,5 +132,17 @@ int main()
         }
 #endif
     }
+#ifdef TABLE
+    point[0] = s.b(point, 1.001 * s.end_of_table())[0];
+    if (point[0] == point[0]) {
+        std::fprintf(stderr, "a value after the end of the table\n");
+        return 1;
+    }
+    try {
+        s.read_table(HEADER);
+        return 1;
+    } catch (const std::runtime_error &) {
+    }
+#endif
     return 0;
 }

@@ -28,6 +28,8 @@ pub(crate) struct Item {
 pub(crate) enum Given {
     /// No arguments.
     Nothing,
+    /// A position.
+    Position,
     /// A position and a time.
     PositionAndTime,
 }
@@ -58,6 +60,11 @@ impl Item {
 }
 
 impl Code<'_> {
+    /// Whether the density depends on the place, so that there is a function `rho0` of it.
+    pub(crate) fn has_graded_density(&self) -> bool {
+        self.staged.density_here.is_some()
+    }
+
     /// The values of the stage of the parameters, at their defaults.
     pub(crate) fn fixed_values(&self) -> Vec<f64> {
         self.values(self.staged.fixed())
@@ -126,6 +133,12 @@ impl Code<'_> {
             constant("wave_speed", "the speed that CFL numbers refer to", &[constants.wave_speed]),
             constant("period", "the time in which the motion repeats", &[constants.period]),
         ]);
+        if let Some(density) = staged.density_here {
+            let about =
+                "mass per reference volume at a place; density has it in the middle of the body";
+            let given = Given::Position;
+            all.push(Item { given, ..constant("rho0", about, &[density]) });
+        }
         // A host that runs a stated law has its own constants for it.
         if let Law::Library(material) = &constants.law {
             let named = material.row().constants.iter().zip(material.values());

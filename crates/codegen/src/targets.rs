@@ -54,7 +54,7 @@ pub const HOSTS: &[Host] = &[
         name: "cpp",
         about: "a C++17 header for any scalar type, for MFEM, deal.II, smith, PETSc, GEOS",
         ending: ".hpp",
-        reads_tables: false,
+        reads_tables: true,
         write: cpp::source,
     },
     Host {
@@ -103,7 +103,7 @@ pub const HOSTS: &[Host] = &[
         name: "julia",
         about: "a Julia module, for Gridap, Ferrite, Trixi",
         ending: ".jl",
-        reads_tables: false,
+        reads_tables: true,
         write: julia::source,
     },
     Host {
@@ -117,7 +117,7 @@ pub const HOSTS: &[Host] = &[
         name: "openfoam",
         about: "OpenFOAM and solids4foam: coded source and boundary fragments that include the C header",
         ending: "_openfoam",
-        reads_tables: false,
+        reads_tables: true,
         write: openfoam::source,
     },
     Host {

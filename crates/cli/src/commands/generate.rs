@@ -30,13 +30,6 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
         }
     }
     refuse_what_does_not_fit(options, &spec, &found.file())?;
-    if spec.has_graded_density() {
-        bail!(
-            "{}: files of hosts have one density, and here it depends on the place; mms eval and the package for Python have b, force per \
-             mass, all the same",
-            found.file()
-        );
-    }
     let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let mut table = None;

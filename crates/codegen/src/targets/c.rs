@@ -94,7 +94,7 @@ impl Code<'_> {
                 };
                 format!("{lines}    s->par = *p;\n{fixed}{no_table}")
             }
-            "fields" => items(Given::PositionAndTime),
+            "fields" => items(Given::PositionAndTime) + &items(Given::Position),
             "constants" => items(Given::Nothing),
             "table_reader" | "table_member" | "read_table" | "series" if self.table.is_none() => {
                 String::new()
@@ -226,6 +226,7 @@ impl C {
         let joint = if result == name { ", " } else { ",\n    " };
         let (given, read) = match item.given {
             Given::Nothing => (String::new(), &["s"][..]),
+            Given::Position => (format!(", const double X[{d}]"), &["s", "X"][..]),
             Given::PositionAndTime => {
                 (format!(", const double X[{d}], double t"), &["s", "X", "t"][..])
             }

@@ -1,5 +1,6 @@
 //! C++17 source: a header for any scalar type.
 
+use super::tables;
 use crate::c_names::{c_name, members};
 use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
@@ -197,7 +198,8 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let remarks = REMARKS.replace("NAME", &space);
     let mut text = commented(&code.head_for_host(&remarks), "//", 118);
     text += &format!(
-        "#ifndef {guard}\n#define {guard} 1\n{SUPPORT}\nnamespace mms {{\nnamespace {space} {{\n\n"
+        "#ifndef {guard}\n#define {guard} 1\n{SUPPORT}{}\nnamespace mms {{\nnamespace {space} {{\n\n",
+        tables::cpp::reader(code)
     );
     // Beside the functions that argument-dependent look-up finds for types of a host.
     let library = [
@@ -231,10 +233,15 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         text += &format!("        fixed[{index}] = {value};\n");
     }
     text += "    }\n";
+    text += &tables::cpp::members(code);
     for item in code.functions() {
-        text += &cpp.item(code, &item);
+        text += &match item.of_table {
+            None => cpp.item(code, &item),
+            Some(of_table) => tables::cpp::item(code, &item, of_table),
+        };
     }
     let d = spec.dimension;
+    let density = if code.has_graded_density() { "rho0(X)" } else { "density()" };
     text += &format!(
         "
     // body force per unit reference volume
@@ -243,7 +250,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     {{
         auto force = b(X, t);
         for (auto &entry : force) {{
-            entry = density() * entry;
+            entry = {density} * entry;
         }}
         return force;
     }}
@@ -255,7 +262,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         auto force = b(X, t);
         const auto acceleration = a(X, t);
         for (int i = 0; i < {d}; ++i) {{
-            force[i] = density() * (force[i] - acceleration[i]);
+            force[i] = {density} * (force[i] - acceleration[i]);
         }}
         return force;
     }}
@@ -289,14 +296,15 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
 private:
     Parameters par;
     std::array<double, {}> fixed;
-}};
+{}}};
 
 }}  // namespace {space}
 }}  // namespace mms
 
 #endif  // {guard}
 ",
-        fixed.len().max(1)
+        fixed.len().max(1),
+        tables::cpp::private_members(code)
     );
     Ok(text)
 }
@@ -338,6 +346,7 @@ impl Cpp {
         let reads = |such: fn(Operand<'_>) -> bool| block.reads(such);
         let given = match item.given {
             Given::Nothing => String::new(),
+            Given::Position => "const Point &X".to_owned(),
             Given::PositionAndTime => {
                 let X = if reads(|o| matches!(o, Operand::Coordinate(_))) { "X" } else { "" };
                 let t = if reads(|o| matches!(o, Operand::Time)) { "t" } else { "" };
@@ -345,7 +354,7 @@ impl Cpp {
             }
         };
         let mut text = format!("\n    // {}\n", item.about);
-        if item.given == Given::PositionAndTime {
+        if item.given != Given::Nothing {
             text += "    template <class Point>\n";
         }
         text += &format!("    {returned} {name}({given}) const\n    {{\n");

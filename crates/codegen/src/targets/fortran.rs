@@ -244,6 +244,7 @@ impl Fortran {
                 Some(of_table) => tables::fortran::item(code, item, of_table),
             };
         }
+        let density = if code.has_graded_density() { "rho0(s, X)" } else { "density(s)" };
         text + &format!(
             "
   ! body force per unit reference volume
@@ -251,7 +252,7 @@ impl Fortran {
     type(solution), intent(in) :: s
     real(dp), intent(in) :: X({d}), t
     real(dp) :: values({d})
-    values = density(s) * b(s, X, t)
+    values = {density} * b(s, X, t)
   end function
 
   ! -Div P, the force per reference volume that holds the deformation of time t at rest
@@ -259,7 +260,7 @@ impl Fortran {
     type(solution), intent(in) :: s
     real(dp), intent(in) :: X({d}), t
     real(dp) :: values({d})
-    values = density(s) * (b(s, X, t) - a(s, X, t))
+    values = {density} * (b(s, X, t) - a(s, X, t))
   end function
 
   ! Cauchy stress
@@ -330,14 +331,17 @@ impl Fortran {
 
     fn item(&self, code: &Code<'_>, item: &Item) -> String {
         let (d, name) = (code.spec.dimension, &item.name);
-        let at_points = item.given == Given::PositionAndTime;
+        let (arguments, declared) = match item.given {
+            Given::Nothing => ("", ""),
+            Given::Position => (", X", ""),
+            Given::PositionAndTime => (", X, t", ", t"),
+        };
         let mut text = format!(
             "\n  ! {}\n  pure function {name}(s{}) result(values)\n    type(solution), intent(in) :: s\n",
-            item.about,
-            if at_points { ", X, t" } else { "" }
+            item.about, arguments
         );
-        if at_points {
-            text += &format!("    real(dp), intent(in) :: X({d}), t\n");
+        if item.given != Given::Nothing {
+            text += &format!("    real(dp), intent(in) :: X({d}){declared}\n");
         }
         text += &match item.shape {
             Shape::Scalar => "    real(dp) :: values\n".to_owned(),

@@ -1,5 +1,6 @@
 //! Julia source.
 
+use super::tables;
 use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
@@ -77,7 +78,7 @@ impl WithRuntime for Julia {
 }
 
 /// A string literal; a dollar sign would interpolate.
-fn string(text: &str) -> String {
+pub(super) fn string(text: &str) -> String {
     let mut literal = String::from("\"");
     for c in one_line(text).chars() {
         match c {
@@ -145,17 +146,22 @@ function Solution(given::Pair...)
         code.admitted(&Julia, "    ", (), &REFUSAL, |index| format!("s.par[{}]", index + 1));
     text += &lines;
     text += &format!("    return Solution(s.par, {})\nend\n", tuple(&fixed));
+    text += &tables::julia::reader(code);
     for item in code.functions() {
-        text += &julia_item(code, &item);
+        text += &match item.of_table {
+            None => julia_item(code, &item),
+            Some(of_table) => tables::julia::item(code, &item, of_table),
+        };
     }
     let d = spec.dimension;
+    let density = if code.has_graded_density() { "rho0(s, X)" } else { "density(s)" };
     text += &format!(
         "
 # body force per unit reference volume
-rho0_b(s, X, t) = density(s) .* b(s, X, t)
+rho0_b(s, X, t) = {density} .* b(s, X, t)
 
 # -Div P, the force per reference volume that holds the deformation of time t at rest
-static_force(s, X, t) = density(s) .* (b(s, X, t) .- a(s, X, t))
+static_force(s, X, t) = {density} .* (b(s, X, t) .- a(s, X, t))
 
 # Cauchy stress
 function sigma(s, X, t)
@@ -194,7 +200,11 @@ fn julia_routine(routine: &Routine) -> String {
 }
 
 fn julia_item(code: &Code<'_>, item: &Item) -> String {
-    let given = if item.given == Given::Nothing { "s" } else { "s, X, t" };
+    let given = match item.given {
+        Given::Nothing => "s",
+        Given::Position => "s, X",
+        Given::PositionAndTime => "s, X, t",
+    };
     let mut text = format!("\n# {}\nfunction {}({given})\n", item.about, item.name);
     let Written { lines, outputs } = Julia.block(&item.block(code), "    ", ());
     text += &lines;

@@ -144,9 +144,18 @@ impl Python {
                 Some(of_table) => self.item_of_table(code, &item, of_table),
             };
         }
-        text += "\n    def rho0_b(self, X, t):\n        # body force per unit reference volume\n        return self.density() * self.b(X, t)\n";
-        text += "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
-                 deformation of time t at rest\n        return self.density() * (self.b(X, t) - self.a(X, t))\n";
+        let density = match (code.has_graded_density(), &self.arrays) {
+            (false, _) => "self.density()",
+            (true, None) => "self.rho0(X)",
+            (true, Some(_)) => "self.rho0(X)[..., None]",
+        };
+        text += &format!(
+            "\n    def rho0_b(self, X, t):\n        # body force per unit reference volume\n        return {density} * self.b(X, t)\n"
+        );
+        text += &format!(
+            "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
+                 deformation of time t at rest\n        return {density} * (self.b(X, t) - self.a(X, t))\n"
+        );
         text += "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), self.J(X, t), self.P(X, t)\n";
         text += self.cauchy;
         text += "\n    def S(self, X, t):\n        # second Piola-Kirchhoff stress\n        F, P = self.F(X, t), self.P(X, t)\n";
@@ -170,7 +179,11 @@ impl Python {
     fn item(&self, code: &Code<'_>, item: &Item) -> String {
         // `lambda` is a word of Python.
         let name = if item.name == "lambda" { "lambda_" } else { &item.name };
-        let given = if item.given == Given::Nothing { "self" } else { "self, X, t" };
+        let given = match item.given {
+            Given::Nothing => "self",
+            Given::Position => "self, X",
+            Given::PositionAndTime => "self, X, t",
+        };
         let mut text = format!("\n    def {name}({given}):\n        # {}\n", item.about);
         let block = item.block(code);
         let reads = |such: fn(&Operand<'_>) -> bool| block.reads(|operand| such(&operand));
@@ -180,7 +193,7 @@ impl Python {
         if reads(|o| matches!(o, Operand::Kept(Stage::Fixed, _))) {
             text += "        fixed = self.fixed\n";
         }
-        if item.given == Given::PositionAndTime {
+        if item.given != Given::Nothing {
             let names: Vec<String> = (0..code.spec.dimension).map(|i| format!("X{i}")).collect();
             text += &format!("        {}, = _position(X, {})\n", names.join(", "), names.len());
         }
@@ -190,6 +203,7 @@ impl Python {
         text + &match (item.given, item.shape) {
             (Given::Nothing, Shape::Scalar) => format!("        return {entries}\n"),
             (Given::Nothing, _) => format!("        return [{entries}]\n"),
+            (Given::Position, _) => format!("        return _scalar(X0, 0.0, {entries})\n"),
             (_, Shape::Scalar) => format!("        return _scalar(X0, t, {entries})\n"),
             (_, Shape::Vector) => format!("        return _vector(X0, t, [{entries}])\n"),
             (_, Shape::Matrix) => {

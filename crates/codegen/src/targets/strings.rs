@@ -75,13 +75,18 @@ impl Strings {
                 .map_or(Vec::new(), |item| item.outputs().to_vec())
         };
         let (a, b) = (outputs("a"), outputs("b"));
-        for item in functions.iter().filter(|item| item.given == Given::PositionAndTime) {
+        // The density at the place, where it depends on it.
+        let graded = code.staged.density_here;
+        let with_density =
+            |slots: &[Slot]| -> Vec<Slot> { slots.iter().copied().chain(graded).collect() };
+        for item in functions.iter().filter(|item| item.given != Given::Nothing) {
             if item.name == "b" {
-                let scaled = |of: &[String]| format!("{density}*({})", of[0]);
-                let of = |i: usize| self.joined(code, &[b[i]], scaled);
+                let rho0 = |of: Option<&String>| of.cloned().unwrap_or_else(|| density.clone());
+                let scaled = |of: &[String]| format!("{}*({})", rho0(of.get(1)), of[0]);
+                let of = |i: usize| self.joined(code, &with_density(&[b[i]]), scaled);
                 all.push(field("rho0_b", "body force per unit reference volume", 1, b.len(), of)?);
-                let scaled = |of: &[String]| format!("{density}*({} - {})", of[0], of[1]);
-                let of = |i: usize| self.joined(code, &[b[i], a[i]], scaled);
+                let scaled = |of: &[String]| format!("{}*({} - {})", rho0(of.get(2)), of[0], of[1]);
+                let of = |i: usize| self.joined(code, &with_density(&[b[i], a[i]]), scaled);
                 let about = "-Div P, the force per unit reference volume that holds the deformation of a time still";
                 all.push(field("static_force", about, 1, b.len(), of)?);
             }
