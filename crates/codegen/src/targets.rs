@@ -40,7 +40,7 @@ pub const HOSTS: &[Host] = &[
         name: "rust",
         about: "a module for a crate that depends on mmsmith-runtime",
         ending: ".rs",
-        reads_tables: false,
+        reads_tables: true,
         write: |code| Ok(code.standalone_source()),
     },
     Host {

@@ -284,6 +284,14 @@ impl<const D: usize> Histories<D> {
         }
     }
 
+    /// The part that a table in a file may leave out: with less the values are no closer, since trajectories have errors as well.
+    pub(crate) fn tolerance_of_files(&self) -> f64 {
+        match self.law {
+            AnyLaw::Flow(_) => TABLE_TOLERANCE,
+            AnyLaw::Maxwell(_) | AnyLaw::Stated(_) => TABLE_TOLERANCE / 5.0,
+        }
+    }
+
     /// The kind of each quantity, in the order of [`in_frame`](Self::in_frame): components of one tensor are of one kind.
     fn kinds(&self) -> Vec<usize> {
         let mut stems: Vec<&str> = Vec::new();
@@ -473,7 +481,7 @@ impl<const D: usize> Histories<D> {
         if let Some(tables) = known().filter(|tables| tables.end >= end) {
             return Ok(tables);
         }
-        let tables = Arc::new(Tables::new(self, end)?);
+        let tables = Arc::new(Tables::new(self, end, TABLE_TOLERANCE)?);
         if let Ok(mut own) = self.tables.write() {
             *own = Some(Arc::clone(&tables));
         }
@@ -562,20 +570,25 @@ pub(crate) enum OverAxes {
 }
 
 impl<const D: usize> Tables<D> {
-    pub(crate) fn new(histories: &Histories<D>, end: f64) -> Result<Self, HistoryError> {
+    /// Tables until a time that leave out no more than a share of each quantity's largest value.
+    pub(crate) fn new(
+        histories: &Histories<D>,
+        end: f64,
+        tolerance: f64,
+    ) -> Result<Self, HistoryError> {
         if histories.has_front(end)? {
             return Ok(Self { table: None, end, error: f64::NAN });
         }
         match histories.axes.len() {
-            1 => Self::over::<1>(histories, end, OverAxes::One),
-            2 => Self::over::<2>(histories, end, OverAxes::Two),
-            _ => Self::over::<3>(histories, end, OverAxes::Three),
+            1 => Self::over::<1>(histories, [end, tolerance], OverAxes::One),
+            2 => Self::over::<2>(histories, [end, tolerance], OverAxes::Two),
+            _ => Self::over::<3>(histories, [end, tolerance], OverAxes::Three),
         }
     }
 
     fn over<const K: usize>(
         histories: &Histories<D>,
-        end: f64,
+        [end, tolerance]: [f64; 2],
         any: impl Fn(Table<K>) -> OverAxes,
     ) -> Result<Self, HistoryError> {
         let Histories { chart, axes, .. } = histories;
@@ -590,7 +603,7 @@ impl<const D: usize> Tables<D> {
             histories.in_frame(&histories.particle(chart.place(q)), times)
         };
         let kinds = histories.kinds();
-        let (table, error) = Table::<K>::fine_by_kinds(range, end, TABLE_TOLERANCE, &kinds, of)?;
+        let (table, error) = Table::<K>::fine_by_kinds(range, end, tolerance, &kinds, of)?;
         Ok(Self { table: (error <= LARGEST_ERROR).then(|| any(table)), end, error })
     }
 

@@ -152,7 +152,7 @@ impl TableFile {
             }
             (error, None)
         } else {
-            let tables = Tables::new(&histories, end)?;
+            let tables = Tables::new(&histories, end, histories.tolerance_of_files())?;
             let table = tables.table.as_ref().ok_or(TableFileError::Rough)?;
             measures(&mut content, D, [end, tables.error], &fields);
             let of = (&histories, spec.coordinates);

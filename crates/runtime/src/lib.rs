@@ -15,6 +15,7 @@
 
 mod domain;
 mod history;
+mod history_table;
 mod lattice;
 mod parameters;
 mod real;
@@ -23,6 +24,7 @@ mod staged;
 
 pub use domain::{Boundary, Condition, Domain, Surface};
 pub use history::HistoryReport;
+pub use history_table::{HistoryTable, PointSeries, TableError, TabulatedPoints};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
 /// Functions that the standard library lacks, which [`Real::apply`] takes.
 pub use libm;

@@ -4,6 +4,7 @@ mod language;
 mod parameters;
 mod solution;
 mod stages;
+mod tabulated;
 
 use self::language::{Translator, fill};
 use crate::code::Code;
@@ -94,6 +95,14 @@ impl Generator<'_> {
         let parameter_items = self.parameter_items(&parameters, &names.solution);
         let inherent = self.inherent_items(&solution, &parameters);
         let mut solution_items = self.solution_items();
+        if self.code.table.is_some() {
+            solution_items.extend(self.tabulated_items());
+            return self.all_items(
+                &names,
+                [parameter_items, inherent, solution_items],
+                &TokenStream::new(),
+            );
+        }
         let (body_force, time, point) = self.body_force_stages();
         let (state, state_time, velocity_time, state_point) = self.state_stages();
         let dimension = Literal::usize_unsuffixed(self.spec.dimension);
@@ -125,6 +134,36 @@ impl Generator<'_> {
                 )
             }
         });
+        let stages = quote! {
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<T: #runtime::Real> #runtime::BodyForceStages<T, #dimension, #time, #point> for #solution<T> {
+                #body_force
+            }
+
+            #lattice_items
+
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<T: #runtime::Real>
+                #runtime::StateStages<T, #dimension, #state_time, #velocity_time, #state_point> for #solution<T>
+            {
+                #state
+            }
+        };
+        self.all_items(&names, [parameter_items, inherent, solution_items], &stages)
+    }
+
+    /// The items of the file around those of stages, which solutions with a table do not have.
+    fn all_items(
+        &self,
+        names: &Names,
+        [parameter_items, inherent, solution_items]: [TokenStream; 3],
+        stages: &TokenStream,
+    ) -> TokenStream {
+        let runtime = self.runtime;
+        let solution = format_ident!("{}", names.solution);
+        let parameters = format_ident!("{}", names.parameters);
+        let dimension = Literal::usize_unsuffixed(self.spec.dimension);
+        let (table, _) = self.table_member();
         let count = Literal::usize_unsuffixed(self.staged.fixed_count());
         let variant =
             format_ident!("{}", ["One", "Two", "Three"][self.spec.dimension.clamp(1, 3) - 1]);
@@ -152,6 +191,7 @@ impl Generator<'_> {
                 parameters: #parameters<T>,
                 /// What depends on the parameters only.
                 fixed: [T; #count],
+                #table
             }
 
             #inherent
@@ -161,19 +201,7 @@ impl Generator<'_> {
                 #solution_items
             }
 
-            #[allow(unused_variables, clippy::all, clippy::pedantic)]
-            impl<T: #runtime::Real> #runtime::BodyForceStages<T, #dimension, #time, #point> for #solution<T> {
-                #body_force
-            }
-
-            #lattice_items
-
-            #[allow(unused_variables, clippy::all, clippy::pedantic)]
-            impl<T: #runtime::Real>
-                #runtime::StateStages<T, #dimension, #state_time, #velocity_time, #state_point> for #solution<T>
-            {
-                #state
-            }
+            #stages
 
             impl<T: #runtime::Real> From<#solution<T>> for #runtime::AnySolution<T> {
                 fn from(solution: #solution<T>) -> Self {

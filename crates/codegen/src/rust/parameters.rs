@@ -51,7 +51,11 @@ impl Generator<'_> {
         let dimension = Literal::usize_unsuffixed(spec.dimension);
         let specification = &spec.source;
         let entries = spec.parameters.iter().map(|p| {
-            let (name, unit, range) = (&p.name, one_line(&p.unit), one_line(&p.range));
+            let (name, unit) = (&p.name, one_line(&p.unit));
+            let range = match &self.code.table {
+                None => one_line(&p.range),
+                Some(_) => format!("{}, for which the table holds", p.default),
+            };
             let description = one_line(&p.description);
             let default = float(p.default);
             quote! {
@@ -72,7 +76,9 @@ impl Generator<'_> {
                 let limit = float(bound.limit);
                 quote!(&& value #sign #limit)
             });
-            quote!(value.is_finite() #(#bounds)*)
+            let held = float(p.default);
+            let held = self.code.table.as_ref().map(|_| quote!(&& value == #held));
+            quote!(value.is_finite() #(#bounds)* #held)
         });
 
         let translator = Translator::new("parameters", names.clone(), self.runtime, self.blocks);
@@ -89,6 +95,8 @@ impl Generator<'_> {
                 }
             });
         let count = Literal::usize_unsuffixed(names.len());
+        let (_, no_table) = self.table_member();
+        let table_items = self.table_items();
         quote! {
             #[allow(unused_variables, clippy::all, clippy::pedantic)]
             impl<T: #runtime::Real> #solution<T> {
@@ -118,7 +126,7 @@ impl Generator<'_> {
                     )*
                     #statements
                     #(#requirements)*
-                    Ok(#solution { parameters, fixed: [#(#fixed_values,)*] })
+                    Ok(#solution { parameters, fixed: [#(#fixed_values,)*], #no_table })
                 }
 
                 /// The solution with parameter values in the order of the description; missing ones take their
@@ -136,6 +144,8 @@ impl Generator<'_> {
                     )*
                     Self::new(parameters)
                 }
+
+                #table_items
 
                 /// The parameters.
                 #[must_use]

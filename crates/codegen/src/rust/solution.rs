@@ -19,6 +19,10 @@ impl Generator<'_> {
         let matrix = quote!(#runtime::nalgebra::SMatrix<T, #n, #n>);
         let mut items = TokenStream::new();
         for field in &self.staged.fields {
+            if let Some(of_table) = self.tabulated_field(field.name) {
+                items.extend(of_table);
+                continue;
+            }
             let method = format_ident!("{}", field.name.in_code());
             let block = self.staged.after_parameters(&field.outputs);
             let (statements, values) = self.translator.statements(&block);
@@ -45,10 +49,13 @@ impl Generator<'_> {
             .map(|field| {
                 let (own, rest) = values.split_at(field.outputs.len());
                 values = rest;
-                let (letter, value) = (
-                    format_ident!("{}", field.name.letter()),
-                    self.shaped(field.name.shape(), own),
-                );
+                let letter = format_ident!("{}", field.name.letter());
+                let value = if self.code.is_tabulated(field.name) {
+                    let method = format_ident!("{}", field.name.in_code());
+                    quote!(#runtime::Solution::<T, #n>::#method(self, X, t))
+                } else {
+                    self.shaped(field.name.shape(), own)
+                };
                 quote!(#letter: #value)
             })
             .collect();
@@ -69,7 +76,10 @@ impl Generator<'_> {
                 }
             });
         }
-        items.extend(self.traction());
+        if self.code.table.is_none() {
+            items.extend(self.traction());
+        }
+        items.extend(self.density_at());
         let constants = &self.staged.constants;
         let [cell_length, density, wave_speed, period] =
             [constants.cell_length, constants.density, constants.wave_speed, constants.period]
