@@ -26,7 +26,7 @@
 //!     per_cell: 2,
 //!     layout: Layout::Lattice,
 //! };
-//! let scheme = Scheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4, volume: Volume::Pointwise };
+//! let scheme = Scheme { degree: 3, mass: MassMatrix::Consistent, composition: Composition::Order4 };
 //! let material = Material::NeoHookean { lambda: 5769.0, mu: 3846.0 };
 //! let mut bar = TotalLagrangian::new(grid, scheme, material, 1.0, 4e-4)?;
 //! let v: Vec<_> = bar.positions().iter().map(|X| X.map(|x| (std::f64::consts::PI * x).sin())).collect();
@@ -61,7 +61,6 @@ pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use coordinates::Coordinates;
 pub use linearised::{Disturbed, Magnitude};
-pub use mmsmith_laws::Volume;
 pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;

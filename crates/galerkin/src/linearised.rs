@@ -18,7 +18,7 @@
 use std::array;
 
 use mmsmith_laws::{
-    BLOCK, BlockOfStresses, BlockWithMemory, InternalVariable, Law, SIDE_BY_SIDE, Stressed, Volume,
+    BLOCK, BlockOfStresses, BlockWithMemory, InternalVariable, Law, SIDE_BY_SIDE, Stressed,
 };
 use mmsmith_mpm::SetupError;
 use nalgebra::{SMatrix, SVector};
@@ -189,8 +189,7 @@ where
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         let (mass, composition) = (MassMatrix::Consistent, Composition::Order2);
-        let volume = Volume::Pointwise;
-        check(grid, &Scheme { degree, mass, composition, volume }, density, 1.0)?;
+        check(grid, &Scheme { degree, mass, composition }, density, 1.0)?;
         let lines: [Line; D] = array::from_fn(|k| line(grid, k));
         let (mut bases, mut masses) = (Vec::with_capacity(D), Vec::with_capacity(D));
         let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };

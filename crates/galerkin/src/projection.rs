@@ -92,10 +92,4 @@ impl<const D: usize> Projection<D> {
             inner *= bases[k].points;
         }
     }
-
-    /// The numbers that it holds.
-    #[cfg(test)]
-    pub(super) fn held(&self) -> usize {
-        self.layers.iter().map(Vec::len).sum::<usize>() + self.coefficients.len()
-    }
 }

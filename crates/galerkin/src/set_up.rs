@@ -2,7 +2,6 @@
 
 use std::array;
 
-use mmsmith_laws::Volume;
 use mmsmith_mpm::{Particles, SetupError};
 use nalgebra::{SMatrix, SVector};
 
@@ -44,8 +43,6 @@ pub struct Scheme {
     pub mass: MassMatrix,
     /// The integration in time.
     pub composition: Composition,
-    /// How the change of volume enters the stress.
-    pub volume: Volume,
 }
 
 /// The particles along an axis.

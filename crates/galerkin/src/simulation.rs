@@ -8,8 +8,7 @@ use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
-    AnyLaw, InternalVariable, Law, Material, NeoHookean, NeoHookeanNoLog, ProjectedVolume,
-    Stressed, Volume,
+    AnyLaw, InternalVariable, Law, LawWithMemory, Material, NeoHookean, NeoHookeanNoLog,
 };
 use mmsmith_mpm::BodyForce;
 use mmsmith_mpm::Particles;
@@ -63,10 +62,7 @@ pub struct TotalLagrangian<const D: usize> {
     planted: Planted,
 }
 
-impl<const D: usize> TotalLagrangian<D>
-where
-    f64: Stressed<D>,
-{
+impl<const D: usize> TotalLagrangian<D> {
     /// Sets up a body at rest and undeformed, of density `density` per reference volume, at time 0.
     ///
     /// Stages of compositions of higher order go back in time, where internal variables of a law with memory cannot follow: with such a
@@ -84,12 +80,14 @@ where
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         let law = law.into();
-        let mut scheme = scheme;
-        if !law.variables().is_empty() {
+        let (variables, mut scheme) = (law.variables(), scheme);
+        let of_projection = match &law {
+            Law::WithMemory(law) if law.is_projected() => Some(law.clone()),
+            Law::WithMemory(_) | Law::Library(_) | Law::Own(_) => None,
+        };
+        if !variables.is_empty() && of_projection.is_none() {
             scheme.composition = Composition::Order2;
         }
-        let (law, of_projection) = with_volume(law, scheme.volume)?;
-        let variables = law.variables();
         check(&grid, &scheme, density, time_step)?;
         reserve(&grid, scheme.degree, variables.len())?;
         let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
@@ -596,7 +594,7 @@ where
         let found = scaled.chunks_mut(size).zip(of.values().chunks_mut(size));
         let states = remembered.chunks(size).zip(theta.chunks(size));
         each(states.zip(found).collect(), &|((F, theta), (scaled, mean))| {
-            law.evaluate(F, theta, scaled, mean);
+            law.evaluate_projected(F, theta, scaled, mean);
         });
         // The stress of a particle is that of the law: its own mean stress is nearer to the exact one than the projected one, which the
         // forces need.
@@ -693,31 +691,12 @@ where
 /// The projection of the change of volume, and the law that takes it.
 #[derive(Clone, Debug)]
 struct ProjectedChange<const D: usize> {
-    law: Arc<ProjectedVolume<f64, D>>,
+    law: Arc<dyn LawWithMemory<f64, D>>,
     of: Projection<D>,
     /// The projected change of volume of each particle.
     theta: Vec<f64>,
-    /// The law's stress at the deformation gradient with this change, as [`ProjectedVolume::evaluate`] gives it.
+    /// The law's stress at the deformation gradient with this change.
     scaled: Vec<SMatrix<f64, D, D>>,
-}
-
-/// The law of a solver, and where it takes a projected change of volume that law as such.
-#[allow(clippy::type_complexity)]
-fn with_volume<const D: usize>(
-    law: Law<f64, D>,
-    volume: Volume,
-) -> Result<(Law<f64, D>, Option<Arc<ProjectedVolume<f64, D>>>), SetupError>
-where
-    f64: Stressed<D>,
-{
-    match volume {
-        Volume::Pointwise => Ok((law, None)),
-        Volume::Projected => {
-            let own = ProjectedVolume::new(law).ok_or(SetupError::ProjectedMemory)?;
-            let own = Arc::new(own);
-            Ok((Law::WithMemory(own.clone()), Some(own)))
-        }
-    }
 }
 
 /// The internal variables of particles at time zero, those of a particle one after the other.
@@ -801,21 +780,14 @@ mod tests {
             ends: [[End; 2]; D],
             per_cell: usize,
             degree: usize,
-        ) where
-            f64: Stressed<D>,
-        {
+        ) {
             let axes: [Axis; D] = array::from_fn(|k| {
                 let (lower, upper) = (0.5, 1.0 + 0.5 * k as f64);
                 Axis { lower, upper, cells: cells[k], ends: ends[k] }
             });
             let grid: Grid<D> = Grid { axes, coordinates, per_cell, layout: Layout::Gauss };
             let composition = Composition::Order2;
-            let scheme = Scheme {
-                degree,
-                mass: MassMatrix::Consistent,
-                composition,
-                volume: Volume::Pointwise,
-            };
+            let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition };
             let expected = doubles(&grid, degree);
             let law = Material::NeoHookean { lambda: 6.0, mu: 4.0 };
             let mut body = TotalLagrangian::new(grid, scheme, law, 1.0, 1e-6).unwrap();

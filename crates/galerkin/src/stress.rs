@@ -6,7 +6,7 @@ use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
     BLOCK, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory,
-    LibraryLaw, ProjectedVolume, Stressed,
+    LibraryLaw, projected_stress,
 };
 use mmsmith_mpm::{BodyForce, Particles};
 use nalgebra::{SMatrix, SVector};
@@ -227,18 +227,15 @@ impl<const D: usize> LawOfRows<D> for MemoryRows<'_, D> {
     }
 }
 
-/// A law with a projected change of volume, evaluated before, see [`ProjectedVolume::stress`].
+/// A law with a projected change of volume, evaluated before, see [`projected_stress`].
 pub(super) struct ProjectedRows<'a, const D: usize> {
-    /// The stress of each particle, as [`ProjectedVolume::evaluate`] gives it.
+    /// The stress of each particle, as [`LawWithMemory::evaluate_projected`] gives it.
     pub(super) scaled: &'a [SMatrix<f64, D, D>],
     /// The projected mean stress of each particle.
     pub(super) p: &'a [f64],
 }
 
-impl<const D: usize> LawOfRows<D> for ProjectedRows<'_, D>
-where
-    f64: Stressed<D>,
-{
+impl<const D: usize> LawOfRows<D> for ProjectedRows<'_, D> {
     fn stresses(&self, row: &mut RowOfPlaces<'_, '_, D>) {
         let frame = row.at.map(|at| at.frame);
         for i in 0..row.volume.len() {
@@ -246,8 +243,8 @@ where
             let place = row.first + row.start + i;
             let (scaled, p) = (&self.scaled[place], self.p[place]);
             let P = match frame {
-                None => ProjectedVolume::stress(&F, scaled, p),
-                Some(Q) => ProjectedVolume::stress(&F, &(Q.transpose() * scaled * Q), p),
+                None => projected_stress(&F, scaled, p),
+                Some(Q) => projected_stress(&F, &(Q.transpose() * scaled * Q), p),
             };
             row.set_stress(i, &F, P);
         }

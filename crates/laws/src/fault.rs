@@ -5,7 +5,7 @@
 //! [`Planted`] has no size, and all its questions are constants.
 
 use mmsmith_lanes::tensor::{determinant, inverse_transpose};
-use mmsmith_vocabulary::Material;
+use mmsmith_vocabulary::{Flow, Material};
 use nalgebra::{RealField, SMatrix, SVector};
 
 /// The mistake.
@@ -135,6 +135,30 @@ pub enum Fault {
     RelaxationTime,
     /// Maxwell elements: stresses that decay, and take up no change of shape.
     ShareDropped,
+    /// Flow by von Mises: the plastic strain advanced by the multiplier, without the root of two thirds.
+    PlasticStrainRoot,
+    /// Flow by von Mises: the multiplier of a material that does not harden.
+    MultiplierWithoutHardening,
+    /// Flow by von Mises: linear hardening for that of a power.
+    HardeningExponent,
+    /// Flow by von Mises: the shear strain of flow left out of the trial state.
+    TrialShearDropped,
+    /// Flow beyond the yield stress: half of its time.
+    OverstressTime,
+    /// Flow beyond the yield stress: the overstress to the power one.
+    OverstressExponent,
+    /// Flow beyond the yield stress: the drag for its double.
+    OverstressDrag,
+    /// Maxwell elements: only the first one counts.
+    LastElementsDropped,
+    /// Maxwell elements: shares of the whole stress, that of changes of volume too.
+    ShareOfPressure,
+    /// Maxwell elements: stresses that never decay.
+    DecayDropped,
+    /// Maxwell elements: beside an elastic law that keeps their shares.
+    ShareTwice,
+    /// Maxwell elements: second Piola-Kirchhoff stresses added to first ones.
+    PushForwardDropped,
     /// Projected volume: each particle's own J for the projected one.
     JacobianForTheta,
     /// Projected volume: projections that count all particles alike, whatever their volumes.
@@ -293,6 +317,27 @@ impl Planted {
 const _: () = assert!(size_of::<Planted>() == 0, "a normal build carries nothing");
 
 impl Planted {
+    /// The flow of a law as its steps take it.
+    #[inline(always)]
+    #[must_use]
+    pub fn flow(self, mut flow: Flow<f64>) -> Flow<f64> {
+        if self.is(Fault::HardeningExponent) {
+            flow.exponent = 1.0;
+        }
+        if let Some(overstress) = &mut flow.overstress {
+            if self.is(Fault::OverstressTime) {
+                overstress.time *= 0.5;
+            }
+            if self.is(Fault::OverstressExponent) {
+                overstress.exponent = 1.0;
+            }
+            if self.is(Fault::OverstressDrag) {
+                overstress.drag *= 2.0;
+            }
+        }
+        flow
+    }
+
     /// The Kirchhoff stress as it enters the forces.
     #[inline(always)]
     pub fn stress_in_forces<T: RealField + Copy, const D: usize>(

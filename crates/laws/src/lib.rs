@@ -44,7 +44,7 @@ pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volume
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub use plastic::{Plastic, ReturnMap};
-pub use projected::{ProjectedVolume, Volume};
+pub use projected::{ProjectedVolume, Volume, projected_stress};
 
 use crate::fault::Planted;
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};

@@ -96,8 +96,16 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
         false
     }
 
-    /// Writes the mean stresses of particles with these deformation gradients and projected changes of volume, where these are projected.
-    fn mean_stresses(&self, _F: &[SMatrix<T, D, D>], _theta: &[T], _mean: &mut [T]) {}
+    /// Where changes of volume are projected: writes the stress and the mean stress of each particle at its deformation gradient with the
+    /// projected change of volume, as [`ProjectedVolume`](crate::ProjectedVolume) has them.
+    fn evaluate_projected(
+        &self,
+        _F: &[SMatrix<T, D, D>],
+        _theta: &[T],
+        _scaled: &mut [SMatrix<T, D, D>],
+        _mean: &mut [T],
+    ) {
+    }
 
     /// The normal Kirchhoff stress of a particle along the axes that F leaves out, where the stretch is one; `None` where it is not known.
     fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>, _q: &[T]) -> Option<T> {

@@ -51,7 +51,8 @@ impl Plastic {
     /// With Lame's constants of the elastic part, which are pressures.
     #[must_use]
     pub fn new(lambda: f64, mu: f64, flow: Flow<f64>, map: ReturnMap) -> Self {
-        Self { lambda, law: Yield { mu, flow, planted: Planted::here() }, map }
+        let planted = Planted::here();
+        Self { lambda, law: Yield { mu, flow: planted.flow(flow), planted }, map }
     }
 
     /// `G` at the start: the identity, or that of the elastic stretch that brings the body onto the yield surface.
@@ -225,7 +226,8 @@ fn trials<T: RealField + Copy, const D: usize>(
 ) {
     for n in 0..BLOCK {
         let across = if planted.is(Fault::AcrossDropped) { 1.0 } else { double(g33[n]) };
-        let G = Sym { a: [double(g11[n]), double(g22[n])], shear: double(g12[n]), across };
+        let shear = if planted.is(Fault::TrialShearDropped) { 0.0 } else { double(g12[n]) };
+        let G = Sym { a: [double(g11[n]), double(g22[n])], shear, across };
         elastic.set(n, &Elastic::new(&row(F, n), &G));
     }
 }

@@ -14,7 +14,7 @@
 
 use mmsmith_lanes::tensor::{determinant, inverse_transpose, real};
 use mmsmith_vocabulary::Material;
-use nalgebra::SMatrix;
+use nalgebra::{RealField, SMatrix};
 
 use crate::fault::{Fault, Planted};
 use crate::memory::{Increment, InternalVariable, LawWithMemory, of_particle, set_stress};
@@ -30,7 +30,8 @@ pub enum Volume {
     Projected,
 }
 
-/// An elastic law with a projected change of volume. Its two internal variables are `theta` and `p` above; the solver sets them, and they do
+/// An elastic law with a projected change of volume. [`evaluate_projected`](LawWithMemory::evaluate_projected) writes
+/// `(theta/J)^(1/D) Pb` and the mean stress `(Pb : Fb)/(D theta)`. Its two internal variables are `theta` and `p` above; the solver sets them, and they do
 /// not evolve.
 #[derive(Clone, Debug)]
 pub struct ProjectedVolume<T, const D: usize> {
@@ -53,44 +54,6 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
     #[must_use]
     pub fn law(&self) -> &Law<T, D> {
         &self.law
-    }
-
-    /// Evaluates the law at the deformation gradients with projected changes of volume: writes `(theta/J)^(1/D) Pb` of each particle, and
-    /// its mean stress `(Pb : Fb)/(D theta)`.
-    pub fn evaluate(
-        &self,
-        F: &[SMatrix<T, D, D>],
-        theta: &[T],
-        scaled: &mut [SMatrix<T, D, D>],
-        mean: &mut [T],
-    ) {
-        let blocks = F.chunks(BLOCK).zip(theta.chunks(BLOCK));
-        let found = scaled.chunks_mut(BLOCK).zip(mean.chunks_mut(BLOCK));
-        for ((F, theta), (scaled, mean)) in blocks.zip(found) {
-            let mut block = [[[T::zero(); BLOCK]; D]; D];
-            let mut of_block = [T::one(); BLOCK];
-            for n in 0..BLOCK {
-                // The last particle fills the block.
-                let own = n.min(F.len() - 1);
-                of_block[n] = theta[own];
-                set_stress(&mut block, n, &F[own]);
-            }
-            let mut stress = [[[T::zero(); BLOCK]; D]; D];
-            let ratios = self.stresses(&block, &of_block, &mut stress);
-            for (n, (scaled, mean)) in scaled.iter_mut().zip(mean).enumerate() {
-                *scaled = of_particle(&stress, n) * ratios[n];
-                *mean = scaled.dot(&F[n]) / (theta[n] * real(D as f64));
-            }
-        }
-    }
-
-    /// The stress of a particle from its deformation gradient, what [`evaluate`](Self::evaluate) gave, and its projected mean stress.
-    #[inline(always)]
-    #[must_use]
-    pub fn stress(F: &SMatrix<T, D, D>, scaled: &SMatrix<T, D, D>, p: T) -> SMatrix<T, D, D> {
-        let J = determinant(F);
-        let mean = scaled.dot(F) / real(D as f64);
-        scaled - inverse_transpose(F, J) * (mean - p * J)
     }
 
     /// Stresses `Pb`, and `(theta/J)^(1/D)`.
@@ -152,7 +115,7 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
         let ratios = self.stresses(F, theta, &mut stress);
         for (n, ratio) in ratios.iter().enumerate() {
             let scaled = of_particle(&stress, n) * *ratio;
-            set_stress(P, n, &Self::stress(&of_particle(F, n), &scaled, p[n]));
+            set_stress(P, n, &projected_stress(&of_particle(F, n), &scaled, p[n]));
         }
     }
 
@@ -162,9 +125,31 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
         true
     }
 
-    fn mean_stresses(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
-        let mut scaled = vec![SMatrix::zeros(); F.len()];
-        self.evaluate(F, theta, &mut scaled, mean);
+    fn evaluate_projected(
+        &self,
+        F: &[SMatrix<T, D, D>],
+        theta: &[T],
+        scaled: &mut [SMatrix<T, D, D>],
+        mean: &mut [T],
+    ) {
+        let blocks = F.chunks(BLOCK).zip(theta.chunks(BLOCK));
+        let found = scaled.chunks_mut(BLOCK).zip(mean.chunks_mut(BLOCK));
+        for ((F, theta), (scaled, mean)) in blocks.zip(found) {
+            let mut block = [[[T::zero(); BLOCK]; D]; D];
+            let mut of_block = [T::one(); BLOCK];
+            for n in 0..BLOCK {
+                // The last particle fills the block.
+                let own = n.min(F.len() - 1);
+                of_block[n] = theta[own];
+                set_stress(&mut block, n, &F[own]);
+            }
+            let mut stress = [[[T::zero(); BLOCK]; D]; D];
+            let ratios = self.stresses(&block, &of_block, &mut stress);
+            for (n, (scaled, mean)) in scaled.iter_mut().zip(mean).enumerate() {
+                *scaled = of_particle(&stress, n) * ratios[n];
+                *mean = scaled.dot(&F[n]) / (theta[n] * real(D as f64));
+            }
+        }
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
@@ -179,4 +164,17 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
             Law::Own(_) | Law::WithMemory(_) => None,
         }
     }
+}
+
+/// The stress of a particle from its deformation gradient, what [`LawWithMemory::evaluate_projected`] gave, and its projected mean stress.
+#[inline(always)]
+#[must_use]
+pub fn projected_stress<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+    scaled: &SMatrix<T, D, D>,
+    p: T,
+) -> SMatrix<T, D, D> {
+    let J = determinant(F);
+    let mean = scaled.dot(F) / real(D as f64);
+    scaled - inverse_transpose(F, J) * (mean - p * J)
 }

@@ -40,7 +40,13 @@ impl<T: Copy + nalgebra::RealField> Viscoelastic<T> {
             }
             _ => return None,
         };
-        Some(Self { elastic, isochoric, is_linear, elements, planted: Planted::here() })
+        let planted = Planted::here();
+        let mut elements = elements;
+        if planted.is(Fault::LastElementsDropped) {
+            elements.truncate(1);
+        }
+        let isochoric = if planted.is(Fault::ShareOfPressure) { elastic } else { isochoric };
+        Some(Self { elastic, isochoric, is_linear, elements, planted })
     }
 
     /// The sum of the elements' shares.
@@ -78,7 +84,8 @@ impl<T: Copy + nalgebra::RealField> Viscoelastic<T> {
                 }
             }
         }
-        if self.is_linear { sum } else { product(F, &sum) }
+        let is_pushed = !self.is_linear && !self.planted.is(Fault::PushForwardDropped);
+        if is_pushed { product(F, &sum) } else { sum }
     }
 }
 
@@ -125,7 +132,9 @@ impl<T: Stressed<D> + Stressed<3>, const D: usize> LawWithMemory<T, D> for Visco
             let F = of_particle(F, n);
             let mut sum = stress(&self.elastic, &F);
             if !self.planted.is(Fault::ElasticPartAlone) {
-                sum -= stress(&self.isochoric, &F) * share;
+                if !self.planted.is(Fault::ShareTwice) {
+                    sum -= stress(&self.isochoric, &F) * share;
+                }
                 sum += self.of_elements(&F, |k| q[k][n]);
             }
             set_stress(P, n, &sum);
@@ -142,7 +151,9 @@ impl<T: Stressed<D> + Stressed<3>, const D: usize> LawWithMemory<T, D> for Visco
                 let half = (-time * real(0.5 * hurry) / element.time).exp();
                 let share =
                     if self.planted.is(Fault::ShareDropped) { T::zero() } else { element.share };
-                [half * half, half * share]
+                let decay =
+                    if self.planted.is(Fault::DecayDropped) { T::one() } else { half * half };
+                [decay, half * share]
             })
             .collect();
         for n in 0..BLOCK {

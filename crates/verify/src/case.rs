@@ -1,8 +1,8 @@
 //! The settings of one simulation.
 
-use mmsmith_laws::{ReturnMap, Stressed, Volume, with_memory};
+use mmsmith_laws::{ReturnMap, Stressed, Volume, with_memory, with_projected_volume};
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{Integrator, Law, Material, Shape};
+use mmsmith_mpm::{Integrator, Law, Material, SetupError, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
 use mmsmith_stated_law::Compiled;
 
@@ -216,6 +216,18 @@ pub(crate) fn law<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: us
     law: mmsmith_runtime::Law<T>,
 ) -> Result<Law<T, D>, SceneError> {
     law_by(law, ReturnMap::default())
+}
+
+/// The solver's own law for a solution's, as a case asks for it.
+pub(crate) fn law_of<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: usize>(
+    law: mmsmith_runtime::Law<T>,
+    case: &Case,
+) -> Result<Law<T, D>, CaseError> {
+    let law = law_by(law, case.return_map.unwrap_or_default())?;
+    match case.volume {
+        Volume::Pointwise => Ok(law),
+        Volume::Projected => Ok(with_projected_volume(law).ok_or(SetupError::ProjectedMemory)?),
+    }
 }
 
 /// The solver's own law for a solution's.

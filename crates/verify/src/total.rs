@@ -10,7 +10,7 @@ use mmsmith_runtime::{AnySolution, Condition, Domain, Law, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use crate::case::{Case, CflSpeed, Extent, law_by, two_digits};
+use crate::case::{Case, CflSpeed, Extent, law_of, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::kept_stress::KeptStress;
@@ -278,8 +278,8 @@ where
     }
     let set_up = SetUp {
         grid: total.grid(scene, case.per_cell)?,
-        scheme: Scheme { degree, mass, composition, volume: case.volume },
-        law: law_by(exact.law(), case.return_map.unwrap_or_default())?,
+        scheme: Scheme { degree, mass, composition },
+        law: law_of(exact.law(), case)?,
         density: exact.density(),
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],

@@ -5,16 +5,14 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
-use mmsmith_laws::{Volume, with_projected_volume};
 use mmsmith_mpm::{
-    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, SetupError, Shape, Share,
-    Solver,
+    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share, Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
 use nalgebra::SVector;
 
-use crate::case::{Case, Extent, law_by};
+use crate::case::{Case, Extent, law_of};
 use crate::error::{CaseError, SceneError};
 use crate::precision::Precision;
 use crate::scene::Scene;
@@ -221,11 +219,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_density(&mut body.particles, exact);
-    let law = law_by::<T, D>(model.law(), case.return_map.unwrap_or_default())?;
-    let law = match case.volume {
-        Volume::Pointwise => law,
-        Volume::Projected => with_projected_volume(law).ok_or(SetupError::ProjectedMemory)?,
-    };
+    let law = law_of::<T, D>(model.law(), case)?;
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());
     if let Some(Mesh { X, x, .. }) = &mut body.mesh {

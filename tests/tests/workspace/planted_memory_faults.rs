@@ -5,8 +5,8 @@
 
 use mmsmith_history::{AnyLaw, Dual, Kinematics, Number, Trajectory, divergence};
 use mmsmith_laws::{
-    BLOCK, Element, Flow, Increment, Law, Material, Memory, ReturnMap, Volumetric, WithMemory,
-    with_memory,
+    BLOCK, Element, Flow, Increment, Law, Material, Memory, Overstress, ReturnMap, Volumetric,
+    WithMemory, with_memory,
 };
 use mmsmith_mpm::fault::{self, Fault};
 use nalgebra::Matrix3;
@@ -87,13 +87,39 @@ fn faults_of_plastic_flow_are_caught() {
         Fault::PlasticStrainStays,
         Fault::AcrossDropped,
         Fault::ElasticPartAlone,
+        Fault::PlasticStrainRoot,
+        Fault::MultiplierWithoutHardening,
+        Fault::TrialShearDropped,
     ];
     all_are_caught(&faults, &law);
 }
 
 #[test]
+fn faults_of_hardening_by_a_power_and_of_viscous_flow_are_caught() {
+    let flow = Flow {
+        yield_stress: 50.0,
+        modulus: 300.0,
+        exponent: 0.5,
+        overstress: None,
+        is_on_yield: false,
+    };
+    let viscous = Flow {
+        overstress: Some(Overstress { drag: 40.0, exponent: 2.0, time: 0.3 }),
+        exponent: 1.0,
+        ..flow
+    };
+    let law = |flow| WithMemory {
+        elastic: Material::Hencky { lambda: LAMBDA, mu: MU },
+        memory: Memory::Flow(flow),
+    };
+    all_are_caught(&[Fault::HardeningExponent], &law(flow));
+    let faults = [Fault::OverstressTime, Fault::OverstressExponent, Fault::OverstressDrag];
+    all_are_caught(&faults, &law(viscous));
+}
+
+#[test]
 fn faults_of_maxwell_elements_are_caught() {
-    let (share, time) = (0.4, 0.5);
+    let elements = [(0.4, 0.5), (0.2, 2.0)].map(|(share, time)| Element { share, time });
     let law = WithMemory {
         elastic: Material::Yeoh {
             c1: 0.5 * MU,
@@ -102,8 +128,17 @@ fn faults_of_maxwell_elements_are_caught() {
             kappa: LAMBDA,
             volumetric: Volumetric::Logarithmic,
         },
-        memory: Memory::Maxwell(vec![Element { share, time }]),
+        memory: Memory::Maxwell(elements.to_vec()),
     };
-    let faults = [Fault::RelaxationTime, Fault::ShareDropped, Fault::ElasticPartAlone];
+    let faults = [
+        Fault::RelaxationTime,
+        Fault::ShareDropped,
+        Fault::ElasticPartAlone,
+        Fault::LastElementsDropped,
+        Fault::ShareOfPressure,
+        Fault::DecayDropped,
+        Fault::ShareTwice,
+        Fault::PushForwardDropped,
+    ];
     all_are_caught(&faults, &law);
 }

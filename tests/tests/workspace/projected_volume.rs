@@ -18,8 +18,7 @@ fn solution(name: &str, overrides: &[(&str, f64)]) -> AnySolution<f64> {
 /// Its run, which has to reach the end.
 fn run(exact: &AnySolution<f64>, case: &Case) -> Row {
     let sweep = Sweep::Cells(vec![case.cells]);
-    let mut rows =
-        converge(exact, Arithmetic::Double, case, &sweep, &mut |_| ()).unwrap().rows;
+    let mut rows = converge(exact, Arithmetic::Double, case, &sweep, &mut |_| ()).unwrap().rows;
     let row = rows.remove(0);
     assert_eq!(row.status, Status::Ok, "{row:?}");
     row
@@ -60,7 +59,10 @@ fn a_motion_that_keeps_the_volume_has_the_errors_of_a_compressible_body() {
         let [u, P] = errors(&far, &pointwise);
         let [near_u, near_P] = errors(&near, &projected);
         let [_, locked_P] = errors(&near, &pointwise);
-        assert!(near_u < 2.0 * u && near_P < 3.0 * P, "{degree}: {u:e} {P:e}, {near_u:e} {near_P:e}");
+        assert!(
+            near_u < 2.0 * u && near_P < 3.0 * P,
+            "{degree}: {u:e} {P:e}, {near_u:e} {near_P:e}"
+        );
         assert!(locked_P > 20.0 * near_P, "{degree}: {locked_P:e} without, {near_P:e} with");
     }
 }
@@ -70,7 +72,8 @@ fn a_motion_that_keeps_the_volume_has_the_errors_of_a_compressible_body() {
 fn transfers_project_volumes_in_the_updated_formulation() {
     let [far, near] = [0.3, NEAR].map(|nu| solution("swirl", &[("nu", nu), ("A", 0.01)]));
     for shape in ["gimp", "bspline2", "cpdi"] {
-        let scheme = Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
+        let scheme =
+            Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
         let pointwise = Case { scheme, cells: 16, periods: 0.05, ..Case::default() };
         let projected = Case { volume: Volume::Projected, ..pointwise };
         let [u, _] = errors(&far, &pointwise);

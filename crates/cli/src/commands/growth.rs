@@ -2,8 +2,8 @@
 
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    A_DIGIT, Extremes, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH, Volume,
-    extremes_of, growth, harmful_growth, lambda_over_mu,
+    A_DIGIT, Extremes, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,
+    Volume, extremes_of, growth, harmful_growth, lambda_over_mu,
 };
 use serde_json::{Map, Value, json};
 

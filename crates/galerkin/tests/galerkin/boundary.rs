@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_galerkin::Volume;
 use mmsmith_galerkin::{
     Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
     Side, TotalLagrangian,
@@ -15,7 +14,7 @@ const DENSITY: f64 = 2.0;
 const MATERIAL: Material<f64> = Material::StVenantKirchhoff { lambda: 60.0, mu: 40.0 };
 
 fn scheme(degree: usize, mass: MassMatrix) -> Scheme {
-    Scheme { degree, mass, composition: Composition::Order4, volume: Volume::Pointwise }
+    Scheme { degree, mass, composition: Composition::Order4 }
 }
 
 /// `x = X + H(t) X`, with `H` of second degree in time, which leapfrog follows without error.

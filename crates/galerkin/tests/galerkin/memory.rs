@@ -5,7 +5,6 @@
 
 use std::f64::consts::PI;
 
-use mmsmith_galerkin::Volume;
 use mmsmith_galerkin::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
 };
@@ -77,12 +76,7 @@ fn errors(degree: usize, cells: usize, steps: usize) -> [f64; 2] {
         per_cell: 4,
         layout: Layout::Lattice,
     };
-    let scheme = Scheme {
-        degree,
-        mass: MassMatrix::Consistent,
-        composition: Composition::Order4,
-        volume: Volume::Pointwise,
-    };
+    let scheme = Scheme { degree, mass: MassMatrix::Consistent, composition: Composition::Order4 };
     let dt = 1.0 / steps as f64;
     let mut bar = TotalLagrangian::new(grid, scheme, Law::with_memory(Springs), 1.0, dt).unwrap();
     // Stages that go back in time are not for laws with memory.
@@ -152,12 +146,8 @@ fn moving(coordinates: Coordinates, law: Law<f64, 2>) -> TotalLagrangian<2> {
     };
     let axes = [0, 1].map(|k| Axis { lower: lower[k], upper: upper[k], cells: 6, ends });
     let grid = Grid { axes, coordinates, per_cell: 4, layout: Layout::Gauss };
-    let scheme = Scheme {
-        degree: 2,
-        mass: MassMatrix::Consistent,
-        composition: Composition::Order2,
-        volume: Volume::Pointwise,
-    };
+    let scheme =
+        Scheme { degree: 2, mass: MassMatrix::Consistent, composition: Composition::Order2 };
     let mut body = TotalLagrangian::new(grid, scheme, law, 2.0, 2e-3).unwrap();
     let X = body.positions().to_vec();
     let v: Vec<_> =

@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_galerkin::Volume;
 use mmsmith_galerkin::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme, Side,
     TotalLagrangian,
@@ -17,7 +16,7 @@ const SOFT: Material<f64> = Material::StVenantKirchhoff { lambda: LAMBDA, mu: MU
 const DENSITY: f64 = 2.0;
 
 fn scheme(degree: usize, composition: Composition) -> Scheme {
-    Scheme { degree, mass: MassMatrix::Consistent, composition, volume: Volume::Pointwise }
+    Scheme { degree, mass: MassMatrix::Consistent, composition }
 }
 
 fn open_box<const D: usize>(cells: usize) -> Grid<D> {
@@ -409,12 +408,7 @@ fn runs_have_the_same_bits_on_any_number_of_threads() {
     }
     for mass in [MassMatrix::Consistent, MassMatrix::Lumped] {
         for degree in [3, 4] {
-            let scheme = Scheme {
-                degree,
-                mass,
-                composition: Composition::Order2,
-                volume: Volume::Pointwise,
-            };
+            let scheme = Scheme { degree, mass, composition: Composition::Order2 };
             check::<1>(open_box(5_000), scheme);
             check::<2>(open_box(48), scheme);
             check::<3>(open_box(9), scheme);

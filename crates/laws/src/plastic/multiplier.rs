@@ -32,7 +32,8 @@ impl Yield {
     /// The plastic strain after a multiplier.
     #[inline(always)]
     pub(super) fn advanced(&self, alpha: f64, D: f64) -> f64 {
-        if self.planted.is(Fault::PlasticStrainStays) { alpha } else { alpha + ROOT * D }
+        let root = if self.planted.is(Fault::PlasticStrainRoot) { 1.0 } else { ROOT };
+        if self.planted.is(Fault::PlasticStrainStays) { alpha } else { alpha + root * D }
     }
 
     /// Whether a deviator of this size flows.
@@ -50,6 +51,9 @@ impl Yield {
             return 0.0;
         }
         let stiffness = 2.0 * self.mu;
+        if self.planted.is(Fault::MultiplierWithoutHardening) {
+            return over / stiffness;
+        }
         let Some(Overstress { drag, exponent, time: of_flow }) = self.flow.overstress else {
             let is_linear = self.flow.exponent == 1.0 && !self.planted.is_any();
             if is_linear || self.flow.modulus == 0.0 {

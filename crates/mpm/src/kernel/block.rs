@@ -199,7 +199,8 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
     }
 
     fn mean_stresses(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
-        self.law.mean_stresses(F, theta, mean);
+        let mut scaled = vec![SMatrix::zeros(); F.len()];
+        self.law.evaluate_projected(F, theta, &mut scaled, mean);
     }
 
     fn evolve(

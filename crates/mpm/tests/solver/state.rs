@@ -160,13 +160,9 @@ fn total_scenes() -> impl Iterator<Item = (Coordinates, [End; 2], Scheme)> {
     ];
     schemes.into_iter().flat_map(|(degree, mass, composition)| {
         [Coordinates::Cartesian, Coordinates::Polar].into_iter().flat_map(move |coordinates| {
-            [End::Free, End::Wall, End::Moved, End::Periodic].into_iter().map(move |end| {
-                (
-                    coordinates,
-                    [end; 2],
-                    Scheme { degree, mass, composition, volume: Volume::Pointwise },
-                )
-            })
+            [End::Free, End::Wall, End::Moved, End::Periodic]
+                .into_iter()
+                .map(move |end| (coordinates, [end; 2], Scheme { degree, mass, composition }))
         })
     })
 }

@@ -1,4 +1,4 @@
-use mmsmith_galerkin::{Composition, MassMatrix, SetUp, Volume};
+use mmsmith_galerkin::{Composition, MassMatrix, SetUp};
 use mmsmith_mpm::{BodyForce, Particles, Solver};
 use mmsmith_runtime::BodyForceAtPoints;
 
@@ -42,7 +42,6 @@ where
             degree,
             mass: MassMatrix::Consistent,
             composition: Composition::Order2,
-            volume: Volume::Pointwise,
         };
         let set_up = SetUp {
             grid: grid.clone(),
