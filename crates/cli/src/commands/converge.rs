@@ -107,7 +107,7 @@ struct Converge<'a> {
     base: Case,
     cases: Vec<Discretized<'a>>,
     orders: Orders,
-    /// What the errors of every scheme suffer from here.
+    /// Causes of errors that lie in the motion, measured once.
     warnings: OnceLock<Warnings>,
 }
 

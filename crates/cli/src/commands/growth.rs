@@ -61,7 +61,7 @@ fn smaller(selection: &Selection, periods: f64) -> Option<f64> {
     Some(0.9 * harmless * present)
 }
 
-/// What the errors of every scheme suffer from in a motion, apart from the scheme: disturbances that grow, and locking next to
+/// Causes of errors that lie in the motion and the material, not in the scheme: disturbances that grow, and locking next to
 /// incompressibility. Nothing in ordinary motions.
 pub(crate) struct Warnings {
     growth: Option<(Harm, String)>,
@@ -72,7 +72,7 @@ pub(crate) struct Warnings {
 /// Lame's constants' quotient lambda/mu from which on schemes without a cure are said to lock: `nu = 0.495`.
 const LOCKING: f64 = 100.0;
 
-/// What cures locking, as a sentence.
+/// The cure of locking, as a sentence.
 const CURE: &str = "--volume projected is against it.";
 
 impl Warnings {
@@ -95,7 +95,7 @@ impl Warnings {
         }
     }
 
-    /// Those of a scheme that has a cure for locking, or may have one.
+    /// The warnings for a scheme that has a cure for locking, or may have one.
     pub(crate) fn without_locking(self) -> Self {
         Self { locking: None, ..self }
     }

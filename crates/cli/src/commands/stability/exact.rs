@@ -111,7 +111,7 @@ fn report(options: &StabilityOptions, points: &[Point], found: &[Growth]) -> Res
     Ok(report.with("over", json!(over)).with("rows", rows.collect::<Result<Vec<_>>>()?))
 }
 
-/// What the numbers mean.
+/// Meaning of the numbers.
 const DEFINITION: &str = "\
 Small disturbances of the exact motion under its dead body force, by the balance of momentum linearised about it.
 A factor is the largest displacement of a disturbance over the way that its largest first velocity makes in l/(4 c),
@@ -161,7 +161,7 @@ fn told(factor: f64) -> String {
     }
 }
 
-/// What follows for one motion.
+/// The judgement of one motion, and a better one.
 fn judgement(point: &Point, found: &Growth) -> String {
     if found.factor < A_DIGIT {
         return "The motion is stable: no scheme loses a digit by it.\n".to_owned();
