@@ -2,7 +2,7 @@
 
     python hosts.py MMS FOLDER [--solutions NAME|FILE,...] HOST...
 
-Hosts: c, cpp, cuda, fortran, abaqus, calculix, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
+Hosts: c, cpp, rust, cuda, fortran, abaqus, calculix, numpy, jax, ufl, moose, kratos, febio, julia, openfoam. Exit status: 0 where all agree, 1 where any does not.
 
 Differences are told in units of 2^-52 of the largest entry of the field over all points; LARGEST says what a host may have. Zero
 means the same bits. Fields that a file takes from a table, as the stress of a material with memory is not a formula, have to be within
@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 SPECS = HERE.parents[1] / "mms-specs"
 FIELDS = {"u": 1, "v": 1, "a": 1, "H": 2, "F": 2, "J": 0, "P": 2, "b": 1}
 POINTS = 1000
-LARGEST = {"c": 0, "cpp": 0, "cuda": 16, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
+LARGEST = {"c": 0, "cpp": 0, "rust": 0, "cuda": 16, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
 
 
 class Refused(Exception):
@@ -261,6 +261,27 @@ def abaqus(case):
 
 def calculix(case):
     return case.unpacked(fortran_program(case, case.generate("calculix", "_calculix.f90"), "calculix.f90", case.packed()), {"rho0_b": 1})
+
+
+def rust(case):
+    """A crate of its own that depends on the run time of solutions; all cases share what is compiled."""
+    source = case.generate("rust", ".rs")
+    place = case.folder / "rust"
+    (place / "src").mkdir(parents=True, exist_ok=True)
+    text = source.read_text()
+    (place / "src" / "solution.rs").write_text(text)
+    name = re.search(r"pub struct (\w+)<T: [:\w]+> \{\s+parameters", text)[1]
+    driver = (HERE / "fields.rs").read_text().replace("DIMENSION", str(case.dimension)).replace("SOLUTION", name)
+    if case.variables:
+        driver = driver.replace("//TABLE ", "").replace("TABLE_FILE", case.table.name)
+        (place / case.table.name).write_text(case.table.read_text())
+    (place / "src" / "main.rs").write_text("#![allow(non_snake_case, unused)]\n" + driver.replace("//! ", "// "))
+    runtime = HERE.parents[1] / "crates" / "runtime"
+    (place / "Cargo.toml").write_text(
+        f'[package]\nname = "host"\nversion = "0.1.0"\nedition = "2024"\n[dependencies]\nmmsmith-runtime = {{ path = "{runtime}" }}\n[workspace]\n')
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(case.folder.parent / "rust-target")}
+    flat = call(["cargo", "run", "--quiet", "--offline"], cwd=place, env=environment, input=case.packed().tobytes())
+    return case.unpacked(flat, {**case.fields, "rho0_b": 1})
 
 
 def python_fields(solution, X, t):
