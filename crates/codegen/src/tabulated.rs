@@ -159,7 +159,7 @@ impl Code<'_> {
         };
         vec![format!(
             "table: P, b, tractions and internal variables ({}) follow from the history of each particle and come from the file {} beside this one, \
-             {where_it_holds}, with errors of at most {:.1e} of the largest value of each. It holds for {}, and for times from 0 to {}: later ones give \
+             {where_it_holds}, with errors of about {:.1e} of the largest value of each. It holds for {}, and for times from 0 to {}: later ones give \
              not a number. For other values write both files anew, mms gen {} --set NAME=VALUE --periods X. The state at the start, which a host \
              sets, is that of t = 0. Tensors among the internal variables have Cartesian components.",
             table.variables.join(", "),

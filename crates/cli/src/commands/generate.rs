@@ -17,6 +17,9 @@ use crate::terminal;
 /// Hexadecimal digits of the sign that a source and its table have in common.
 const DIGITS_OF_DIGEST: usize = 16;
 
+/// Tables with larger errors are worth a word.
+const CLOSE: f64 = 1e-11;
+
 pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let found = locate(&options.name)?;
     let mut spec = found.specification()?;
@@ -37,6 +40,13 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
         None if spec.has_history() && options.target.reads_tables => {
             let staged = Staged::of(&spec, fields.clone());
             let file = tabulate(options, &spec, &staged).with_context(|| found.file())?;
+            if file.error > CLOSE {
+                terminal::note(format_args!(
+                    "the fields are rough, and the table has errors of about {:.1e} of the largest value of each; series of your points are closer: \
+                     --points points.csv",
+                    file.error
+                ));
+            }
             let digest = digest(&file);
             let code = Code::of(&spec, fields, origin).with_table(beside(&file, &digest));
             table = Some(file.text(&digest));
