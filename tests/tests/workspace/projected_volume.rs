@@ -6,8 +6,8 @@
 use mmsmith_mpm::fault::{self, Fault};
 use mmsmith_solutions::{AnySolution, CATALOGUE, build};
 use mmsmith_verify::{
-    Arithmetic, Case, CflSpeed, Composition, Layout, Row, Scheme, Status, Sweep, Total, Updated,
-    Volume, converge,
+    Arithmetic, Case, CflSpeed, Composition, Coordinates, Layout, Row, Scheme, Status, Sweep,
+    Total, Updated, Volume, converge,
 };
 
 fn solution(name: &str, overrides: &[(&str, f64)]) -> AnySolution<f64> {
@@ -25,9 +25,10 @@ fn run(exact: &AnySolution<f64>, case: &Case) -> Row {
 }
 
 /// Splines of the total formulation at Gauss points.
-fn total(degree: usize) -> Case {
+fn total(degree: usize, coordinates: Coordinates) -> Case {
     Case {
         scheme: Scheme::Total(Total {
+            coordinates,
             composition: Composition::Order2,
             layout: Layout::Gauss,
             ..Total::of_degree(degree)
@@ -54,7 +55,7 @@ const NEAR: f64 = 0.4999;
 fn a_motion_that_keeps_the_volume_has_the_errors_of_a_compressible_body() {
     for degree in 2..=4 {
         let [far, near] = [0.3, NEAR].map(|nu| solution("vortex", &[("nu", nu)]));
-        let pointwise = Case { cells: 16, ..total(degree) };
+        let pointwise = Case { cells: 16, ..total(degree, Coordinates::Polar) };
         let projected = Case { volume: Volume::Projected, ..pointwise };
         let [u, P] = errors(&far, &pointwise);
         let [near_u, near_P] = errors(&near, &projected);
@@ -74,7 +75,13 @@ fn transfers_project_volumes_in_the_updated_formulation() {
     for shape in ["gimp", "bspline2", "cpdi"] {
         let scheme =
             Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
-        let pointwise = Case { scheme, cells: 16, periods: 0.05, ..Case::default() };
+        let pointwise = Case {
+            scheme,
+            cells: 16,
+            periods: 0.05,
+            cfl_speed: CflSpeed::PWave,
+            ..Case::default()
+        };
         let projected = Case { volume: Volume::Projected, ..pointwise };
         let [u, _] = errors(&far, &pointwise);
         let [near_u, near_P] = errors(&near, &projected);
@@ -92,10 +99,11 @@ fn bits_do_not_depend_on_threads() {
         let scheme = Scheme::Updated(Updated { integrator, ..Updated::default() });
         Case { scheme, periods: 0.02, ..Case::default() }
     };
+    let cartesian = Coordinates::Cartesian;
     let cases = [
-        ("axis-aligned-1d", Case { cells: 16, ..total(3) }),
-        ("ring-nu", Case { cells: 6, ..total(2) }),
-        ("skew-3d", Case { cells: 3, ..total(2) }),
+        ("axis-aligned-1d", Case { cells: 16, ..total(3, cartesian) }),
+        ("ring-nu", Case { cells: 6, ..total(2, Coordinates::Polar) }),
+        ("skew-3d", Case { cells: 3, ..total(2, cartesian) }),
         ("axis-aligned-1d", updated("cd")),
         ("swirl", updated("usavg")),
         ("swirl", updated("musl")),
@@ -115,7 +123,7 @@ fn bits_do_not_depend_on_threads() {
 #[test]
 fn faults_of_the_projection_are_caught() {
     let near = solution("vortex", &[("nu", NEAR)]);
-    let case = Case { volume: Volume::Projected, ..total(2) };
+    let case = Case { volume: Volume::Projected, ..total(2, Coordinates::Polar) };
     let [_, sound] = errors(&near, &case);
     for fault in
         [Fault::JacobianForTheta, Fault::VolumesLeftOut, Fault::MeanStressStays, Fault::VolumeRoot]

@@ -76,6 +76,9 @@ impl Yield {
     pub(super) fn multiplier_of(&self, size: impl Fn(f64) -> f64, alpha: f64) -> f64 {
         let residual = |D: f64| size(D) - self.allowed(alpha + ROOT * D);
         let stiffness = 2.0 * self.mu;
+        if self.planted.is(Fault::MultiplierWithoutHardening) {
+            return residual(0.0) / stiffness;
+        }
         // Logarithms of stretches about one carry the rounding of one.
         root(residual, (size(0.0) - self.allowed(alpha)) / stiffness, stiffness)
     }
