@@ -1,7 +1,7 @@
 //! A solution that is ready to be written down.
 
 use crate::fault::{Fault, NoEffect};
-use crate::tabulated::Tabulated;
+use crate::table::Tabulated;
 use mmsmith_expr::{Function, Operation};
 use mmsmith_spec::{DeriveError, Fields, Spec};
 use mmsmith_stage::Staged;

@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::runtime::{Routine, WithRuntime, routines};
-use crate::tabulated::OfTable;
+use crate::table::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};

@@ -3,76 +3,10 @@
 use crate::code::Code;
 use crate::listing::{Item, surface_name};
 use crate::names::Names;
+use crate::table::{OfTable, Tabulated};
 use crate::text::digits;
 use mmsmith_spec::Surface;
 use mmsmith_stage::{FieldName, Shape};
-
-/// The table beside a file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tabulated {
-    /// The sign that a file and its table have in common.
-    pub digest: String,
-    /// The last time that it has.
-    pub end: f64,
-    /// The error of the table, as a share of the largest value of each field.
-    pub error: f64,
-    /// How many numbers the fields after `b` and `P` have, in their order.
-    pub sizes: Vec<usize>,
-    /// The names of internal variables: the entries of these fields, one after the other.
-    pub variables: Vec<String>,
-    /// Pieces in time and polynomials in each; none where the table has series of some points alone.
-    pub in_time: Option<[usize; 2]>,
-}
-
-/// What a function takes from the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum OfTable {
-    /// The body force.
-    BodyForce,
-    /// The stress.
-    Stress,
-    /// All internal variables.
-    Internal,
-    /// One internal variable: its field, the number of this field's entries, and its place among them.
-    Variable { field: usize, size: usize, entry: usize },
-    /// The stress times the outward normal of a surface.
-    Traction(Surface),
-}
-
-/// The numbers of the fields `b` and `P` in a table, and of the first internal variable.
-pub(crate) const BODY_FORCE: usize = 0;
-pub(crate) const STRESS: usize = 1;
-pub(crate) const FIRST_INTERNAL: usize = 2;
-
-/// The outward normal of a surface.
-pub(crate) enum Normal {
-    /// Along an axis, in this sense.
-    Axis(usize, f64),
-    /// Along the position, in this sense.
-    Radial(f64),
-}
-
-impl Normal {
-    pub(crate) fn of(surface: Surface) -> Self {
-        match surface {
-            Surface::Lower(axis) => Normal::Axis(axis, -1.0),
-            Surface::Upper(axis) => Normal::Axis(axis, 1.0),
-            Surface::Inner => Normal::Radial(-1.0),
-            Surface::Outer => Normal::Radial(1.0),
-        }
-    }
-}
-
-impl Tabulated {
-    /// Each internal variable with the number of its field, the size of this field, and its place there.
-    fn places(&self) -> impl Iterator<Item = (&String, OfTable)> {
-        let entries = self.sizes.iter().enumerate().flat_map(|(number, &size)| {
-            let field = FIRST_INTERNAL + number;
-            (0..size).map(move |entry| OfTable::Variable { field, size, entry })
-        });
-        self.variables.iter().zip(entries)
-    }
-}
 
 impl Code<'_> {
     /// This code with the table beside it.

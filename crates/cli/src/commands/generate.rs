@@ -123,7 +123,7 @@ fn digest(file: &TableFile) -> String {
     all[..DIGITS_OF_DIGEST].to_owned()
 }
 
-/// What the source knows of the table.
+/// The table as the source knows it.
 fn beside(file: &TableFile, digest: &str) -> Tabulated {
     // After b and P, whose sizes sources know.
     let internal = file.fields.iter().skip(2);

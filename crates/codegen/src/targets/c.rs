@@ -6,7 +6,7 @@ use crate::code::Code;
 use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Line, Primitive, Routine, WithRuntime};
-use crate::tabulated::OfTable;
+use crate::table::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{c_number, c_string, filled, push_index};
 use mmsmith_expr::{Function, RustCall};

@@ -1,7 +1,7 @@
 //! C: the reader of tables, and functions that take values from them.
 
 use crate::code::Code;
-use crate::tabulated::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS, Tabulated};
+use crate::table::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS, Tabulated};
 use crate::text::c_string;
 
 /// The reader; it has a guard of its own, as a program may include several files.

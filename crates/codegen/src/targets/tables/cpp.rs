@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::listing::Item;
-use crate::tabulated::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
+use crate::table::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
 use crate::text::c_string;
 use mmsmith_stage::Shape;
 

@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::listing::Item;
-use crate::tabulated::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
+use crate::table::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
 use crate::targets::julia::string;
 
 const TABLE: &str = include_str!("table.jl");
