@@ -586,7 +586,7 @@ impl<const D: usize> TotalLagrangian<D> {
             of.project(&particles.volume);
         }
         theta.copy_from_slice(of.values());
-        if theta.iter().any(|theta| !(*theta > 0.0)) {
+        if !theta.iter().all(|theta| *theta > 0.0) {
             let variables = particles.internal.chunks_exact_mut(2);
             variables.zip(&*theta).for_each(|(q, &theta)| q[0] = theta);
             return false;
@@ -673,7 +673,8 @@ impl<const D: usize> TotalLagrangian<D> {
             && !particles.F.iter().any(is_bad)
         {
             let mut all = theta.iter().step_by(2).enumerate();
-            let (particle, &theta) = all.find(|(_, theta)| !(**theta > 0.0)).unwrap_or((0, &0.0));
+            let (particle, &theta) =
+                all.find(|(_, theta)| theta.is_nan() || **theta <= 0.0).unwrap_or((0, &0.0));
             return StepError::Inverted { step, time, particle, J: theta };
         }
         let particle = particles.F.iter().position(is_bad).unwrap_or(0);

@@ -160,7 +160,7 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
 
     fn elastic(&self) -> Option<Material<T>> {
         match &self.law {
-            Law::Library(material) => Some(material.clone()),
+            Law::Library(material) => Some(*material),
             Law::Own(_) | Law::WithMemory(_) => None,
         }
     }
