@@ -18,7 +18,7 @@ pub(crate) struct Item {
     pub(crate) about: String,
     pub(crate) shape: Shape,
     pub(crate) given: Given,
-    /// What it takes from the table; its values are computed otherwise.
+    /// The part of the table that it takes; its values are computed otherwise.
     pub(crate) of_table: Option<OfTable>,
     outputs: Vec<Slot>,
 }

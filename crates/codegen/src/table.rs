@@ -19,7 +19,7 @@ pub struct Tabulated {
     pub in_time: Option<[usize; 2]>,
 }
 
-/// What a function takes from the table.
+/// The part of the table that a function takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OfTable {
     /// The body force.

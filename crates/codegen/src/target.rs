@@ -1,7 +1,6 @@
 //! How languages spell programs, and the hosts that files are written for.
 
 use crate::code::Code;
-use crate::targets::readers_of_tables;
 use crate::text::{push_index, spell};
 use mmsmith_expr::{Function, Operation, Rational, nearest_f64};
 use mmsmith_stage::{Block, Operand};
@@ -196,9 +195,8 @@ pub enum Unwritable {
     /// Stresses that no expression has.
     #[error(
         "--target {target}: the stress of {solution} follows from the history of each particle, for which {target} has no expression; \
-         write a source with a table, mms gen {solution} --target numpy --out DIR (there are {readers}), or take the fields at \
-         points of yours, mms eval {solution} --points points.csv --csv fields.csv",
-        readers = readers_of_tables()
+         write a source with a table for a target with functions of its own, mms gen {solution} --target numpy --out DIR, or take the \
+         fields at points of yours, mms eval {solution} --points points.csv --csv fields.csv"
     )]
     History {
         /// The host.

@@ -27,13 +27,6 @@ impl Host {
     }
 }
 
-/// The hosts whose files read tables, for messages.
-pub(crate) fn readers_of_tables() -> String {
-    let names: Vec<&str> =
-        HOSTS.iter().filter(|host| host.reads_tables).map(|host| host.name).collect();
-    names.join(", ")
-}
-
 /// Every host, in the order in which help lists them.
 pub const HOSTS: &[Host] = &[
     Host {

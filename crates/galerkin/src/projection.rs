@@ -31,7 +31,6 @@ impl<const D: usize> Projection<D> {
         degree: usize,
         lines: &[Line; D],
     ) -> Result<Self, SetupError> {
-        let planted = Planted::here();
         let mut along = Vec::with_capacity(D);
         for (k, line) in lines.iter().enumerate() {
             // Nothing is prescribed for a change of volume: at walls it is continued by its mirror image, elsewhere it is free.
@@ -39,12 +38,7 @@ impl<const D: usize> Projection<D> {
             let axis = Axis { ends: grid.axes[k].ends.map(free), ..grid.axes[k] };
             let too_few = SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 };
             let basis = Basis::new(&axis, degree - 1, false, &line.points).ok_or(too_few)?;
-            let equal = vec![1.0; line.weights.len()];
-            let weights = match planted.is(Fault::VolumesLeftOut) {
-                true => &equal,
-                false => &line.weights,
-            };
-            let mass = Mass::consistent(&axis, &Band::consistent(&basis, weights));
+            let mass = Mass::consistent(&axis, &Band::consistent(&basis, &line.weights));
             let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
             along.push((basis, mass.ok_or(singular)?));
         }
@@ -58,7 +52,7 @@ impl<const D: usize> Projection<D> {
             coefficients: vec![0.0; bases.iter().map(|basis| basis.functions).product()],
             masses: array::from_fn(|k| along[k].1.clone()),
             bases,
-            planted,
+            planted: Planted::here(),
         })
     }
 
@@ -70,9 +64,13 @@ impl<const D: usize> Projection<D> {
     /// Replaces values at particles of these volumes by those of the projection.
     pub(super) fn project(&mut self, volumes: &[f64]) {
         let Self { bases, masses, layers, coefficients, planted } = self;
-        let are_equal = planted.is(Fault::VolumesLeftOut);
-        if let Some(values) = layers.last_mut().filter(|_| !are_equal) {
-            values.iter_mut().zip(volumes).for_each(|(value, volume)| *value *= volume);
+        if let Some(values) = layers.last_mut() {
+            if planted.is(Fault::VolumesLeftOut) {
+                let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
+                values.iter_mut().for_each(|value| *value *= mean);
+            } else {
+                values.iter_mut().zip(volumes).for_each(|(value, volume)| *value *= volume);
+            }
         }
         let mut inner = volumes.len();
         for k in (0..D).rev() {

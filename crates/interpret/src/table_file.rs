@@ -166,7 +166,7 @@ impl TableFile {
         Ok(Self { fields, dimension: D, variables: histories.names, in_time, end, error, content })
     }
 
-    /// What follows the digest in the file.
+    /// The text after the digest in the file.
     #[must_use]
     pub fn content(&self) -> &str {
         &self.content

@@ -161,7 +161,7 @@ pub enum Fault {
     PushForwardDropped,
     /// Projected volume: each particle's own J for the projected one.
     JacobianForTheta,
-    /// Projected volume: projections that count all particles alike, whatever their volumes.
+    /// Projected volume: sums that count all particles alike, whatever their volumes.
     VolumesLeftOut,
     /// Projected volume: each particle's own mean stress for the projected one.
     MeanStressStays,

@@ -132,7 +132,7 @@ fn a_front_with_linear_hardening_is_not_judged_and_the_reason_is_said() {
 
 #[test]
 fn fields_that_no_formula_has_are_refused_with_the_way_out() {
-    let call = ["gen", "block-j2", "--target", "c", "--out", "nowhere"];
+    let call = ["gen", "block-j2", "--target", "moose", "--out", "nowhere"];
     let (status, _, errors) = outcome(mms().args(call));
     assert_eq!(status, Some(2), "{errors}");
     assert!(errors.contains("history") && errors.contains("mms eval"), "{errors}");

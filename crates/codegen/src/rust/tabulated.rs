@@ -76,7 +76,7 @@ impl Generator<'_> {
         })
     }
 
-    /// What the trait has of internal variables, and of many points.
+    /// The functions of the trait for internal variables, and for many points.
     pub(super) fn tabulated_items(&self) -> TokenStream {
         let Some(table) = &self.code.table else { return TokenStream::new() };
         let runtime = self.runtime;

@@ -9,6 +9,7 @@ use mmsmith_scalar_functions::logarithm::ln_of_both_in_range;
 
 use super::multiplier::Yield;
 use crate::BLOCK;
+use crate::fault::Fault;
 
 /// A tensor with the axis across among its principal ones: its entries 11, 22, 12 and 33.
 #[derive(Clone, Copy, Debug)]
@@ -252,7 +253,8 @@ pub(super) fn midpoint(
 ) -> (Sym, f64) {
     let middle: F2 =
         std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (start[i][j] + end[i][j])));
-    let at_middle = Elastic::new(&middle, G);
+    let shear = if law.planted.is(Fault::TrialShearDropped) { 0.0 } else { G.shear };
+    let at_middle = Elastic::new(&middle, &Sym { shear, ..*G });
     let n = at_middle.direction();
     // `F^-1 n F G`, symmetric: the deviator's part of it in the plane.
     let [[f11, f12], [f21, f22]] = middle;
