@@ -160,12 +160,17 @@ fn grown(found: &Harm) -> String {
 /// Pressure, shear and the growth of a coarse wave, as `check` and `explain` tell them.
 pub(crate) struct Told {
     extremes: Option<Extremes>,
-    growth: Result<Growth, String>,
+    /// None where the pressure is too small to drive a disturbance on.
+    growth: Option<Result<Growth, String>>,
 }
 
 impl Told {
     /// Until so many periods, with at most so much work; beyond it it is said that it was left out.
     pub(crate) fn measure(exact: &AnySolution<f64>, periods: f64, most_work: f64) -> Self {
+        let extremes = extremes_of(exact, periods);
+        if extremes.as_ref().is_some_and(|own| own.pressure_over_mu <= HARMLESS_PRESSURE) {
+            return Self { extremes, growth: None };
+        }
         let settings = GrowthSettings {
             periods,
             cells: None,
@@ -180,10 +185,7 @@ impl Told {
             Err(GrowthError::Work { .. }) => on(Some(COARSE)),
             found => found,
         };
-        Self {
-            extremes: extremes_of(exact, periods),
-            growth: found.map_err(|error| error.to_string()),
-        }
+        Self { extremes, growth: Some(found.map_err(|error| error.to_string())) }
     }
 
     /// Lines of it.
@@ -193,16 +195,19 @@ impl Told {
             text += &format!("{margin}{}\n", of_extremes(extremes));
         }
         text += &match &self.growth {
-            Ok(found) if found.factor < A_DIGIT => format!(
+            None => format!(
+                "{margin}the exact motion is stable: its pressure is too small to drive a disturbance on\n"
+            ),
+            Some(Ok(found)) if found.factor < A_DIGIT => format!(
                 "{margin}the exact motion is stable: a disturbance in one wave grows {} in a period\n",
                 times(found.factor)
             ),
-            Ok(found) => format!(
+            Some(Ok(found)) => format!(
                 "{margin}the exact motion is UNSTABLE: a disturbance in one wave grows {} in a period, which costs every scheme {:.1} digits\n",
                 times(found.factor),
                 found.digits
             ),
-            Err(reason) => format!(
+            Some(Err(reason)) => format!(
                 "{margin}growth of disturbances of the exact motion not measured: {reason} (mms stability --exact does)\n"
             ),
         };
@@ -216,11 +221,12 @@ impl Told {
             document.insert("extremes".into(), json!(extremes));
         }
         match &self.growth {
-            Ok(found) => {
+            None => {}
+            Some(Ok(found)) => {
                 document.insert("factor".into(), json!(found.factor));
                 document.insert("digits".into(), json!(found.digits));
             }
-            Err(reason) => {
+            Some(Err(reason)) => {
                 document.insert("not_measured".into(), json!(reason));
             }
         }
