@@ -602,9 +602,7 @@ impl<const D: usize> TotalLagrangian<D> {
         for (q, (&theta, &mut p)) in particles.internal.chunks_exact_mut(2).zip(own) {
             q.copy_from_slice(&[theta, p]);
         }
-        if !planted.is(Fault::MeanStressStays) {
-            of.project(&particles.volume);
-        }
+        of.project(&particles.volume);
         true
     }
 

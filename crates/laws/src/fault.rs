@@ -163,8 +163,6 @@ pub enum Fault {
     JacobianForTheta,
     /// Projected volume: sums that count all particles alike, whatever their volumes.
     VolumesLeftOut,
-    /// Projected volume: each particle's own mean stress for the projected one.
-    MeanStressStays,
     /// Projected volume, in the plane: the third root of the change of volume for the square root.
     VolumeRoot,
 }

@@ -46,16 +46,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let law = &*self.law;
         let pieces = F.chunks(CHUNK).zip(theta.chunks(CHUNK)).zip(p.chunks_mut(CHUNK));
         each(pieces.collect(), &|((F, theta), p)| law.mean_stresses(F, theta, p));
-        if !planted.is(Fault::MeanStressStays) {
-            let densities = |particles: &Particles<T, D>| -> Vec<T> {
-                let Particles { mass, volume, .. } = particles;
-                mass.iter().zip(volume).map(|(m, V)| *m / *V).collect()
-            };
-            let densities = densities(&self.particles);
-            p.iter_mut().zip(&densities).for_each(|(p, density)| *p /= *density);
-            self.project(&mut p);
-            p.iter_mut().zip(&densities).for_each(|(p, density)| *p *= *density);
-        }
+        let Particles { mass, volume, .. } = &self.particles;
+        let densities: Vec<T> = mass.iter().zip(volume).map(|(m, V)| *m / *V).collect();
+        p.iter_mut().zip(&densities).for_each(|(p, density)| *p /= *density);
+        self.project(&mut p);
+        p.iter_mut().zip(&densities).for_each(|(p, density)| *p *= *density);
         let internal = match is_early {
             true => &mut self.early.internal,
             false => &mut self.particles.internal,
