@@ -48,6 +48,7 @@ mod component;
 mod composition;
 mod coordinates;
 mod fit;
+mod gradient;
 mod linearised;
 mod mass;
 mod projection;

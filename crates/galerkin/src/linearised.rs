@@ -23,14 +23,15 @@ use mmsmith_laws::{
 use mmsmith_mpm::SetupError;
 use nalgebra::{SMatrix, SVector};
 
-use super::basis::Basis;
 use super::boundary::Face;
 use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
 use super::composition::Composition;
 use super::coordinates::{Coordinates, RowGeometry};
 use super::fit::Line;
-use super::mass::{Band, Mass};
-use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, rows};
+use super::gradient::Gradients;
+use super::set_up::{
+    Grid, MassMatrix, Scheme, bases, check, faces, fits, line, masses, particles, rows,
+};
 
 /// The largest strain of the difference that stands for the tangent.
 const STRAIN: f64 = 1e-5;
@@ -189,27 +190,12 @@ where
     ) -> Result<Self, SetupError> {
         const { assert!(1 <= D && D <= 3, "one, two or three dimensions") };
         let (mass, composition) = (MassMatrix::Consistent, Composition::Order2);
-        check(grid, &Scheme { degree, mass, composition }, density, 1.0)?;
+        let scheme = Scheme { degree, mass, composition };
+        check(grid, &scheme, density, 1.0)?;
         let lines: [Line; D] = array::from_fn(|k| line(grid, k));
-        let (mut bases, mut masses) = (Vec::with_capacity(D), Vec::with_capacity(D));
         let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
-        for (k, axis) in grid.axes.iter().enumerate() {
-            let basis =
-                |normal: bool| {
-                    Basis::new(axis, degree, normal, &lines[k].points)
-                        .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
-                };
-            let pair = [basis(false)?, basis(true)?];
-            // The density belongs to the product over the axes, so to one of them.
-            let factor = if k == 0 { density } else { 1.0 };
-            let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
-            let mass = |basis| Mass::consistent(axis, &Band::consistent(basis, &weights));
-            let both = mass(&pair[0]).zip(mass(&pair[1])).ok_or_else(|| singular(k))?;
-            masses.push(<[Mass; 2]>::from(both));
-            bases.push(pair);
-        }
-        let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
-        let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let bases = bases(grid, degree, &lines)?;
+        let mass = masses(grid, &scheme, &bases, &lines, density)?;
         let fits = Ok(fits(grid, &bases, &lines).map_err(singular)?);
         let bodies = particles(grid, &lines, density);
         let given = match &law {
@@ -329,15 +315,10 @@ where
 
     /// Gradients of what stands at the points, Cartesian.
     fn gradients(&self) -> Vec<SMatrix<f64, D, D>> {
-        let (row, components) = (self.row(), &self.components);
-        let of = |p: usize| {
-            let H = SMatrix::from_fn(|c, k| components[c].slopes[k][p]);
-            let Some(at) = self.rows.get(p / row) else { return H };
-            let u = SVector::from_fn(|c, _| components[c].values[p]);
-            let H = self.coordinates.gradient(&u, &H, self.reciprocal_radius[p % row], at);
-            at.frame * H * at.frame.transpose()
-        };
-        (0..self.X.len()).map(of).collect()
+        let Self { components, coordinates, rows, reciprocal_radius, .. } = self;
+        let (row, coordinates) = (self.row(), *coordinates);
+        let at = Gradients { components, coordinates, row, rows, reciprocal_radius };
+        (0..self.X.len()).map(|p| at.at(p)).collect()
     }
 
     /// `A : grad w` at the points.

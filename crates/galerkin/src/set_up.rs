@@ -11,6 +11,7 @@ use super::boundary::{Face, Side};
 use super::composition::Composition;
 use super::coordinates::{Coordinates, RowGeometry};
 use super::fit::{Fit, Line};
+use super::mass::{Band, Mass};
 
 /// A tensor-product grid that covers the body, with the particles in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +58,57 @@ pub(super) fn rows<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Row
     counts[0] = 1;
     let place = |index: [usize; D]| SVector::from_fn(|k, _| lines[k].points[index[k]]);
     products(counts).filter_map(|index| grid.coordinates.row(&place(index))).collect()
+}
+
+/// The splines of a degree by axis and kind of component.
+pub(super) fn bases<const D: usize>(
+    grid: &Grid<D>,
+    degree: usize,
+    lines: &[Line; D],
+) -> Result<[[Basis; 2]; D], SetupError> {
+    let mut bases = Vec::with_capacity(D);
+    for (k, axis) in grid.axes.iter().enumerate() {
+        let basis = |normal: bool| {
+            Basis::new(axis, degree, normal, &lines[k].points).ok_or(SetupError::TooFewCells {
+                axis: k,
+                cells: axis.cells,
+                least: 2,
+            })
+        };
+        bases.push([basis(false)?, basis(true)?]);
+    }
+    Ok(array::from_fn(|k| bases[k].clone()))
+}
+
+/// Their mass matrices, for a density of the body.
+pub(super) fn masses<const D: usize>(
+    grid: &Grid<D>,
+    scheme: &Scheme,
+    bases: &[[Basis; 2]; D],
+    lines: &[Line; D],
+    density: f64,
+) -> Result<[[Mass; 2]; D], SetupError> {
+    let mut masses = Vec::with_capacity(D);
+    for (k, (axis, pair)) in grid.axes.iter().zip(bases).enumerate() {
+        // The density belongs to the product over the axes, so to one of them.
+        let factor = if k == 0 { density } else { 1.0 };
+        let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
+        let mass = |normal: usize| match scheme.mass {
+            MassMatrix::Consistent => {
+                Mass::consistent(axis, &Band::consistent(&pair[normal], &weights))
+            }
+            MassMatrix::Lumped => {
+                let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
+                let skipped = usize::from(on_wall && normal == 1);
+                let count = pair[normal].functions;
+                Some(Mass::lumped(axis, &pair[0], &weights, skipped, count))
+            }
+        };
+        let both = mass(0).zip(mass(1));
+        let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
+        masses.push(<[Mass; 2]>::from(both.ok_or(singular)?));
+    }
+    Ok(array::from_fn(|k| masses[k].clone()))
 }
 
 /// Fits of coefficients to values, by axis and kind of component; or the axis whose particles do not determine them.

@@ -17,17 +17,17 @@ use mmsmith_mpm::{SetupError, StepError};
 use mmsmith_threads::{each, each_chunk};
 use nalgebra::{SMatrix, SVector};
 
-use super::axis::End;
-use super::basis::Basis;
 use super::boundary::{BoundaryData, Face, HeldBoundary, Quantity};
 use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
 use super::composition::Composition;
 use super::coordinates::RowGeometry;
 use super::fit::Line;
-use super::mass::{Band, Mass};
+use super::gradient::Gradients;
 use super::piece;
 use super::projection::Projection;
-use super::set_up::{Grid, MassMatrix, Scheme, check, faces, fits, line, particles, reserve, rows};
+use super::set_up::{
+    Grid, MassMatrix, Scheme, bases, check, faces, fits, line, masses, particles, reserve, rows,
+};
 use super::stress::{
     LawOfRows, MemoryRows, OwnRows, Places, ProjectedRows, Stress, is_deformation,
 };
@@ -92,16 +92,7 @@ impl<const D: usize> TotalLagrangian<D> {
         reserve(&grid, scheme.degree, variables.len())?;
         let mut lines: [Line; D] = array::from_fn(|k| line(&grid, k));
         let faces = faces(&grid, &lines);
-        let basis = |k: usize, normal: bool| {
-            let axis = &grid.axes[k];
-            Basis::new(axis, scheme.degree, normal, &lines[k].points)
-                .ok_or(SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 })
-        };
-        let mut bases = Vec::with_capacity(D);
-        for k in 0..D {
-            bases.push([basis(k, false)?, basis(k, true)?]);
-        }
-        let bases: [[Basis; 2]; D] = array::from_fn(|k| bases[k].clone());
+        let bases = bases(&grid, scheme.degree, &lines)?;
         let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
         let fits = fits(&grid, &bases, &lines).map_err(singular);
         if let (Err(error), true) = (&fits, faces.iter().any(|face| face.moved)) {
@@ -110,26 +101,7 @@ impl<const D: usize> TotalLagrangian<D> {
         if Planted::here().is(Fault::WeightOff) {
             lines.iter_mut().for_each(|line| line.weights[0] *= 1.001);
         }
-        let mut masses = Vec::with_capacity(D);
-        for (k, (axis, pair)) in grid.axes.iter().zip(&bases).enumerate() {
-            // The density belongs to the product over the axes, so to one of them.
-            let factor = if k == 0 { density } else { 1.0 };
-            let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
-            let mass = |normal: usize| match scheme.mass {
-                MassMatrix::Consistent => {
-                    Mass::consistent(axis, &Band::consistent(&pair[normal], &weights))
-                }
-                MassMatrix::Lumped => {
-                    let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
-                    let skipped = usize::from(on_wall && normal == 1);
-                    let count = pair[normal].functions;
-                    Some(Mass::lumped(axis, &pair[0], &weights, skipped, count))
-                }
-            };
-            let pair_of_masses = mass(0).zip(mass(1)).ok_or_else(|| singular(k))?;
-            masses.push(<[Mass; 2]>::from(pair_of_masses));
-        }
-        let mass: [[Mass; 2]; D] = array::from_fn(|k| masses[k].clone());
+        let mass = masses(&grid, &scheme, &bases, &lines, density)?;
         let projected = match of_projection {
             Some(law) => {
                 let count = lines.iter().map(|line| line.points.len()).product();
@@ -375,21 +347,15 @@ impl<const D: usize> TotalLagrangian<D> {
             }
         });
         evaluate(components, Field::Displacement);
-        let at = &*components;
+        let (components, coordinates) = (&*components, grid.coordinates);
+        let at = Gradients { components, coordinates, row, rows, reciprocal_radius };
         let Particles { X, x, F, .. } = particles;
         let X = &X[..];
         let pieces = x.chunks_mut(size).zip(F.chunks_mut(size)).enumerate().collect();
         each(pieces, &|(piece, (x, F))| {
             for ((x, F), p) in x.iter_mut().zip(F).zip(piece * size..) {
-                let local = SVector::from_fn(|i, _| at[i].values[p]);
-                let mut H = SMatrix::from_fn(|i, k| at[i].slopes[k][p]);
-                if let Some(at) = rows.get(p / row) {
-                    let reciprocal_radius = reciprocal_radius[p % row];
-                    H = grid.coordinates.gradient(&local, &H, reciprocal_radius, at);
-                    H = at.frame * H * at.frame.transpose();
-                }
-                *F = SMatrix::identity() + H;
-                *x = X[p] + cartesian(rows, p / row, &local);
+                *F = SMatrix::identity() + at.at(p);
+                *x = X[p] + cartesian(rows, p / row, &at.value(p));
             }
         });
         &self.particles
@@ -402,14 +368,9 @@ impl<const D: usize> TotalLagrangian<D> {
         each_component(components, &|component| {
             component.evaluate(&operators.bases, field, true);
         });
-        let of_place = |p: usize| {
-            let local = SVector::from_fn(|i, _| components[i].values[p]);
-            let H = SMatrix::from_fn(|i, k| components[i].slopes[k][p]);
-            let Some(at) = rows.get(p / row) else { return H };
-            let H = grid.coordinates.gradient(&local, &H, reciprocal_radius[p % row], at);
-            at.frame * H * at.frame.transpose()
-        };
-        (0..particles.len()).map(of_place).collect()
+        let (components, coordinates) = (&*components, grid.coordinates);
+        let at = Gradients { components, coordinates, row, rows, reciprocal_radius };
+        (0..particles.len()).map(|p| at.at(p)).collect()
     }
 
     /// The particles as they were at the last call of [`observe`](Self::observe), or at rest.
@@ -561,16 +522,11 @@ impl<const D: usize> TotalLagrangian<D> {
         let Some(ProjectedChange { law, of, theta, scaled }) = projected else { return true };
         let (reciprocal_radius, planted) = (&self.reciprocal_radius, self.planted);
         let size = piece(particles.len());
-        let (components, rows, grid) = (&*components, &*rows, &*grid);
+        let (components, coordinates) = (&*components, grid.coordinates);
+        let at = Gradients { components, coordinates, row, rows, reciprocal_radius };
         each_chunk(remembered, size, &|piece, F| {
             for (F, p) in F.iter_mut().zip(piece * size..) {
-                let mut H = SMatrix::<f64, D, D>::from_fn(|i, k| components[i].slopes[k][p]);
-                if let Some(at) = rows.get(p / row) {
-                    let local = SVector::from_fn(|i, _| components[i].values[p]);
-                    H = grid.coordinates.gradient(&local, &H, reciprocal_radius[p % row], at);
-                    H = at.frame * H * at.frame.transpose();
-                }
-                *F = SMatrix::identity() + H;
+                *F = SMatrix::identity() + at.at(p);
             }
         });
         let remembered = &remembered[..];
@@ -718,7 +674,8 @@ fn cartesian<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{Axis, Layout};
+    use crate::axis::{Axis, End, Layout};
+    use crate::basis::Basis;
     use crate::composition::Composition;
     use crate::coordinates::Coordinates;
     use crate::set_up::doubles;

@@ -50,10 +50,14 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         is_elastic.then(|| Self { law, planted: Planted::here() })
     }
 
-    /// The law without projection.
-    #[must_use]
-    pub fn law(&self) -> &Law<T, D> {
-        &self.law
+    /// `(theta/J)^(1/D)`, from the quotient.
+    fn root(&self, share: T) -> T {
+        match D {
+            1 => share,
+            2 if self.planted.is(Fault::VolumeRoot) => share.cbrt(),
+            2 => share.sqrt(),
+            _ => share.cbrt(),
+        }
     }
 
     /// Stresses `Pb`, and `(theta/J)^(1/D)`.
@@ -66,13 +70,7 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         let mut scaled = *F;
         let ratios = std::array::from_fn(|n| {
             let own = of_particle(F, n);
-            let share = theta[n] / determinant(&own);
-            let ratio = match D {
-                1 => share,
-                2 if self.planted.is(Fault::VolumeRoot) => share.cbrt(),
-                2 => share.sqrt(),
-                _ => share.cbrt(),
-            };
+            let ratio = self.root(theta[n] / determinant(&own));
             set_stress(&mut scaled, n, &(own * ratio));
             ratio
         });
@@ -153,8 +151,7 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
-        let share = q.first().copied()? / determinant(F);
-        let ratio = if D == 2 { share.sqrt() } else { share };
+        let ratio = self.root(q.first().copied()? / determinant(F));
         Some(self.law.kirchhoff_in_space(&(F * ratio))?[(2, 2)])
     }
 
