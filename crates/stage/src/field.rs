@@ -35,6 +35,18 @@ pub enum Shape {
     Matrix,
 }
 
+impl Shape {
+    /// The entries in so many dimensions.
+    #[must_use]
+    pub fn entries(self, dimension: usize) -> usize {
+        match self {
+            Self::Scalar => 1,
+            Self::Vector => dimension,
+            Self::Matrix => dimension * dimension,
+        }
+    }
+}
+
 /// A field of a solution, and where its entries are, row by row.
 #[derive(Clone, Debug)]
 pub struct Field {

@@ -80,7 +80,7 @@ impl Code<'_> {
             "field_values" => (staged.fields.iter())
                 .map(|field| {
                     let (shape, d) = (field.name.shape(), spec.dimension);
-                    let argument = argument(field.name.letter(), shape, entry_count(shape, d));
+                    let argument = argument(field.name.letter(), shape, shape.entries(d));
                     format!("    {argument}; /* {} */\n", field.name.in_words())
                 })
                 .collect(),
@@ -188,15 +188,6 @@ fn results_in(values: &[String], places: Vec<String>) -> String {
     places.iter().zip(values).map(|(place, value)| format!("    {place}{value};\n")).collect()
 }
 
-/// How many entries a field has.
-fn entry_count(shape: Shape, dimension: usize) -> usize {
-    match shape {
-        Shape::Scalar => 1,
-        Shape::Vector => dimension,
-        Shape::Matrix => dimension * dimension,
-    }
-}
-
 /// C, with the names of the parameters as members of their structure.
 struct C {
     members: Vec<String>,
@@ -219,7 +210,7 @@ impl C {
         let count = match item.of_table {
             None => item.outputs().len(),
             Some(OfTable::Internal) => code.variable_count(),
-            Some(_) => entry_count(item.shape, d),
+            Some(_) => item.shape.entries(d),
         };
         // The argument for results has the name of the quantity.
         let result = name.rsplit('_').next().unwrap_or(name);

@@ -189,11 +189,7 @@ pub(in crate::targets) fn item(code: &Code<'_>, item: &Item, of_table: OfTable) 
     let scalar = "support::Scalar<Point>";
     let count = match of_table {
         OfTable::Internal => code.variable_count(),
-        _ => match item.shape {
-            Shape::Scalar => 1,
-            Shape::Vector => d,
-            Shape::Matrix => d * d,
-        },
+        _ => item.shape.entries(d),
     };
     let returned = match item.shape {
         Shape::Scalar => scalar.to_owned(),
