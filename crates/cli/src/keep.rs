@@ -10,9 +10,9 @@ use mmsmith_ledger::{Claim, Ledger, LedgerError, Shard, ShardName};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 
 use crate::arguments::KeepOptions;
+use crate::checksum::sha256;
 use crate::json::prepare_folder;
 use crate::library::{Origin, locate};
 use crate::{machine, terminal};
@@ -326,5 +326,5 @@ fn at_once<R: Send>(cases: &[usize], work: impl Fn(usize) -> Result<R> + Sync) -
 
 /// A short checksum in hexadecimal digits.
 fn sum(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    sha256(bytes)[..16].to_owned()
 }

@@ -11,6 +11,7 @@
 //! reference and a map of the code.
 
 mod arguments;
+mod checksum;
 mod commands;
 mod expect;
 mod html;

@@ -11,6 +11,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::arguments::RunOptions;
+use crate::checksum::sha256;
 use crate::json::{self, Output};
 use crate::keep;
 use crate::processes;
@@ -36,17 +37,13 @@ pub(super) struct Start {
 /// The text of a JSON object with the SHA-256 of what follows it as its first member.
 fn sealed(object: &str) -> Option<String> {
     let rest = object.strip_prefix('{')?;
-    Some(format!("{BEFORE}{}{AFTER}{rest}", sum(rest)))
+    Some(format!("{BEFORE}{}{AFTER}{rest}", sha256(rest)))
 }
 
 /// Whether `text` is what [`sealed`] made, to the bit.
 fn is_whole(text: &str) -> bool {
     let parts = text.strip_prefix(BEFORE).and_then(|text| text.split_once(AFTER));
-    parts.is_some_and(|(found, rest)| found == sum(rest))
-}
-
-fn sum(text: &str) -> String {
-    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+    parts.is_some_and(|(found, rest)| found == sha256(rest))
 }
 
 /// How the run of `folder` was started.

@@ -5,10 +5,10 @@ use mmsmith_codegen::{Code, Names, Origin, Tabulated};
 use mmsmith_interpret::{TableFile, TableFileError};
 use mmsmith_spec::Spec;
 use mmsmith_stage::Staged;
-use sha2::{Digest, Sha256};
 
 use super::eval::points::positions;
 use crate::arguments::GenerateOptions;
+use crate::checksum::sha256;
 use crate::input::Source;
 use crate::json::{self, Output};
 use crate::library::{Selection, locate};
@@ -118,9 +118,7 @@ fn tabulate(options: &GenerateOptions, spec: &Spec, staged: &Staged) -> Result<T
 
 /// A digest of all that a table has.
 fn digest(file: &TableFile) -> String {
-    let all: String =
-        Sha256::digest(file.content()).iter().map(|byte| format!("{byte:02x}")).collect();
-    all[..DIGITS_OF_DIGEST].to_owned()
+    sha256(file.content())[..DIGITS_OF_DIGEST].to_owned()
 }
 
 /// The table as the source knows it.

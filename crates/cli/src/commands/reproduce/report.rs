@@ -6,7 +6,6 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use mmsmith_solutions::{CATALOGUE, Description};
 use mmsmith_verify::{Field, Row, Sweep};
-use sha2::{Digest, Sha256};
 
 use super::claims::{Claim, difference_orders, told_orders};
 use super::section::{Section, captioned};
@@ -15,6 +14,7 @@ use super::{
     SMALL_STEP, SMALL_STEP_CELLS, SPACE, TIME, compare, difference_plot, difference_tables,
     errors_with_units, name, pictures, space_plot, stopped, tables, time_plot, verdict_table,
 };
+use crate::checksum::sha256;
 use crate::svg::escape;
 use crate::table::{self, Table};
 use crate::{machine, number};
@@ -261,8 +261,7 @@ fn setting_section() -> Result<String> {
     table.row(["threads".to_owned(), rayon::current_num_threads().to_string()]);
     for problem in PROBLEMS {
         let text = describe(problem)?.specification;
-        let hash: String = Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect();
-        table.row([format!("SHA-256 of {problem}.toml"), hash]);
+        table.row([format!("SHA-256 of {problem}.toml"), sha256(text)]);
     }
     let rate = table::rate(Some(2.0));
     Ok(format!(

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail};
 use mmsmith_oracle::{Accuracy, JudgedCode, Search};
 use mmsmith_spec::Spec;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
+use crate::checksum::sha256;
 use crate::input;
 use crate::json::Output;
 
@@ -60,7 +60,7 @@ impl State {
                 state.version
             );
         }
-        if state.specification != checksum(spec) {
+        if state.specification != sha256(&spec.source) {
             bail!(
                 "--state: {shown} is the state of another text of the specification '{}'; {remedy}",
                 state.solution
@@ -88,7 +88,7 @@ impl State {
             version: VERSION.into(),
             build: BUILD.into(),
             solution: spec.name.clone(),
-            specification: checksum(spec),
+            specification: sha256(&spec.source),
             generated: is_generated,
             search: search.clone(),
         })
@@ -98,8 +98,4 @@ impl State {
 /// Names of solutions are names of files.
 fn path(folder: &Path, spec: &Spec) -> PathBuf {
     folder.join(&spec.name).with_extension("json")
-}
-
-fn checksum(spec: &Spec) -> String {
-    Sha256::digest(&spec.source).iter().map(|byte| format!("{byte:02x}")).collect()
 }
