@@ -102,6 +102,9 @@ const NOTHING: f64 = 1e-13;
 const ON_SURFACE: f64 = 1e-9;
 /// Errors of the divergence of stresses are at most such a part of what the estimates of steps tell (measured; see the crate's tests).
 const LENIENCE: f64 = 30.0;
+/// So many steps are shortened before their errors are compared with the rounding of rates, and so many roundings are left to a step.
+const MOST_REJECTIONS: usize = 3;
+const ROUNDINGS: f64 = 64.0;
 /// Evaluations of rates, at most: a second or so.
 const MOST_EVALUATIONS: usize = 1_000_000;
 /// Intervals in which a time without flow is searched for its end, at least.
@@ -139,6 +142,25 @@ impl<'a, L: LawWithHistory, M: Motion<K>, const K: usize> Along<'a, L, M, K> {
             return self.law.margin(&at, &values_of(&self.constants(time)), z, branch);
         }
         self.law.margin(&at, &self.steady_values, z, branch)
+    }
+
+    /// By how much rates move where the entries of `F` and its rate are off by a unit of their last place, as they are: no step
+    /// tells values apart that differ by less than this times its length.
+    fn rounding(&self, time: f64, z: &[Dual<f64, K>], branch: Branch) -> f64 {
+        let (at, z) = (values(&self.motion.at(time)), values_of(z));
+        let constants = values_of(&self.constants(time));
+        let off = |A: &Tensor<f64>| {
+            let largest = A.iter().flatten().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            // Not by one factor, to which a law may be blind.
+            tensor(|i, j| A[i][j] + f64::EPSILON * largest * ((i + 2 * j) % 3 + 1) as f64)
+        };
+        let moved = Kinematics { F: off(&at.F), rate: off(&at.rate) };
+        let [rates, moved] = [&at, &moved].map(|at| {
+            let mut rates = vec![0.0; z.len()];
+            self.law.rate(at, &constants, &z, branch, &mut rates);
+            rates
+        });
+        rates.iter().zip(moved).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
     }
 
     /// The slopes right after the onset of the flow: particles next to this one begin at another time,
@@ -333,6 +355,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
         let mut counts_slopes = true;
         let mut rejected: Option<f64> = None;
         let mut trials = 0;
+        let mut rejections = 0;
         step.begin(&mut rate, self.time);
         if self.step <= 0.0 {
             self.step = (end - self.time) / 32.0;
@@ -366,6 +389,12 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                     }
                 }
                 rejected = Some(of_slopes);
+                // Next to the start variables may be so small that their tolerance is less than the rounding of their rates.
+                rejections += 1;
+                if rejections >= MOST_REJECTIONS {
+                    let rounding = length * self.along.rounding(self.time, &step.from, branch);
+                    scales[0] = scales[0].max(ROUNDINGS * rounding / self.tolerance);
+                }
                 error = if error.is_finite() { error } else { f64::INFINITY };
                 self.step = length * factor(error).min(0.7);
                 if self.time + self.step <= self.time {
@@ -378,7 +407,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                 continue;
             }
             let growth = if rejected.is_some() { 1.0 } else { 6.0 };
-            (rejected, trials) = (None, 0);
+            (rejected, trials, rejections) = (None, 0, 0);
             scales = step.scales(scales);
             let stop = if length == rest { end } else { self.time + length };
             step.finish(&mut rate);

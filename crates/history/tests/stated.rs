@@ -266,3 +266,43 @@ fn texts_that_are_no_laws_are_told() {
     assert!(matches!(AnyLaw::stated(&law, 3), Err(UnsupportedLaw::Stated(_))));
     assert!(matches!(AnyLaw::stated(&law, 4), Err(UnsupportedLaw::Dimension(4))));
 }
+
+/// From rest strains are so small at first that `ln F` has few digits: that is rounding, not a rough law.
+#[test]
+fn variables_of_tiny_strains_are_followed_from_rest() {
+    let stated = Stated {
+        internal: vec![internal("q", "(ln(F11) - q)/tau", "0")],
+        ..stated(stress(&[["E*(ln(F11) - q)/F11", "0"], ["0", "0"]]), &["E", "tau"], &[])
+    };
+    let law = AnyLaw::new(&Law::Stated(stated), 2).unwrap();
+    let tau = 0.005;
+    for rate in [1e-3, 4.0, 300.0] {
+        let at = move |time: f64| {
+            let mut at = Kinematics {
+                F: std::array::from_fn(|i| {
+                    std::array::from_fn(|j| number(f64::from(i == j), [0.0; 2]))
+                }),
+                rate: [[number(0.0, [0.0; 2]); 3]; 3],
+            };
+            let (sine, cosine) = (600.0 * time).sin_cos();
+            at.F[0][0] = number(1.0 + rate * sine / 600.0, [rate * sine / 600.0, 0.0]);
+            at.rate[0][0] = number(rate * cosine, [rate * cosine, 0.0]);
+            at
+        };
+        let names = law.constants();
+        for end in [1e-14, 1e-9, 1e-6, 4.8e-5, 1e-3] {
+            let motion =
+                WithPlaces { at, X: [0.0; 2], constants: vec![1e4, tau], names: names.clone() };
+            let found = Trajectory::new(&law, &motion, &[0.5 * end, end], 1e-13)
+                .unwrap_or_else(|error| panic!("{rate} {end}: {error}"));
+            // Of second order in the time, where that is short beside tau.
+            let q = found.states[1][0];
+            let expected = 0.5 * rate * end * end / tau;
+            let room = 2.0 * end / tau * expected + 1e-16 * end / tau;
+            assert!(
+                (q.value - expected).abs() < room.max(3.0 * rate * end * expected),
+                "{rate} {end}: {q:?} {expected:e}"
+            );
+        }
+    }
+}

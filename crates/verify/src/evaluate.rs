@@ -36,6 +36,9 @@ pub struct FieldRow {
     /// The fields that have entries which are no finite numbers, and are written as null. Written where there are any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_finite: Vec<String>,
+    /// Why they have: the history of the internal variables could not be followed. Written where that is the reason.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
 }
 
 fn is_false(value: &bool) -> bool {
@@ -111,11 +114,15 @@ fn evaluate_in<const D: usize>(
         b: list(&b),
         outside: outside(&solution.domain(), &X).is_some_and(|share| share > OUTSIDE),
         not_finite: Vec::new(),
+        why: None,
     };
     let bad = |values: &[f64]| !values.iter().all(|value| value.is_finite());
     let fields = row.named();
     let not_finite = fields.iter().filter(|(.., values)| bad(values));
     row.not_finite = not_finite.map(|(name, ..)| (*name).to_owned()).collect();
+    if !row.not_finite.is_empty() && !row.internal.is_empty() {
+        row.why = solution.history(&[X], t).err();
+    }
     Ok(row)
 }
 

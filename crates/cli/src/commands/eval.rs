@@ -96,7 +96,8 @@ fn judge(file: Source, rows: &[FieldRow]) -> bool {
     let bad = rows.iter().enumerate().filter(|(_, row)| !row.not_finite.is_empty());
     for (index, row) in bad.clone().take(MOST_NAMED) {
         let fields = row.not_finite.join(", ");
-        terminal::error(format_args!("{file}, entry {index}: {fields} is not finite there"));
+        let why = row.why.as_ref().map_or(String::new(), |why| format!(": {why}"));
+        terminal::error(format_args!("{file}, entry {index}: {fields} is not finite there{why}"));
     }
     let bad = bad.count();
     if bad > MOST_NAMED {
