@@ -106,8 +106,8 @@ pub use scheme::{Choice, Formulation, GridPose, Placement, Scheme, Start, Total,
 pub use score::{
     AgainstError, Agreement, Convergence, Deformation, DifferenceRow, Differences, Exchange, Input,
     Integrated, IntegratedOrders, Judgement, Lag, LawRow, LawVerdict, Placing, Points, Quantity,
-    Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source, Times, against,
-    compare_recordings, score,
+    RecordedMotion, Remark, Resolution, Role, Score, ScoreError, ScoreOptions, ScoreRow, Source,
+    Times, against, compare_recordings, score,
 };
 pub use stability::{
     Criteria, Search, SearchProgress, StabilityRow, is_stable, p_wave_limit, stability,

@@ -81,7 +81,7 @@ impl<const D: usize> Opened<D> {
     }
 
     /// Where reference positions and displacements are from.
-    fn sources(&self) -> (Source, Source) {
+    pub(super) fn sources(&self) -> (Source, Source) {
         match &self.scheme {
             Scheme::Given { displacement: true } => (Source::Array, Source::Array),
             Scheme::Given { displacement: false } => {

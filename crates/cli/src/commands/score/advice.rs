@@ -2,8 +2,8 @@
 
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Exchange, Input, Norm, Placing, Points, Quantity, Remark, Score, ScoreOptions as Reading,
-    ScoreRow, score as measure,
+    Exchange, Input, Norm, Placing, Points, Quantity, RecordedMotion, Remark, Score,
+    ScoreOptions as Reading, ScoreRow, score as measure,
 };
 
 use crate::library::Selection;
@@ -23,6 +23,8 @@ const NO_ORDER: f64 = 0.5;
 const AS_GOOD: f64 = 1.1;
 /// Steps by which the place of a body is found.
 const SHIFTS: usize = 4;
+/// More than one by what sums in another order may differ.
+const ROUNDED: f64 = 1.0 + 1e-9;
 /// More numbers than are read anew for every trial.
 const MOST_TRIED: usize = 50_000;
 /// Octaves up and down from the value of a parameter in which another one is looked for.
@@ -158,6 +160,13 @@ impl Case<'_> {
             None => None,
         };
         let exact = other.as_ref().unwrap_or(self.exact);
+        // Most explain nothing, which the displacements alone tell.
+        if let Some(motion) =
+            RecordedMotion::read(exact, &self.input[0], &hypothesis.reading).ok()?
+            && motion.misfit(exact) > ROUNDED * EXPLAINED * u(self.row)
+        {
+            return None;
+        }
         let row = measure(exact, self.input, &hypothesis.reading).ok()?.rows.pop()?;
         let explains = |field: &Quantity| {
             let error = |row: &ScoreRow| row.errors.get(field).map(|norms| norms[Norm::L2]);
@@ -323,9 +332,15 @@ impl Case<'_> {
 
     /// Other values of single parameters.
     fn parameters(&self) -> Vec<Hypothesis> {
+        let Ok(motion) = RecordedMotion::read(self.exact, &self.input[0], self.how) else {
+            return vec![];
+        };
         let misfit = |name: &str, value: f64| -> Option<f64> {
             let exact = self.selection.with(&[(name.to_owned(), value)]).ok()?.build().ok()?;
-            Some(u(&measure(&exact, self.input, self.how).ok()?.rows[0]))
+            match &motion {
+                Some(motion) => Some(motion.misfit(&exact)).filter(|error| !error.is_nan()),
+                None => Some(u(&measure(&exact, self.input, self.how).ok()?.rows[0])),
+            }
         };
         let best = |(name, value): (&String, &f64)| {
             let (factor, _) = least(|factor| misfit(name, factor * value))?;
