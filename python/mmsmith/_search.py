@@ -94,7 +94,7 @@ class Search:
 
     def changed(self, names: Sequence[str]) -> Solution:
         """The solution with those causes countered that need other fields."""
-        names = [name for name in names if self.rows[name].kind == "fields"]
+        names = [name for name in names if self.rows[name].kind in ("fields", "memory")]
         if not names:
             return self.right
         key = "+".join(names)

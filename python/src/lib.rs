@@ -165,12 +165,17 @@ impl Fields {
             Cause::named(name).ok_or_else(|| refused(format!("there is no cause '{name}'")))
         });
         let causes: Vec<&Cause> = found.collect::<PyResult<_>>()?;
+        let (of_memory, causes): (Vec<&Cause>, Vec<&Cause>) =
+            causes.into_iter().partition(|cause| cause.is_of_memory());
+        let mistaken = of_memory.into_iter().try_fold(self.spec.clone(), |spec, cause| {
+            cause.specification(&spec).map_err(|none| NoEffect::new_err(none.to_string()))
+        })?;
         py.detach(|| {
             // Times are shifted in the part in Python, which knows the solver's time steps.
             let plant = |spec: &Spec, fields: &mut Derived| {
                 Cause::plant_all(&causes, spec, fields, Steps::of(f64::NAN, f64::NAN))
             };
-            Fields::build(self.spec.clone(), &self.parameters, Some(names.join(" and ")), plant)
+            Fields::build(mistaken, &self.parameters, Some(names.join(" and ")), plant)
         })
     }
 
@@ -335,6 +340,7 @@ fn faults() -> Vec<(&'static str, &'static str)> {
 fn causes() -> Vec<(&'static str, &'static str, &'static str, &'static str, &'static str, f64)> {
     let parts = |counter: Counter| match counter {
         Counter::Fields(_) => ("fields", "", 0.0),
+        Counter::Memory(_) => ("memory", "", 0.0),
         Counter::Time { of, steps } => ("time", of.word(), steps),
         Counter::Place(placed) => ("place", placed.word(), 0.0),
         Counter::Motion(moved) => ("motion", moved.word(), 0.0),

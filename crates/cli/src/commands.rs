@@ -28,6 +28,7 @@ mod scheme;
 mod score;
 mod stability;
 mod study;
+mod tabulated;
 mod texts;
 mod thorough;
 mod tradeoff;

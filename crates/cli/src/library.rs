@@ -316,7 +316,8 @@ impl Selection {
                 (Source::Library(description), defaults)
             }
         };
-        let selection = Self { source, parameters: defaults }.with(overrides).context("--set")?;
+        let whose = if overrides.is_empty() { origin.file() } else { "--set".to_owned() };
+        let selection = Self { source, parameters: defaults }.with(overrides).context(whose)?;
         if !overrides.is_empty() {
             body_of(&selection.build()?).context("--set")?;
         }

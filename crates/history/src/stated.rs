@@ -23,7 +23,8 @@ use crate::tensor::{Space, Tensor, symmetric_product, tensor, trace};
 pub enum StatedHistoryError {
     /// Components along curvilinear coordinates.
     #[error(
-        "a law with internal variables, rates or given fields is stated in Cartesian components: write components = \"cartesian\""
+        "the components of this law turn from place to place with the coordinates, while internal variables, rates and given fields are \
+         followed in Cartesian ones: state the law in J, I1 and I2, or the solution with coordinates = 'cartesian'"
     )]
     Curvilinear,
     /// A stress has as many rows and columns as there are dimensions.

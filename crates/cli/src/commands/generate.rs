@@ -1,21 +1,18 @@
 //! `mms gen`: a solution as code, anywhere and without cargo.
 
 use anyhow::{Context, Result, bail};
-use mmsmith_codegen::{Code, Names, Origin, Tabulated};
+use mmsmith_codegen::{Code, Names, Origin};
 use mmsmith_interpret::{TableFile, TableFileError};
 use mmsmith_spec::Spec;
 use mmsmith_stage::Staged;
 
 use super::eval::points::positions;
+use super::tabulated;
 use crate::arguments::GenerateOptions;
-use crate::checksum::sha256;
 use crate::input::Source;
 use crate::json::{self, Output};
 use crate::library::{Selection, locate};
 use crate::terminal;
-
-/// Hexadecimal digits of the sign that a source and its table have in common.
-const DIGITS_OF_DIGEST: usize = 16;
 
 /// Tables with larger errors are worth a word.
 const CLOSE: f64 = 1e-11;
@@ -47,9 +44,8 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
                     file.error
                 ));
             }
-            let digest = digest(&file);
-            let code = Code::of(&spec, fields, origin).with_table(beside(&file, &digest));
-            table = Some(file.text(&digest));
+            let (code, text) = tabulated::beside(Code::of(&spec, fields, origin), &file);
+            table = Some(text);
             code
         }
         None => Code::of(&spec, fields, origin),
@@ -114,23 +110,4 @@ fn tabulate(options: &GenerateOptions, spec: &Spec, staged: &Staged) -> Result<T
         ),
         other => other.into(),
     })
-}
-
-/// A digest of all that a table has.
-fn digest(file: &TableFile) -> String {
-    sha256(file.content())[..DIGITS_OF_DIGEST].to_owned()
-}
-
-/// The table as the source knows it.
-fn beside(file: &TableFile, digest: &str) -> Tabulated {
-    // After b and P, whose sizes sources know.
-    let internal = file.fields.iter().skip(2);
-    Tabulated {
-        digest: digest.to_owned(),
-        end: file.end,
-        error: file.error,
-        sizes: internal.map(|field| field.shape.size(file.dimension)).collect(),
-        variables: file.variables.clone(),
-        in_time: file.in_time,
-    }
 }

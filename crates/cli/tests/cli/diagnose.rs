@@ -8,11 +8,11 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 /// Writes the script that builds and runs the solver with a change of its text, a command of sed.
-fn script(place: &Path, change: &str) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c/bar.c");
+fn script(place: &Path, solver: &str, change: &str) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c").join(solver);
     let text = format!(
         "set -e\ncd \"$MMS_FIELDS\"\nmkdir -p mmsmith\ncp *.h mmsmith\nsed '{change}' {} > own.c\n\
-         ${{CC:-cc}} -O1 -I . own.c -o own -lm\n./own \"$MMS_CELLS\" > \"$MMS_OUT/bar.csv\"\n",
+         ${{CC:-cc}} -O1 -I . own.c -o own -lm\n./own \"$MMS_CELLS\" *.table > \"$MMS_OUT/bar.csv\"\n",
         source.display()
     );
     let path = place.join("run.sh");
@@ -20,34 +20,49 @@ fn script(place: &Path, change: &str) {
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-const LINE: &str = "diagnose axis-aligned-1d --target c --jobs 2 --json found.json --run";
-
-fn diagnosed(place: &Path, change: &str) -> (i32, String) {
-    script(place, change);
+fn diagnosed(place: &Path, solution: &str, solver: &str, change: &str) -> (i32, String) {
+    script(place, solver, change);
+    let line = format!("diagnose {solution} --target c --jobs 2 --json found.json --run");
     // Without arguments: the command is one word, and the environment has the places.
-    let called = mms(place, &format!("{LINE} {}/run.sh", place.display()));
+    let called = mms(place, &format!("{line} {}/run.sh", place.display()));
     (called.status, called.stdout + &called.stderr)
+}
+
+/// The right solver, and then one with each of the changes, which has to be named.
+fn names_mistakes(solution: &str, solver: &str, mistakes: &[(&str, &str)]) {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let (status, said) = diagnosed(place, solution, solver, "");
+    assert_eq!(status, 0, "{said}");
+    assert!(said.contains("nothing is wrong"), "{said}");
+    for (change, name) in mistakes {
+        let (status, said) = diagnosed(place, solution, solver, change);
+        assert_eq!(status, 1, "{change}: {said}");
+        let found = read_json(&place.join("found.json"));
+        assert_eq!(found["causes"][0]["name"], *name, "{said}");
+        assert!(said.contains(found["causes"][0]["look"].as_str().unwrap()), "{said}");
+        assert_eq!(found["passed"], false);
+    }
 }
 
 #[test]
 fn a_right_solver_is_told_that_nothing_is_wrong_and_a_wrong_one_what_is() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    let (status, said) = diagnosed(place, "");
-    assert_eq!(status, 0, "{said}");
-    assert!(said.contains("nothing is wrong"), "{said}");
-    for (change, name) in [
+    let mistakes = [
         ("s/ + b);/ - b);/", "force-sign"),
         ("s/ + b);/ + axis_aligned_1d_density(\\&bar)*b);/", "force-per-volume"),
         ("s/step \\* dt, &b)/0.0, \\&b)/", "force-frozen"),
-    ] {
-        let (status, said) = diagnosed(place, change);
-        assert_eq!(status, 1, "{said}");
-        let found = read_json(&place.join("found.json"));
-        assert_eq!(found["causes"][0]["name"], name, "{said}");
-        assert!(said.contains(found["causes"][0]["look"].as_str().unwrap()), "{said}");
-        assert_eq!(found["passed"], false);
-    }
+    ];
+    names_mistakes("axis-aligned-1d", "bar.c", &mistakes);
+}
+
+#[test]
+fn mistakes_in_the_memory_of_a_material_are_named() {
+    let mistakes = [
+        ("s/q\\[i\\] += /q[i] += 0.0 * /", "memory-rates-unused"),
+        ("s/-dt \\/ own.tau/-2 * dt \\/ own.tau/", "memory-rates-doubled"),
+        ("s/-dt \\/ own.tau/-dt \\/ (2 * own.tau)/", "memory-rates-halved"),
+    ];
+    names_mistakes("bar-own-law", "bar_own_law.c", &mistakes);
 }
 
 #[test]

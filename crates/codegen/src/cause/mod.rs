@@ -3,6 +3,7 @@
 //! A solver that makes the mistake becomes right when it is given these fields, and its errors fall with the order of its method. The
 //! mistake is thus found without a look at the code.
 
+mod memory;
 mod planting;
 mod table;
 mod timing;
@@ -32,6 +33,8 @@ pub struct Cause {
 pub enum Counter {
     /// Changed fields.
     Fields(fn(&mut Planting<'_>)),
+    /// Fields of a specification whose material makes the mistake in its memory.
+    Memory(fn(&mut Spec)),
     /// A field at another time.
     Time {
         /// The field.
@@ -234,15 +237,41 @@ impl Cause {
         causes.into_iter().try_for_each(|cause| cause.plant(spec, fields, steps))
     }
 
+    /// The specification whose material makes the mistake, for mistakes in its memory.
+    ///
+    /// # Errors
+    ///
+    /// [`NoEffect`] where the material has no such memory.
+    pub fn specification(&self, spec: &Spec) -> Result<Spec, NoEffect> {
+        let mut mistaken = spec.clone();
+        if let Counter::Memory(change) = self.counter {
+            change(&mut mistaken);
+        }
+        let is_other = mistaken.memory != spec.memory || mistaken.internal != spec.internal;
+        is_other.then_some(mistaken).ok_or_else(|| self.no_effect(spec))
+    }
+
+    /// Whether the mistake is one in the memory of a material, which shows by [another specification](Self::specification).
+    #[must_use]
+    pub fn is_of_memory(&self) -> bool {
+        matches!(self.counter, Counter::Memory(_))
+    }
+
+    fn no_effect(&self, spec: &Spec) -> NoEffect {
+        NoEffect { fault: self.name.to_owned(), solution: spec.name.clone() }
+    }
+
     /// Changes the fields of `spec` to fields with the opposite mistake. To find out whether a solver uses a field at all, the field
     /// becomes larger by a hundredth.
     ///
     /// # Errors
     ///
-    /// [`NoEffect`] where all fields stay as they are: this solution then cannot show the mistake.
+    /// [`NoEffect`] where all fields stay as they are: this solution then cannot show the mistake. Mistakes in the memory of a material
+    /// change none of these fields.
     pub fn plant(&self, spec: &Spec, fields: &mut Fields, steps: Steps) -> Result<(), NoEffect> {
         let change = |fields: &mut Fields| match self.counter {
             Counter::Fields(change) => change(&mut Planting::new(spec, fields)),
+            Counter::Memory(_) => {}
             Counter::Time { of, steps: by } => {
                 timing::shift(fields, of, by * steps.dt, steps.start)
             }
@@ -260,8 +289,7 @@ impl Cause {
         } else {
             has_effect(spec, fields, handed, change)
         };
-        let none = NoEffect { fault: self.name.to_owned(), solution: spec.name.clone() };
-        changed.then_some(()).ok_or(none)
+        changed.then_some(()).ok_or_else(|| self.no_effect(spec))
     }
 }
 
@@ -306,9 +334,28 @@ mod tests {
         let spec = spec("skew-2d");
         let fields = spec.derive().unwrap();
         let own = ["law-neo-hookean"];
-        for cause in CAUSES {
+        for cause in CAUSES.iter().filter(|cause| !cause.is_of_memory()) {
             let planted = cause.plant(&spec, &mut fields.clone(), Steps::of(1e-3, 0.1));
             assert_eq!(planted.is_ok(), !own.contains(&cause.name), "{}", cause.name);
+        }
+    }
+
+    /// Between them these materials show every mistake in a memory.
+    #[test]
+    fn every_mistake_in_a_memory_changes_a_material() {
+        let names = [
+            "bar-j2",
+            "block-j2",
+            "ring-j2",
+            "block-perzyna",
+            "block-maxwell",
+            "ring-simo",
+            "bar-own-law",
+        ];
+        let specs = names.map(|name| spec(&format!("with-memory/{name}")));
+        for cause in CAUSES.iter().filter(|cause| cause.is_of_memory()) {
+            assert!(specs.iter().any(|spec| cause.specification(spec).is_ok()), "{}", cause.name);
+            assert!(cause.specification(&super::tests::spec("skew-2d")).is_err(), "{}", cause.name);
         }
     }
 

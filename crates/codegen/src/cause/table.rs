@@ -1,5 +1,6 @@
 //! The table of mistakes, a row each.
 
+use super::memory;
 use super::planting::Planting;
 use super::{Cause, Counter, Moved, Placed, Timed, Unused};
 use mmsmith_expr::{Expr, Graph, Rational};
@@ -18,6 +19,10 @@ macro_rules! causes {
 
 const fn fields(change: fn(&mut Planting<'_>)) -> Counter {
     Counter::Fields(change)
+}
+
+const fn memory(change: memory::Change) -> Counter {
+    Counter::Memory(change)
 }
 
 const fn time(of: Timed, steps: f64) -> Counter {
@@ -465,6 +470,68 @@ causes! {
     "initial-velocity-components-exchanged": "the first two components of the first velocity are exchanged",
         "the order of components in the line that sets the first velocity",
         fields(|p| p.exchange_velocity());
+
+    // The memory of the material.
+    "memory-unused": "the material is elastic: it does not flow, or its elements do not relax",
+        "the update of the internal variables: it is called in every step, its result is kept, and the stress takes it",
+        memory(memory::forget);
+    "memory-hardening-unused": "the yield stress stays that of the start",
+        "the equivalent plastic strain: alpha grows by sqrt(2/3) gamma in each return, is kept until the next step, and enters the yield stress",
+        memory(|spec| memory::flow(spec, |_, flow| flow.modulus = Graph::ZERO));
+    "memory-hardening-sign": "the hardening has the wrong sign: the material softens",
+        "the yield stress, sy + K alpha^m, and the sign of K in the equation of the return",
+        memory(|spec| memory::flow(spec, |graph, flow| flow.modulus = graph.neg(flow.modulus)));
+    "memory-hardening-linear": "the exponent of the hardening is left out",
+        "the yield stress, sy + K alpha^m: the power of alpha",
+        memory(|spec| memory::flow(spec, |_, flow| flow.exponent = Graph::ONE));
+    "memory-strain-without-two-thirds": "the equivalent plastic strain lacks the factor sqrt(2/3)",
+        "alpha' = sqrt(2/3) gamma', where the plastic strain grows by gamma' n with |n| = 1",
+        memory(|spec| memory::scale_strain(spec, 3, 2));
+    "memory-strain-with-two-thirds-twice": "the equivalent plastic strain has the factor sqrt(2/3) twice",
+        "alpha' = sqrt(2/3) gamma', where the plastic strain grows by gamma' n with |n| = 1",
+        memory(|spec| memory::scale_strain(spec, 2, 3));
+    "memory-radius-without-two-thirds": "the yield condition lacks the factor sqrt(2/3)",
+        "f = |s| - sqrt(2/3) k, where k is the yield stress of a tension test",
+        memory(memory::larger_radius);
+    "memory-flow-time-halved": "the time of the flow is halved: it is twice as fast",
+        "gamma' = <f/drag>^m / time, and a factor 2 in the viscosity",
+        memory(|spec| memory::scale_flow_time(spec, 1, 2));
+    "memory-flow-time-doubled": "the time of the flow is doubled: it is half as fast",
+        "gamma' = <f/drag>^m / time, and a factor 1/2 in the viscosity",
+        memory(|spec| memory::scale_flow_time(spec, 2, 1));
+    "memory-flow-exponent-unused": "the exponent of the flow is left out",
+        "gamma' = <f/drag>^m / time: the power m of the overstress",
+        memory(|spec| memory::overstress(spec, |_, own| own.exponent = Graph::ONE));
+    "memory-flow-exponent-inverse": "the exponent of the flow is 1/m",
+        "gamma' = <f/drag>^m / time: the power m of the overstress, of which some codes take the inverse",
+        memory(|spec| memory::overstress(spec, |graph, own| own.exponent = graph.powi(own.exponent, -1)));
+    "memory-relaxation-time-halved": "the relaxation times are halved",
+        "the exponential, exp(-dt/tau), or the factor of the implicit step, 1/(1 + dt/tau): a step that is added twice",
+        memory(|spec| memory::scale_elements(spec, [1, 2], [1, 1]));
+    "memory-relaxation-time-doubled": "the relaxation times are doubled",
+        "the exponential, exp(-dt/tau): dt/2 belongs to the factor of the new stress alone, exp(-dt/(2 tau))",
+        memory(|spec| memory::scale_elements(spec, [2, 1], [1, 1]));
+    "memory-relaxation-time-inverse": "the relaxation times are taken for rates",
+        "the exponential, exp(-dt/tau), not exp(-dt tau)",
+        memory(|spec| memory::elements(spec, |graph, all| all.iter_mut().for_each(|own| own.time = graph.powi(own.time, -1))));
+    "memory-shares-halved": "the elements have half their shares",
+        "the shares g_i: those of the shear modulus at the start; 1 - sum g_i is left in the end",
+        memory(|spec| memory::scale_elements(spec, [1, 1], [1, 2]));
+    "memory-first-element-alone": "the first element alone relaxes",
+        "the loop over elements, and the place where each keeps its variables",
+        memory(|spec| memory::elements(spec, |_, all| all.truncate(1)));
+    "memory-elements-exchanged": "the elements have each other's relaxation times",
+        "the order of shares and times",
+        memory(|spec| memory::elements(spec, |_, all| { let times: Vec<Expr> = all.iter().rev().map(|own| own.time).collect(); all.iter_mut().zip(times).for_each(|(own, time)| own.time = time) }));
+    "memory-rates-unused": "the internal variables stay as they are at the start",
+        "the update of the internal variables: it is called in every step, and its result is kept",
+        memory(|spec| memory::scale_rates(spec, 0, 1));
+    "memory-rates-halved": "the internal variables change half as fast",
+        "the time step of the update of the internal variables",
+        memory(|spec| memory::scale_rates(spec, 1, 2));
+    "memory-rates-doubled": "the internal variables change twice as fast",
+        "the time step of the update of the internal variables, and whether it is called twice in a step",
+        memory(|spec| memory::scale_rates(spec, 2, 1));
 
     // The result.
     "result-step-behind": "the result is that of t - dt, one time step behind the time that is told with it",

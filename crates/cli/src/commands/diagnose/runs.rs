@@ -8,9 +8,13 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{Cause, Code, Host, Names, Origin, Steps};
+use mmsmith_interpret::TableFile;
 use mmsmith_solutions::AnySolution;
 use mmsmith_spec::Spec;
+use mmsmith_stage::Staged;
 use mmsmith_verify::{Input, Quantity, Resolution, ScoreOptions as Reading, score};
+
+use crate::commands::tabulated;
 
 /// Errors of a run: the largest at any point, by field.
 pub(super) type Errors = BTreeMap<Quantity, f64>;
@@ -102,6 +106,9 @@ impl Solver<'_> {
 
     /// Whether a mistake changes any field; its counter is the same on all grids but for steps.
     pub(super) fn shows(&self, trial: &Trial, cells: usize) -> bool {
+        if trial.cause.is_of_memory() || self.spec.has_history() {
+            return trial.cause.specification(&self.spec).is_ok();
+        }
         let fields = self.spec.derive();
         fields.is_ok_and(|mut fields| {
             trial.cause.plant(&self.spec, &mut fields, self.steps(trial, cells)).is_ok()
@@ -126,9 +133,10 @@ impl Solver<'_> {
         fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
         if !fields.exists() {
             fs::create_dir_all(&fields).with_context(|| fields.display().to_string())?;
-            let path = fields.join(self.target.file_name(&Names::of(&self.spec.name).module));
-            fs::write(&path, self.source(trial, cells)?)
-                .with_context(|| path.display().to_string())?;
+            for (name, text) in self.files(trial, cells)? {
+                let path = fields.join(name);
+                fs::write(&path, text).with_context(|| path.display().to_string())?;
+            }
             if let Some(build) = self.build
                 && let Err(failure) = self.command(build, &fields, cells, &out)
             {
@@ -142,18 +150,38 @@ impl Solver<'_> {
         })
     }
 
-    fn source(&self, trial: Option<&Trial>, cells: usize) -> Result<String> {
-        let mut fields = self.spec.derive()?;
+    /// The source with the fields, and the table beside it where they follow from histories.
+    fn files(&self, trial: Option<&Trial>, cells: usize) -> Result<Vec<(String, String)>> {
+        let mistaken = match trial {
+            Some(trial) if trial.cause.is_of_memory() => trial.cause.specification(&self.spec)?,
+            _ => self.spec.clone(),
+        };
+        let mut fields = mistaken.derive()?;
+        if let Some(trial) = trial.filter(|trial| !trial.cause.is_of_memory()) {
+            trial.cause.plant(&mistaken, &mut fields, self.steps(trial, cells))?;
+        }
+        let mut table = None;
+        if mistaken.has_history() && self.target.reads_tables {
+            let staged = Staged::of(&mistaken, fields.clone());
+            table = Some(TableFile::new(&mistaken, &staged, [], 1.0, None)?);
+        }
         let origin = self.origin.clone();
-        let code = match trial {
-            None => Code::of(&self.spec, fields, origin),
+        let mut code = match trial {
+            None => Code::of(&mistaken, fields, origin),
             Some(trial) => {
-                trial.cause.plant(&self.spec, &mut fields, self.steps(trial, cells))?;
                 let why = format!("the opposite of the mistake {}", trial.cause.name);
-                Code::wrong_on_purpose(&self.spec, fields, origin, why)
+                Code::wrong_on_purpose(&mistaken, fields, origin, why)
             }
         };
-        Ok(self.target.source(&code)?)
+        let module = Names::of(&self.spec.name).module;
+        let mut files = vec![];
+        if let Some(table) = table {
+            let (with_table, text) = tabulated::beside(code, &table);
+            code = with_table;
+            files.push((format!("{module}.table"), text));
+        }
+        files.push((self.target.file_name(&module), self.target.source(&code)?));
+        Ok(files)
     }
 
     /// Runs a command of the shell; the error says how it ended.
@@ -217,7 +245,7 @@ impl Run {
 impl Trial {
     fn depends_on_steps(&self) -> bool {
         use mmsmith_codegen::Counter;
-        !matches!(self.cause.counter, Counter::Fields(_) | Counter::Place(_))
+        !matches!(self.cause.counter, Counter::Fields(_) | Counter::Memory(_) | Counter::Place(_))
     }
 }
 

@@ -132,7 +132,13 @@ impl Search<'_> {
         let blind = |trial: &Trial| {
             let shows = self.solver.shows(trial, self.cells[0]);
             if !shows {
-                self.leave_out(trial.cause, "with this solution it changes no field");
+                let why = match self.solver.spec.has_history() {
+                    true => {
+                        "the fields follow from histories, in which it is not planted: an elastic solution shows it"
+                    }
+                    false => "with this solution it changes no field",
+                };
+                self.leave_out(trial.cause, why);
             }
             shows
         };
@@ -192,11 +198,13 @@ impl Search<'_> {
     pub(super) fn single(&self, right: &Run) -> Result<Vec<Tried>> {
         let coarse = self.cells[0];
         let mut trials = self.trials();
-        if !self.knows_steps() {
+        if !self.knows_steps() && !self.solver.spec.has_history() {
             trials.extend(self.fitted(right)?);
         }
         if self.order > FIRST_ORDER {
-            trials.sort_by_key(|trial| matches!(trial.cause.counter, Counter::Fields(_)));
+            trials.sort_by_key(|trial| {
+                matches!(trial.cause.counter, Counter::Fields(_) | Counter::Memory(_))
+            });
         }
         let whole = self.expected.size(&right.errors);
         let mut tried: Vec<Tried> = vec![];
