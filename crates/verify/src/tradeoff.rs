@@ -23,6 +23,7 @@ use crate::case::Case;
 use crate::named::named;
 use crate::on_grid::Plan;
 use crate::run::Row;
+use crate::scheme::Formulation;
 use sweep::{Cases, Sweep};
 
 pub use effects::{Effect, Range, SettingName, TimeEffect, differences, leading};
@@ -180,6 +181,8 @@ pub struct Tradeoff {
     pub front: Vec<usize>,
     /// The cheapest setting for each tolerance.
     pub tolerances: Vec<Cheapest>,
+    /// The cheapest setting of each formulation for each tolerance, where settings of both were run.
+    pub by_formulation: Vec<(Formulation, Vec<Cheapest>)>,
     /// The cheapest setting for the tolerance asked for, if one meets it.
     pub for_tolerance: Option<Chosen>,
     /// The most accurate setting within the time asked for, if one is within it.

@@ -23,8 +23,16 @@ fn lasting(document: &Value) -> Value {
                     || name.contains("cpu")
                     || name.ends_with("_s")
                     || name == "timed_alone"
-                    || ["threads", "timings", "front", "tolerances", "effects", "knobs"]
-                        .contains(&name))
+                    || [
+                        "threads",
+                        "timings",
+                        "front",
+                        "tolerances",
+                        "tolerances_by_formulation",
+                        "effects",
+                        "knobs",
+                    ]
+                    .contains(&name))
             };
             let kept = members.iter().filter(|(name, _)| is_lasting(name));
             Value::Object(kept.map(|(name, value)| (name.clone(), lasting(value))).collect())

@@ -23,7 +23,7 @@ fn a_short_sweep_writes_what_it_measured() {
     let found = read_json(&place.join("found.json"));
     assert_eq!(
         keys(&found),
-        "chosen definition effects families front knobs rows schema settings skipped tolerances used_s"
+        "chosen definition effects families front knobs rows schema settings skipped tolerances tolerances_by_formulation used_s"
     );
     assert_eq!(found["schema"], "mmsmith.tradeoff/1");
     assert!(found["definition"].as_str().expect("text").contains("L_inf of u over A = 0.1"));
@@ -59,6 +59,15 @@ fn a_short_sweep_writes_what_it_measured() {
         assert!(!ok().any(|row| cost(row) < cost(one) && error(row) < error(one)), "{one}");
     }
     assert!(ok().all(|row| front.iter().any(|&i| error(&rows[i]) <= error(row))));
+
+    // Users compare settings of one formulation.
+    for (formulation, cheapest) in found["tolerances_by_formulation"].as_object().expect("groups") {
+        for index in
+            cheapest.as_array().expect("a list").iter().filter_map(|own| own["index"].as_u64())
+        {
+            assert_eq!(rows[index as usize]["formulation"], **formulation);
+        }
+    }
 
     // The command that is given runs the same setting.
     for named in found["tolerances"].as_array().expect("tolerances") {

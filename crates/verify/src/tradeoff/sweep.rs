@@ -1,5 +1,7 @@
 //! Execution of a sweep: runs, timings and the conclusions from them.
 
+use std::collections::BTreeSet;
+
 use super::effects::{Compared, differences};
 use super::policy::{CHEAP, Family, Ladder, Next, Policy, SHORT_S, TIMINGS, UNCERTAINTY, weights};
 use super::{
@@ -10,7 +12,7 @@ use crate::case::Case;
 use crate::cost::{Cost, CostModel};
 use crate::on_grid::Plan;
 use crate::run::Status;
-use crate::scheme::{Placement, Scheme};
+use crate::scheme::{Formulation, Placement, Scheme};
 
 /// A sweep under way.
 pub(super) struct Sweep<'a, E> {
@@ -282,16 +284,42 @@ impl<E> Sweep<'_, E> {
         Ok(())
     }
 
-    /// For each tolerance the cheapest setting that meets it, and whose neighbours do.
+    /// For each tolerance the cheapest setting that meets it, and whose neighbours do; where both formulations were run, of each of
+    /// them too.
     pub(super) fn name_cheapest(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
+        // Neighbours that are run here are not candidates themselves, or their neighbours would have to be run in turn.
+        let candidates: Vec<Formulation> = self
+            .found
+            .entries
+            .iter()
+            .map(|entry| entry.setting.case.scheme.formulation())
+            .collect();
+        let all = Vec::from_iter(0..candidates.len());
+        self.found.tolerances = self.cheapest_of(&all, progress)?;
+        for formulation in [Formulation::Updated, Formulation::Total] {
+            let own = all.iter().copied().filter(|&entry| candidates[entry] == formulation);
+            let own = Vec::from_iter(own);
+            if !own.is_empty() && own.len() < all.len() {
+                let cheapest = self.cheapest_of(&own, progress)?;
+                self.found.by_formulation.push((formulation, cheapest));
+            }
+        }
+        Ok(())
+    }
+
+    /// For each tolerance the cheapest of some settings.
+    fn cheapest_of(
+        &mut self,
+        candidates: &[usize],
+        progress: &mut dyn FnMut(&Setting),
+    ) -> Result<Vec<Cheapest>, E> {
         let mut wanted: Vec<f64> = TOLERANCES.into_iter().chain(self.goal.tolerance).collect();
         wanted.sort_by(|a, b| b.total_cmp(a));
         wanted.dedup();
-        // Neighbours that are run here are not candidates themselves, or their neighbours would have to be run in turn.
-        let candidates = self.found.entries.len();
+        let mut all = Vec::with_capacity(wanted.len());
         for tolerance in wanted {
             let mut order: Vec<usize> =
-                (0..candidates).filter(|&i| self.error(i) <= tolerance).collect();
+                candidates.iter().copied().filter(|&i| self.error(i) <= tolerance).collect();
             order.sort_by(|&a, &b| self.cost(a).total_cmp(&self.cost(b)));
             let mut named = Cheapest { tolerance, entry: None, neighbours_hold: false };
             for entry in order {
@@ -306,9 +334,9 @@ impl<E> Sweep<'_, E> {
                     None => {}
                 }
             }
-            self.found.tolerances.push(named);
+            all.push(named);
         }
-        Ok(())
+        Ok(all)
     }
 
     /// Whether the next coarser and the next finer grid meet the tolerance as well; `None` if there was no time, or if they are
@@ -404,7 +432,9 @@ impl<E> Sweep<'_, E> {
 
     /// Spends what is left on timings of the front, those with the fewest first.
     pub(super) fn fill(&mut self, progress: &mut dyn FnMut(&Setting)) -> Result<(), E> {
-        let named: Vec<usize> = self.found.tolerances.iter().filter_map(|t| t.entry).collect();
+        let of_each = self.found.by_formulation.iter().flat_map(|(_, cheapest)| cheapest);
+        let all = self.found.tolerances.iter().chain(of_each);
+        let named: BTreeSet<usize> = all.filter_map(|cheapest| cheapest.entry).collect();
         loop {
             let left = self.left(3) - self.proofs_s();
             let mut worth = self.front();

@@ -73,24 +73,28 @@ impl Measured<'_> {
     pub(in crate::commands) fn sentences(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let entries = &self.found.entries;
-        for named in &self.found.tolerances {
-            let Some(index) = named.entry else { continue };
-            let entry = &entries[index];
-            let proof = match named.neighbours_hold {
-                true => "its neighbouring cell counts meet it too",
-                false if self.options.cells.is_empty() => "there was no time to try its neighbours",
-                false => "it is not between two of the cell counts",
-            };
-            lines.push(format!(
-                "For an error of {:e} take {}: {:.2e} in {:.1e} s, and {proof}. `{}`",
-                named.tolerance,
-                words::line(&entry.setting),
-                self.error(entry),
-                entry.row.wall_s,
-                self.command(&entry.setting)
-            ));
+        for (whose, cheapest) in self.groups() {
+            for named in cheapest {
+                let Some(index) = named.entry else { continue };
+                let entry = &entries[index];
+                let proof = match named.neighbours_hold {
+                    true => "its neighbouring cell counts meet it too",
+                    false if self.options.cells.is_empty() => {
+                        "there was no time to try its neighbours"
+                    }
+                    false => "it is not between two of the cell counts",
+                };
+                lines.push(format!(
+                    "For an error of {:e}, the cheapest setting{whose} is {}: {:.2e} in {:.1e} s, and {proof}. `{}`",
+                    named.tolerance,
+                    words::line(&entry.setting),
+                    self.error(entry),
+                    entry.row.wall_s,
+                    self.command(&entry.setting)
+                ));
+            }
         }
-        // How far each kind gets, and what gets as far for less.
+        // How far each kind gets, and what of its formulation gets as far for less.
         for kind in self.kinds() {
             let own = entries.iter().filter(|entry| {
                 words::kind(&entry.setting) == kind
@@ -105,7 +109,10 @@ impl Measured<'_> {
             let cheaper = entries
                 .iter()
                 .filter(|entry| {
-                    self.error(entry) <= self.error(best) && self.is_of_usual_threads(entry)
+                    self.error(entry) <= self.error(best)
+                        && self.is_of_usual_threads(entry)
+                        && entry.setting.case.scheme.formulation()
+                            == best.setting.case.scheme.formulation()
                 })
                 .min_by(|a, b| a.row.wall_s.total_cmp(&b.row.wall_s));
             let Some(cheaper) = cheaper.filter(|cheaper| words::kind(&cheaper.setting) != kind)

@@ -1,9 +1,11 @@
 //! Everything that a sweep has measured, and its report.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 use mmsmith_verify::{
-    Against, Case, Chosen, Effect, Entry, Field, MARGIN, Named, Norm, Row, Setting, Skip, Status,
-    Tradeoff, leading,
+    Against, Case, Cheapest, Chosen, Effect, Entry, Field, Formulation, MARGIN, Named, Norm, Row,
+    Setting, Skip, Status, Tradeoff, leading,
 };
 use serde_json::{Map, Value, json};
 
@@ -233,29 +235,13 @@ impl Measured<'_> {
         for line in main {
             text += &format!("  {line}\n");
         }
-        text +=
-            "\nthe cheapest setting whose neighbouring cell counts meet the tolerance as well\n";
-        for named in &self.found.tolerances {
-            text += &match named.entry {
-                None => format!("  {:e}: none within the budget\n", named.tolerance),
-                Some(index) => {
-                    let entry = &self.found.entries[index];
-                    let doubt = match named.neighbours_hold {
-                        true => "",
-                        false if self.options.cells.is_empty() => {
-                            " (no time to try its neighbours)"
-                        }
-                        false => " (not between two of the cell counts)",
-                    };
-                    format!(
-                        "  {:e}: {:.2e} s, error {:.2e}: {}{doubt}\n",
-                        named.tolerance,
-                        entry.row.wall_s,
-                        self.error(entry),
-                        words::line(&entry.setting)
-                    )
-                }
-            };
+        for (whose, cheapest) in self.groups() {
+            text += &format!(
+                "\nthe cheapest setting{whose} whose neighbouring cell counts meet the tolerance as well\n"
+            );
+            for named in cheapest {
+                text += &self.cheapest(named);
+            }
         }
         if let Some(limit) = self.options.tolerance {
             text +=
@@ -265,6 +251,35 @@ impl Measured<'_> {
             text += &self.choice(&format!("--time {limit} s"), limit, &self.found.for_time);
         }
         text
+    }
+
+    /// The cheapest settings in groups that users compare: by formulation, where both were run.
+    pub(super) fn groups(&self) -> Vec<(String, &[Cheapest])> {
+        if self.found.by_formulation.is_empty() {
+            return vec![(String::new(), &self.found.tolerances)];
+        }
+        let groups = self.found.by_formulation.iter();
+        let of = |formulation| format!(" of the {} formulation", words::formulation(formulation));
+        groups.map(|(formulation, cheapest)| (of(*formulation), &cheapest[..])).collect()
+    }
+
+    fn cheapest(&self, named: &Cheapest) -> String {
+        let Some(index) = named.entry else {
+            return format!("  {:e}: none within the budget\n", named.tolerance);
+        };
+        let entry = &self.found.entries[index];
+        let doubt = match named.neighbours_hold {
+            true => "",
+            false if self.options.cells.is_empty() => " (no time to try its neighbours)",
+            false => " (not between two of the cell counts)",
+        };
+        format!(
+            "  {:e}: {:.2e} s, error {:.2e}: {}{doubt}\n",
+            named.tolerance,
+            entry.row.wall_s,
+            self.error(entry),
+            words::line(&entry.setting)
+        )
     }
 
     fn choice(&self, asked: &str, limit: f64, chosen: &Option<Chosen>) -> String {
@@ -388,9 +403,8 @@ impl Measured<'_> {
     }
 
     /// The cheapest setting for each tolerance, for programs.
-    fn tolerances(&self) -> Vec<Value> {
-        self.found
-            .tolerances
+    fn tolerances(&self, cheapest: &[Cheapest]) -> Vec<Value> {
+        cheapest
             .iter()
             .map(|named| {
                 json!({
@@ -402,6 +416,12 @@ impl Measured<'_> {
                 })
             })
             .collect()
+    }
+
+    /// As [`Self::tolerances`] of each formulation, where both were run.
+    fn tolerances_by_formulation(&self) -> BTreeMap<&'static str, Vec<Value>> {
+        let groups = self.found.by_formulation.iter();
+        groups.map(|(own, cheapest)| (own.name(), self.tolerances(cheapest))).collect()
     }
 
     /// The settings that were asked for, for programs.
@@ -474,7 +494,8 @@ impl Measured<'_> {
             ("families", json!(self.found.families)),
             ("rows", json!(self.rows()?)),
             ("front", json!(self.found.front)),
-            ("tolerances", json!(self.tolerances())),
+            ("tolerances", json!(self.tolerances(&self.found.tolerances))),
+            ("tolerances_by_formulation", json!(self.tolerances_by_formulation())),
             ("chosen", json!(self.chosen())),
             ("knobs", json!(self.effects())),
             ("effects", json!(effects)),

@@ -1,8 +1,8 @@
 //! Settings of a sweep in words: for people, for JSON, and as options of `mms run`.
 
 use mmsmith_verify::{
-    Coordinates, Effect, Entry, Integrator, Layout, MassMatrix, Named, Placement, Range, Scheme,
-    Setting, SettingName, TimeEffect, Transfer, Updated,
+    Coordinates, Effect, Entry, Formulation, Integrator, Layout, MassMatrix, Named, Placement,
+    Range, Scheme, Setting, SettingName, TimeEffect, Transfer, Updated,
 };
 use serde_json::{Value, json};
 
@@ -10,6 +10,14 @@ use crate::number;
 
 fn precision(setting: &Setting) -> &'static str {
     if setting.single { "f32" } else { "f64" }
+}
+
+/// A formulation in words.
+pub(super) fn formulation(formulation: Formulation) -> &'static str {
+    match formulation {
+        Formulation::Updated => "updated Lagrangian",
+        Formulation::Total => "total Lagrangian",
+    }
 }
 
 /// Kind of a setting, by which it is drawn and tabulated: the weights, the formulation, and whether particles fit the body.
