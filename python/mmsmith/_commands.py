@@ -73,7 +73,7 @@ def run(
     /,
     *,
     cells: int | None = None,
-    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
+    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "gimp-bspline2", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
@@ -118,6 +118,7 @@ def run(
             `gimp`: GIMP weights that follow the particle's stretch.
             `bspline2`: Quadratic splines.
             `bspline3`: Cubic splines.
+            `gimp-bspline2`: Quadratic splines averaged over the particle's box.
             `cpdi`: Parallelograms that deform with the particle.
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).
@@ -229,7 +230,7 @@ def converge(
     csv: str | os.PathLike[str] | None = None,
     markdown: str | os.PathLike[str] | None = None,
     latex: str | os.PathLike[str] | None = None,
-    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
+    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "gimp-bspline2", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
@@ -277,6 +278,7 @@ def converge(
             `gimp`: GIMP weights that follow the particle's stretch.
             `bspline2`: Quadratic splines.
             `bspline3`: Cubic splines.
+            `gimp-bspline2`: Quadratic splines averaged over the particle's box.
             `cpdi`: Parallelograms that deform with the particle.
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).
@@ -374,7 +376,7 @@ def stability(
     csv: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
     shard: str | None = None,
-    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
+    shape: Literal["linear", "ugimp", "gimp", "bspline2", "bspline3", "gimp-bspline2", "cpdi", "cpdi2", "bspline4", "bspline5"] | None = None,
     formulation: Literal["updated-lagrangian", "total-lagrangian"] | None = None,
     mass: Literal["lumped", "consistent"] | None = None,
     composition: Literal[2, 4, 6] | None = None,
@@ -437,6 +439,7 @@ def stability(
             `gimp`: GIMP weights that follow the particle's stretch.
             `bspline2`: Quadratic splines.
             `bspline3`: Cubic splines.
+            `gimp-bspline2`: Quadratic splines averaged over the particle's box.
             `cpdi`: Parallelograms that deform with the particle.
             `cpdi2`: Quadrilaterals (in space hexahedra) whose corners neighbours share.
             `bspline4`: Quartic splines (total Lagrangian).

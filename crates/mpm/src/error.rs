@@ -60,7 +60,7 @@ pub enum StepError {
     /// A particle box grew wider than the weights support.
     #[error(
         "step {step}, time {time:.6e}: the box of particle {particle} has half-size {half_size:.3e} along axis {axis}, \
-         more than the supported {limit:.3e} (two cells)"
+         more than the supported {limit:.3e}"
     )]
     TooLarge {
         /// Number of the failed step, counted from 1; 0 for the initial state.

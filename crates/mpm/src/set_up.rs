@@ -131,7 +131,7 @@ fn check_domains<T: Lanes, const D: usize>(
     shape: Shape,
 ) -> Result<(), SetupError> {
     let Body { particles: Particles { half_size, .. }, half_edges, .. } = body;
-    let of_boxes = matches!(shape, Shape::Ugimp | Shape::Gimp);
+    let of_boxes = matches!(shape, Shape::Ugimp | Shape::Gimp | Shape::GimpBspline2);
     if of_boxes || (shape == Shape::Cpdi && half_edges.is_empty()) {
         for (axis, &l) in half_size.iter().enumerate() {
             positive(&|| format!("the half-size of particles along axis {axis}"), l)?;

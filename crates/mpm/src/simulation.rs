@@ -333,7 +333,9 @@ fn error_of<T: Lanes, const D: usize>(
             let l = domain.half_size(c, particle, F);
             let axis = axis_too_large(&l).unwrap_or(0);
             let spacing = figure(c.spacing());
-            let (half_size, limit) = (figure(l[axis]) * spacing, spacing * HALF_SIZE_LIMIT);
+            let beyond = domain.beyond_box();
+            let half_size = (figure(l[axis]) - beyond) * spacing;
+            let limit = spacing * (HALF_SIZE_LIMIT - beyond);
             StepError::TooLarge { step, time, particle, axis, half_size, limit }
         }
     }

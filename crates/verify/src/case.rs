@@ -197,14 +197,14 @@ impl Case {
                 Err(CaseError::setting("layout", clipped.name(), instead))
             }
             Scheme::Updated(Updated {
-                shape: Shape::Ugimp | Shape::Gimp,
+                shape: Shape::Ugimp | Shape::Gimp | Shape::GimpBspline2,
                 placement: fitted @ Placement::BodyFitted,
                 ..
             }) => Err(CaseError::setting(
                 "layout",
                 fitted.name(),
-                "lattice with gimp and ugimp, whose boxes lie along the axes, or the shape cpdi2, cpdi, linear, bspline2 or \
-                 bspline3",
+                "lattice with gimp, ugimp and gimp-bspline2, whose boxes lie along the axes, or the shape cpdi2, cpdi, linear, \
+                 bspline2 or bspline3",
             )),
             Scheme::Updated(_) | Scheme::Total(_) => Ok(()),
         }

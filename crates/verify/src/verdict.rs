@@ -250,9 +250,10 @@ pub fn expected_in_space(exact: &AnySolution<f64>, case: &Case) -> Expected {
             ..
         }) => {
             let contiguous = match (placement, shape) {
-                (Placement::Lattice { .. }, Shape::Gimp | Shape::Cpdi | Shape::Cpdi2) => {
-                    in_dimension!(exact, |s| stays_aligned(s), else false)
-                }
+                (
+                    Placement::Lattice { .. },
+                    Shape::Gimp | Shape::GimpBspline2 | Shape::Cpdi | Shape::Cpdi2,
+                ) => in_dimension!(exact, |s| stays_aligned(s), else false),
                 (Placement::BodyFitted | Placement::Clipped { .. }, Shape::Cpdi2) => true,
                 _ => false,
             };

@@ -72,7 +72,7 @@ fn a_motion_that_keeps_the_volume_has_the_errors_of_a_compressible_body() {
 #[test]
 fn transfers_project_volumes_in_the_updated_formulation() {
     let [far, near] = [0.3, NEAR].map(|nu| solution("swirl", &[("nu", nu), ("A", 0.01)]));
-    for shape in ["gimp", "bspline2", "cpdi"] {
+    for shape in ["gimp", "bspline2", "gimp-bspline2", "cpdi"] {
         let scheme =
             Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
         let pointwise = Case {

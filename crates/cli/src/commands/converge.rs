@@ -1,5 +1,6 @@
 //! `mms converge`: orders of accuracy.
 
+mod growing;
 mod judged;
 mod told;
 

@@ -185,3 +185,27 @@ fn points_of_a_displacement_at_rest_need_no_time() {
         assert!(refused.stderr.contains("t is missing") || refused.stderr.contains("no column t"));
     }
 }
+
+/// Sums over the points of particles are no integrals, so that errors grow on finer grids; means over boxes are.
+#[test]
+fn errors_that_grow_under_refinement_are_warned_of() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let study = |scheme: &str| {
+        let call = format!(
+            "converge axis-aligned-1d --cells 32,64,128 --periods 0.5 --json study.json {scheme}"
+        );
+        let called = mms(place, &call);
+        (called.stdout, read_json(&place.join("study.json")))
+    };
+    let (said, found) = study("--shape bspline2 --transfer apic");
+    assert!(said.contains("warning: particle quadrature"), "{said}");
+    assert_eq!(found["quadrature"]["instead"], "--shape gimp-bspline2");
+    assert!(found["quadrature"]["order"].as_f64().unwrap() < 0.0);
+    let (said, found) = study("--shape gimp-bspline2 --transfer apic");
+    assert!(!said.contains("warning"), "{said}");
+    assert!(found["quadrature"].is_null() && found["refinement"].is_null());
+    let (said, found) = study("--integrator musl");
+    assert!(said.contains("grows on the finest grids"), "{said}");
+    assert!(found["quadrature"].is_null() && found["refinement"]["field"].is_string());
+}

@@ -48,6 +48,11 @@ named! {
         ///
         /// Walls as for `Bspline2`.
         Bspline3 = "bspline3",
+        /// Quadratic splines averaged over the particle's box
+        ///
+        /// The mean of `Bspline2` over a box that follows the particle's stretch, as `Gimp` is the mean of `Linear`: boxes tile the body,
+        /// and the sums over them are integrals. Walls as for `Bspline2`.
+        GimpBspline2 = "gimp-bspline2",
         /// Parallelograms that deform with the particle
         ///
         /// Hat functions interpolated between the corners of a parallelogram that F carries along (CPDI: Sadeghirad, Brannon
@@ -79,6 +84,7 @@ pub(crate) fn new<T: Lanes, const D: usize>(
         Shape::Gimp => product(OnAxis::StretchingBox, boxes),
         Shape::Bspline2 => product(OnAxis::Quadratic, SVector::repeat(real(0.5))),
         Shape::Bspline3 => product(OnAxis::Cubic, SVector::repeat(real(1.0))),
+        Shape::GimpBspline2 => product(OnAxis::QuadraticMean, boxes),
         Shape::Cpdi => Box::new(Parallelograms::new(half_edges, half_size)),
     }
 }

@@ -25,6 +25,11 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
     /// Half-sizes of the box around a particle's domain, in cells, about the particle's position.
     fn half_size(&self, c: &Constants<T, D>, p: usize, F: &SMatrix<T, D, D>) -> SVector<T, D>;
 
+    /// By how much [half-sizes](Self::half_size) exceed those of the domain itself, in cells. Default: not at all.
+    fn beyond_box(&self) -> f64 {
+        0.0
+    }
+
     /// The rows of nodes that a particle with these half-sizes reaches.
     fn rows(
         &self,

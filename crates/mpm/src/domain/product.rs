@@ -9,7 +9,7 @@ use crate::grid::geometry::Constants;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::product::ProductWeights;
-use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, OnAxis, ProductShape, half_size};
+use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, ProductShape, half_size};
 
 impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
     fn weights(&self, is_affine: bool) -> Box<dyn BlockWeights<T, D>> {
@@ -18,6 +18,10 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
 
     fn half_size(&self, _: &Constants<T, D>, _: usize, F: &SMatrix<T, D, D>) -> SVector<T, D> {
         SVector::from_fn(|a, _| self.half_size(a, F[(a, a)]))
+    }
+
+    fn beyond_box(&self) -> f64 {
+        self.on_axis.beyond_box()
     }
 
     fn rows(
@@ -36,7 +40,7 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
         let mut all_valid = true;
         let (shape, all) = (self, &mut all_valid);
-        if self.on_axis == OnAxis::StretchingBox {
+        if self.on_axis.stretches() {
             dispatch(CheckBoxes::<_, D, true> { of_block, shape, all_valid: all });
         } else {
             dispatch(CheckBoxes::<_, D, false> { of_block, shape, all_valid: all });
@@ -60,7 +64,9 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
         let OfBlock { c, ids, bins, kinematics: Kinematics { x, F } } = of_block;
         let (width, above) = (shape.width(), shape.extended_above());
         let more_rows: T = real((EXTENDED - width) as f64);
-        let half_size = |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]);
+        let beyond: T = real(shape.on_axis.beyond_box());
+        let half_size =
+            |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]) + beyond;
         // The lower edge, and the same where it would be for the last row of a box with extended support.
         let edges = |k: usize, is_extended: bool| {
             let a = D - 1;

@@ -16,8 +16,8 @@ use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::shape::one_axis::{
-    CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticSpline, ShapeFunction, half_size, index,
-    moment,
+    CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticMean, QuadraticSpline, ShapeFunction,
+    half_size, index, moment,
 };
 use crate::shape::weights::{ExtendedWeights, Weights, is_middle};
 
@@ -115,9 +115,9 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         }
     }
 
-    /// Position and half-sizes of a particle whose box has extended support.
+    /// Shape, position and half-sizes of a particle whose box has extended support.
     #[inline(always)]
-    fn extended(&self, k: usize) -> Option<([T; D], [T; D])> {
+    fn extended(&self, k: usize) -> Option<Extended<T, D>> {
         if !self.any_extended {
             return None;
         }
@@ -126,7 +126,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
             (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
             is_extended |= l[a] > self.shape.extended_above();
         }
-        is_extended.then_some((xi, l))
+        is_extended.then_some(Extended { on_axis: self.shape.on_axis, xi, l })
     }
 }
 
@@ -142,6 +142,9 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
                 self.compute_on_axes::<QuadraticSpline, 3, false>(c, &l, kinematics);
             }
             OnAxis::Cubic => self.compute_on_axes::<CubicSpline, 4, false>(c, &l, kinematics),
+            OnAxis::QuadraticMean => {
+                self.compute_on_axes::<QuadraticMean, 4, true>(c, &l, kinematics);
+            }
         }
     }
 
@@ -202,6 +205,23 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
                 (self.S[a][last][k], self.G[a][last][k]) = (T::zero(), T::zero());
             }
         }
+    }
+}
+
+/// A particle whose box has extended support.
+struct Extended<T, const D: usize> {
+    on_axis: OnAxis,
+    /// Position and half-sizes in cells, as in [`ProductWeights`].
+    xi: [T; D],
+    l: [T; D],
+}
+
+impl<T: Lanes, const D: usize> Extended<T, D> {
+    fn weights<const AFFINE: bool>(
+        &self,
+        strides: (&[usize; D], usize),
+    ) -> ExtendedWeights<T, D, AFFINE> {
+        ExtendedWeights::new(self.on_axis, &self.xi, &self.l, strides)
     }
 }
 
@@ -310,7 +330,9 @@ where
         let of_particle = |k: usize, a: usize| {
             let Kinematics { x, F } = kinematics;
             let F_aa = stretch(c.planted, &F[k], a);
-            (c.in_cells(&x[k])[a], half_size::<_, STRETCHING>(reference[a], F_aa))
+            let of_box = half_size::<_, STRETCHING>(reference[a], F_aa);
+            let l = if R::BEYOND_BOX > 0.0 { of_box + real(R::BEYOND_BOX) } else { of_box };
+            (c.in_cells(&x[k])[a], l)
         };
         // In single precision the loop is vectorised only where the numbers of an axis lie side by side; in double precision it is
         // vectorised either way, and laying them so would cost 1 to 3 % of a step.
@@ -436,9 +458,9 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
         }
         for k in 0..count {
             let given = (contributions, k);
-            if let Some((xi, l)) = weights.extended(k) {
+            if let Some(extended) = weights.extended(k) {
                 let strides = (strides, weights.nodes_before);
-                p2g_extended::<T, D, AFFINE>(&xi, &l, strides, band, first, given);
+                p2g_extended::<T, D, AFFINE>(&extended, strides, band, first, given);
             } else if D == 3 {
                 p2g_in_space(vectors, &of_particle(k), strides, band, first, given);
             } else {
@@ -450,14 +472,13 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 
 #[inline(never)]
 fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
-    xi: &[T; D],
-    l: &[T; D],
+    extended: &Extended<T, D>,
     (strides, nodes_before): (&[usize; D], usize),
     band: &mut [Node<T, D>],
     first: usize,
     contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
-    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, (strides, nodes_before));
+    let weights = extended.weights::<AFFINE>((strides, nodes_before));
     p2g(&weights, strides, band, first, contribution);
 }
 
@@ -484,9 +505,9 @@ where
         // A particle's bits do not depend on the others of its block, which are others where the body is shared out.
         let mut k = 0;
         while k < count {
-            if let Some((xi, l)) = weights.extended(k) {
+            if let Some(extended) = weights.extended(k) {
                 let strides = (strides, weights.nodes_before);
-                receiver.receive(k, &g2p_extended::<T, D, AFFINE>(&xi, &l, strides, nodes));
+                receiver.receive(k, &g2p_extended::<T, D, AFFINE>(&extended, strides, nodes));
                 k += 1;
             } else if D == 3 {
                 receiver.receive(k, &g2p_in_space(vectors, &of_particle(k), strides, nodes));
@@ -506,93 +527,13 @@ where
 
 #[inline(never)]
 fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
-    xi: &[T; D],
-    l: &[T; D],
+    extended: &Extended<T, D>,
     (strides, nodes_before): (&[usize; D], usize),
     nodes: &[Node<T, D>],
 ) -> Interpolated<T, D> {
-    let weights = ExtendedWeights::<T, D, AFFINE>::new(xi, l, (strides, nodes_before));
+    let weights = extended.weights::<AFFINE>((strides, nodes_before));
     g2p(&weights, strides, nodes)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::array;
-
-    use crate::kernel::block::tests::{constants, noise};
-
-    /// Boxes may grow and shrink again from one time that a block is used to the next.
-    #[test]
-    fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extended_support() {
-        fn check<const D: usize, const AFFINE: bool>() {
-            let (c, nodes) = constants::<D>();
-            let reference = SVector::repeat(0.25);
-            let shape = ProductShape { on_axis: OnAxis::StretchingBox, l: reference };
-            let x: [_; BLOCK] =
-                array::from_fn(|k| SVector::from_fn(|a, _| 2.0 + 1.2 * noise(5 * k + a)));
-            let grid: Vec<Node<f64, D>> = (0..nodes)
-                .map(|n| Node { values: array::from_fn(|q| noise(8 * n + q + 1000)) })
-                .collect();
-            let mut contributions = Contributions::<f64, D, BLOCK>::zero();
-            for k in 0..BLOCK {
-                let of = |from: usize| SVector::from_fn(|a, _| noise(3 * k + a + from));
-                contributions.value[k] = Node::new(&of(50), &of(700), 1.0 + 0.5 * noise(k));
-                contributions.stress_flux[k] =
-                    SMatrix::from_fn(|i, j| noise(9 * k + 3 * i + j + 2000));
-                contributions.affine[k] = SMatrix::from_fn(|i, j| noise(7 * k + 3 * i + j + 3000));
-            }
-            let mut block = ProductWeights::new(&shape, AFFINE);
-            for extended in [vec![], vec![0], vec![5, BLOCK - 1], (0..BLOCK).collect(), vec![]] {
-                let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
-                    let mut F = SMatrix::identity();
-                    if extended.contains(&k) {
-                        F[(k % D, k % D)] = 3.0 + noise(k);
-                    }
-                    F
-                });
-                block.compute(&c, &[], Kinematics { x: &x, F: &F });
-                let exact = |k: usize| {
-                    let l = array::from_fn(|a| reference[a] * F[k][(a, a)]);
-                    ExtendedWeights::<_, D, AFFINE>::new(&c.in_cells(&x[k]), &l, (&c.strides, 0))
-                };
-                for count in [BLOCK, 41] {
-                    let mut interpolated = [Interpolated::zero(); BLOCK];
-                    block.g2p(&c.strides, &grid, &mut interpolated[..count]);
-                    for k in 0..count {
-                        let alone = g2p(&exact(k), &c.strides, &grid);
-                        let off = (interpolated[k].velocity - alone.velocity).amax();
-                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
-                        let off = (interpolated[k].second - alone.second).amax();
-                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
-                        let off =
-                            (interpolated[k].velocity_gradient - alone.velocity_gradient).amax();
-                        assert!(off < 1e-13, "{extended:?} {k} {off:e}");
-                        // Divided by an inertia of some hundredths of a cell.
-                        let off = (interpolated[k].affine - alone.affine).amax();
-                        assert!(off < 1e-11, "{extended:?} {k} {off:e}");
-                    }
-                    assert!(interpolated[count..].iter().all(|own| own.velocity.amax() == 0.0));
-
-                    let mut sums = vec![Node::zero(); nodes];
-                    let mut one_by_one = sums.clone();
-                    block.p2g(&c.strides, &mut sums, 0, &contributions, count);
-                    for k in 0..count {
-                        p2g(&exact(k), &c.strides, &mut one_by_one, 0, (&contributions, k));
-                    }
-                    for (a, b) in sums.iter().zip(&one_by_one) {
-                        for (a, b) in a.values.iter().zip(&b.values) {
-                            assert!((a - b).abs() < 1e-12, "{extended:?} {a} {b}");
-                        }
-                    }
-                }
-            }
-        }
-        check::<1, false>();
-        check::<2, false>();
-        check::<3, false>();
-        check::<1, true>();
-        check::<2, true>();
-        check::<3, true>();
-    }
-}
+mod tests;

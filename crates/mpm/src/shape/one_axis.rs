@@ -15,6 +15,8 @@ use crate::grid::PAD_BELOW;
 pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
 /// Nodes along each axis of the extended support, which the largest box needs.
 pub(crate) const EXTENDED: usize = 6;
+/// How far a quadratic spline reaches beyond a hat function, in cells.
+const HALF_A_CELL: f64 = 0.5;
 
 /// Weights and gradients at `W` successive nodes of one axis: entry `k` of each array belongs to node `base + k`.
 #[derive(Clone, Copy, Debug)]
@@ -46,14 +48,21 @@ pub(crate) fn moment<T: RealField + Copy, const W: usize>(S: &[T; W], after_firs
 
 /// The weights along all axes of a box with extended support.
 pub(crate) fn extended_axes<T: RealField + Copy, const D: usize>(
+    on_axis: OnAxis,
     xi: &[T; D],
     l: &[T; D],
 ) -> [AxisWeights<T, EXTENDED>; D] {
-    std::array::from_fn(|a| extended_axis(xi[a], l[a]))
+    std::array::from_fn(|a| match on_axis {
+        OnAxis::QuadraticMean => extended_spline(xi[a], l[a]),
+        _ => extended_axis(xi[a], l[a]),
+    })
 }
 
 /// A shape function along one axis, with `W` nodes.
 pub(crate) trait ShapeFunction<const W: usize>: Copy + Send + Sync + 'static {
+    /// By how much a half-size exceeds that of the particle's own box.
+    const BEYOND_BOX: f64 = 0.0;
+
     /// The weights at `xi` for a half-size without extended support.
     fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, W>;
 }
@@ -136,6 +145,48 @@ impl ShapeFunction<4> for CubicSpline {
     }
 }
 
+/// Means of quadratic B-splines over a box.
+///
+/// A quadratic spline is itself the mean of hat functions over one cell: half-sizes count half a cell more than the particle's box has, so
+/// that nodes are found as for hat functions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QuadraticMean;
+
+impl ShapeFunction<4> for QuadraticMean {
+    const BEYOND_BOX: f64 = HALF_A_CELL;
+
+    /// For a box of at most one cell, which has at most one joint of the splines in it: the middle of the cell below the third node.
+    #[inline(always)]
+    fn axis_weights<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, 4> {
+        let (one, two, half) = (T::one(), real::<T>(2.0), real::<T>(0.5));
+        let (base, node) = node_below(xi - l);
+        let l = l - half;
+        // From the second node.
+        let r = xi - node - one;
+        // The part of the box below the joint: from how far below it, to how far.
+        let (from, to) = ((half - r) + l, (half - r) - l);
+        let to = if to > T::zero() { to } else { T::zero() };
+        // The same, from the joint before.
+        let (low, high) = ((half + r) - l, (half + r) + l);
+        let high = if high < one { high } else { one };
+        // The lengths of the parts beyond the joint and below it.
+        let (all, beyond) = (l + l, (r + l) - half);
+        let far = if beyond > T::zero() { beyond } else { T::zero() };
+        let far = if far < all { far } else { all };
+        let near = all - far;
+        let (quarter, twelfth) = (real::<T>(0.25) / l, real::<T>(1.0 / 12.0) / l);
+        let squares = |a: T, b: T| (a * a + b * b) + a * b;
+        let rest = far * (real::<T>(3.0) + far * (real::<T>(3.0) - two * far));
+        let S0 = near * squares(from, to) * twelfth;
+        let S2 = (near * squares(low, high) + rest) * twelfth;
+        let S3 = far * far * far * twelfth;
+        let G0 = -near * (from + to) * quarter;
+        let G2 = (near * (low + high) + two * far * (one - far)) * quarter;
+        let G3 = far * far * quarter;
+        AxisWeights { base, S: [S0, one - S0 - S2 - S3, S2, S3], G: [G0, -G0 - G2 - G3, G2, G3] }
+    }
+}
+
 /// Shape functions on one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OnAxis {
@@ -146,6 +197,23 @@ pub(crate) enum OnAxis {
     StretchingBox,
     Quadratic,
     Cubic,
+    /// Means of quadratic splines over boxes that the diagonal of F stretches.
+    QuadraticMean,
+}
+
+impl OnAxis {
+    /// Whether boxes stretch with the diagonal of F.
+    pub(crate) fn stretches(self) -> bool {
+        matches!(self, Self::StretchingBox | Self::QuadraticMean)
+    }
+
+    /// By how much a half-size exceeds that of the particle's own box.
+    pub(crate) fn beyond_box(self) -> f64 {
+        match self {
+            Self::QuadraticMean => QuadraticMean::BEYOND_BOX,
+            _ => 0.0,
+        }
+    }
 }
 
 /// A shape function whose weights are products over the axes.
@@ -159,10 +227,11 @@ pub(crate) struct ProductShape<T, const D: usize> {
 impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
     /// Half-size of a box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
     pub(crate) fn half_size(&self, axis: usize, F_aa: T) -> T {
-        match self.on_axis {
-            OnAxis::StretchingBox => half_size::<_, true>(self.l[axis], F_aa),
-            _ => half_size::<_, false>(self.l[axis], F_aa),
-        }
+        let of_box = match self.on_axis.stretches() {
+            true => half_size::<_, true>(self.l[axis], F_aa),
+            false => half_size::<_, false>(self.l[axis], F_aa),
+        };
+        of_box + real(self.on_axis.beyond_box())
     }
 
     /// Nodes along each axis, except for a box with extended support.
@@ -170,7 +239,7 @@ impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
         match self.on_axis {
             OnAxis::Hat => 2,
             OnAxis::FixedBox | OnAxis::StretchingBox | OnAxis::Quadratic => 3,
-            OnAxis::Cubic => 4,
+            OnAxis::Cubic | OnAxis::QuadraticMean => 4,
         }
     }
 
@@ -178,6 +247,7 @@ impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
     pub(crate) fn extended_above(&self) -> T {
         match self.on_axis {
             OnAxis::FixedBox | OnAxis::StretchingBox => real(0.5),
+            OnAxis::QuadraticMean => real(1.0),
             OnAxis::Hat | OnAxis::Quadratic | OnAxis::Cubic => real(HALF_SIZE_LIMIT),
         }
     }
@@ -248,18 +318,60 @@ fn extended_axis<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, EXTENDED> {
     let one = T::one();
     let (base, node) = node_below(xi - l);
     let edge = xi - l - node;
-    let scale = real::<T>(0.5) / l;
     let hat = |s: T| (one - s.abs()).max(T::zero());
     // The hat's antiderivative that vanishes at the centre.
     let integral = |s: T| {
         let s = s.clamp(-one, one);
         s - s * s.abs() * real(0.5)
     };
+    means_between(base, edge, l, integral, hat)
+}
+
+/// Exact mean of the quadratic splines over the box, for any `l` up to `HALF_SIZE_LIMIT`, which counts half a cell more than the box has.
+#[inline]
+fn extended_spline<T: RealField + Copy>(xi: T, l: T) -> AxisWeights<T, EXTENDED> {
+    let (half, third) = (real::<T>(0.5), real::<T>(1.0 / 3.0));
+    let (base, node) = node_below(xi - l);
+    let l = l - half;
+    let edge = xi - l - node;
+    let (end, three_quarters) = (real::<T>(1.5), real::<T>(0.75));
+    let spline = |s: T| {
+        let r = s.abs();
+        let q = (end - r).max(T::zero());
+        if r < half { three_quarters - s * s } else { q * q * half }
+    };
+    // The spline's antiderivative that vanishes at the centre.
+    let integral = |s: T| {
+        let s = s.clamp(-end, end);
+        let q = end - s.abs();
+        let outer = half - q * q * q * (half * third);
+        if s.abs() < half {
+            s * (three_quarters - s * s * third)
+        } else if s > T::zero() {
+            outer
+        } else {
+            -outer
+        }
+    };
+    means_between(base, edge, l, integral, spline)
+}
+
+/// Means over a box of half-size `l` whose lower edge is at `edge`, counted from the first node, of a function about each node; by the
+/// antiderivative that vanishes at the centre.
+#[inline(always)]
+fn means_between<T: RealField + Copy>(
+    base: f64,
+    edge: T,
+    l: T,
+    integral: impl Fn(T) -> T,
+    function: impl Fn(T) -> T,
+) -> AxisWeights<T, EXTENDED> {
+    let scale = real::<T>(0.5) / l;
     let from = |k: usize| edge - real(k as f64);
     AxisWeights {
         base,
         S: std::array::from_fn(|k| (integral(from(k) + l + l) - integral(from(k))) * scale),
-        G: std::array::from_fn(|k| (hat(from(k) + l + l) - hat(from(k))) * scale),
+        G: std::array::from_fn(|k| (function(from(k) + l + l) - function(from(k))) * scale),
     }
 }
 
@@ -297,6 +409,14 @@ mod tests {
 
     fn cubic(xi: f64) -> AxisWeights<f64, 4> {
         CubicSpline::axis_weights(xi, 1.0)
+    }
+
+    fn mean(xi: f64, l: f64) -> AxisWeights<f64, 4> {
+        QuadraticMean::axis_weights(xi, l + HALF_A_CELL)
+    }
+
+    fn extended_mean(xi: f64, l: f64) -> AxisWeights<f64, EXTENDED> {
+        extended_spline(xi, l + HALF_A_CELL)
     }
 
     /// The formula as printed in the source.
@@ -337,6 +457,8 @@ mod tests {
             check(&quadratic(xi), xi)?;
             check(&cubic(xi), xi)?;
             check(&extended_axis(xi, wide), xi)?;
+            check(&mean(xi, l), xi)?;
+            check(&extended_mean(xi, 0.75 * wide), xi)?;
         }
 
         /// Particles are sorted by the bin of the first node of their weights.
@@ -344,6 +466,7 @@ mod tests {
         fn the_first_layer_is_that_of_the_weights(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
             prop_assert_eq!(first_layer(xi, l) as f64, gimp_axis(xi, l).base);
             prop_assert_eq!(first_layer(xi, 0.0) as f64, hat(xi).base);
+            prop_assert_eq!(first_layer(xi, l + HALF_A_CELL) as f64, mean(xi, l).base);
         }
 
         #[test]
@@ -356,12 +479,40 @@ mod tests {
             }
         }
 
+        /// Three Gauss points between the splines' joints are exact.
+        #[test]
+        fn means_of_splines_are_exact(xi in 0.0..20.0_f64, l in 1e-2..0.5_f64, wide in 1e-2..1.5_f64) {
+            let (formula, exact) = (spread(&mean(xi, l)), spread(&extended_mean(xi, l)));
+            for &(node, S, G) in &exact {
+                let (S1, G1) = at(&formula, node);
+                prop_assert!((S - S1).abs() < 1e-13 && (G - G1).abs() < 1e-12);
+            }
+            let (low, high) = (xi - wide, xi + wide);
+            let joints = (-4..24).map(|k| f64::from(k) + 0.5).filter(|joint| (low..high).contains(joint));
+            let ends: Vec<f64> = [low].into_iter().chain(joints).chain([high]).collect();
+            for (node, S, G) in spread(&extended_mean(xi, wide)) {
+                let (mut S1, mut G1) = (0.0, 0.0);
+                for ends in ends.windows(2) {
+                    let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
+                    for (s, w) in [(-0.6_f64.sqrt(), 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.6_f64.sqrt(), 5.0 / 9.0)] {
+                        let (S, G) = at(&spread(&quadratic(middle + half * s)), node);
+                        (S1, G1) = (S1 + S * w * half, G1 + G * w * half);
+                    }
+                }
+                prop_assert!((S - S1 / (2.0 * wide)).abs() < 1e-13, "{} {}", S, S1 / (2.0 * wide));
+                prop_assert!((G - G1 / (2.0 * wide)).abs() < 1e-12);
+            }
+        }
+
         #[test]
         fn weights_are_continuous_where_the_formula_changes(xi in 0.0..20.0_f64) {
             let (below, above) = (spread(&gimp_axis(xi, 0.5)), spread(&extended_axis(xi, 0.5 + 1e-12)));
-            for &(node, S, G) in &above {
-                let (S1, G1) = at(&below, node);
-                prop_assert!((S - S1).abs() < 1e-11 && (G - G1).abs() < 1e-11);
+            let splines = (spread(&mean(xi, 0.5)), spread(&extended_mean(xi, 0.5 + 1e-12)));
+            for (below, above) in [(below, above), splines] {
+                for &(node, S, G) in &above {
+                    let (S1, G1) = at(&below, node);
+                    prop_assert!((S - S1).abs() < 1e-11 && (G - G1).abs() < 1e-11);
+                }
             }
         }
 
@@ -373,6 +524,7 @@ mod tests {
                 (spread(&quadratic(xi - d)), spread(&quadratic(xi)), spread(&quadratic(xi + d))),
                 (spread(&cubic(xi - d)), spread(&cubic(xi)), spread(&cubic(xi + d))),
                 (spread(&extended_axis(xi - d, wide)), spread(&extended_axis(xi, wide)), spread(&extended_axis(xi + d, wide))),
+                (spread(&mean(xi - d, l)), spread(&mean(xi, l)), spread(&mean(xi + d, l))),
             ] {
                 for &(node, _, G) in &here {
                     let slope = (at(&plus, node).0 - at(&minus, node).0) / (2.0 * d);

@@ -4,7 +4,7 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 use nalgebra::SMatrix;
 
-use crate::shape::one_axis::{AxisWeights, EXTENDED, extended_axes, moment};
+use crate::shape::one_axis::{AxisWeights, EXTENDED, OnAxis, extended_axes, moment};
 
 /// The weights `S_ip` of one particle and their gradients `G_ip`, however they are stored.
 ///
@@ -32,7 +32,7 @@ pub(crate) const fn is_middle<const W: usize>(place: usize) -> bool {
     W == 3 && place == 1
 }
 
-/// Weights of a GIMP box with extended support: more than three nodes along some axis.
+/// Weights of a box with extended support: more than three nodes along some axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ExtendedWeights<T, const D: usize, const AFFINE: bool> {
     axes: [AxisWeights<T, EXTENDED>; D],
@@ -44,11 +44,12 @@ pub(crate) struct ExtendedWeights<T, const D: usize, const AFFINE: bool> {
 impl<T: Lanes, const D: usize, const AFFINE: bool> ExtendedWeights<T, D, AFFINE> {
     #[inline(never)]
     pub(crate) fn new(
+        on_axis: OnAxis,
         xi: &[T; D],
         l: &[T; D],
         (strides, nodes_before): (&[usize; D], usize),
     ) -> Self {
-        let axes = extended_axes(xi, l);
+        let axes = extended_axes(on_axis, xi, l);
         let first_node: usize = (0..D).map(|a| axes[a].base as usize * strides[a]).sum();
         let first_node = first_node - nodes_before;
         Self { place: std::array::from_fn(|a| axes[a].after_first(xi[a])), axes, first_node }

@@ -167,6 +167,17 @@ mod tests {
         ] {
             for_all_limits("stretching", F, half_size, end, &of_box);
         }
+        let of_spline = valid(shape(OnAxis::QuadraticMean, 0.25));
+        for (F, half_size, end) in [
+            (one, 0.75, 26.0),
+            (with(1.0, 2.0), 1.0, 26.0),
+            (with(1.0, 3.0), 1.25, 24.0),
+            (with(3.0, 1.0), 0.75, 24.0),
+            (with(1.0, 6.0), 2.0, 24.0),
+        ] {
+            for_all_limits("spline", F, half_size, end, &of_spline);
+        }
+        assert!(!of_spline(vector![1.2, 9.0], with(6.125, 1.0)));
         for F in [with(8.125, 1.0), with(1.0, 8.125)] {
             assert!(!of_box(vector![1.2, 9.0], F));
         }

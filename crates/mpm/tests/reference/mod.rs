@@ -304,7 +304,9 @@ where
             Some((2, "has left the grid"))
         } else {
             let is_limited = shape != Shape::Cpdi2;
-            let too_large = is_limited && half_size(shape, &self.body, p).max() > limit;
+            // Splines reach half a cell further than hat functions.
+            let beyond = if shape == Shape::GimpBspline2 { 0.5 * self.grid.spacing } else { 0.0 };
+            let too_large = is_limited && half_size(shape, &self.body, p).max() > limit - beyond;
             too_large.then_some((3, "is too large"))
         }
     }

@@ -3,12 +3,13 @@ use std::collections::BTreeMap;
 use super::*;
 use mmsmith_clip::{Clip, Side};
 
-const SHAPES: [Shape; 7] = [
+const SHAPES: [Shape; 8] = [
     Shape::Linear,
     Shape::Ugimp,
     Shape::Gimp,
     Shape::Bspline2,
     Shape::Bspline3,
+    Shape::GimpBspline2,
     Shape::Cpdi,
     Shape::Cpdi2,
 ];

@@ -232,6 +232,16 @@ fn at_distance(shape: Shape, s: f64, l: f64) -> (f64, f64) {
         Shape::Bspline3 if r < 1.0 => (2.0 / 3.0 - r * r + 0.5 * r.powi(3), s * (1.5 * r - 2.0)),
         Shape::Bspline3 if r < 2.0 => ((2.0 - r).powi(3) / 6.0, -0.5 * (2.0 - r).powi(2) * sign),
         Shape::Bspline2 | Shape::Bspline3 => (0.0, 0.0),
+        Shape::GimpBspline2 => {
+            let spline = |s: f64| at_distance(Shape::Bspline2, s, 0.0).0;
+            // Simpson's rule is exact between the spline's joints.
+            let part = |from: f64, to: f64| {
+                let (from, to) = ((s - l).clamp(from, to), (s + l).clamp(from, to));
+                (to - from) / 6.0 * (spline(from) + 4.0 * spline(0.5 * (from + to)) + spline(to))
+            };
+            let sum = part(-1.5, -0.5) + part(-0.5, 0.5) + part(0.5, 1.5);
+            (sum / (2.0 * l), (spline(s + l) - spline(s - l)) / (2.0 * l))
+        }
         // At nodes the slope is that on the side of larger coordinates.
         _ if (0.0..1.0).contains(&s) => (hat(s), -1.0),
         _ if (-1.0..0.0).contains(&s) => (hat(s), 1.0),
@@ -254,7 +264,7 @@ pub(super) fn half_size<const D: usize>(
     let E = half_edges(body, p).diagonal();
     match shape {
         Shape::Ugimp => E,
-        Shape::Gimp => E.component_mul(&body.particles.F[p].diagonal()).abs(),
+        Shape::Gimp | Shape::GimpBspline2 => E.component_mul(&body.particles.F[p].diagonal()).abs(),
         _ => {
             let corners = domain(shape, body, p).unwrap_or_default();
             let reaches = corners.iter().map(|corner| (corner - body.particles.x[p]).abs());

@@ -49,6 +49,11 @@ where
     })
 }
 
+/// The largest half-size of a box on these grids, which have a spacing of a quarter.
+fn limit_of(shape: Shape) -> f64 {
+    if shape == Shape::GimpBspline2 { 0.375 } else { 0.5 }
+}
+
 #[test]
 fn initial_states_are_admitted_up_to_the_limits() {
     fn check<const D: usize>()
@@ -93,8 +98,8 @@ fn initial_states_are_admitted_up_to_the_limits() {
                     of(shape, &stretch(J), Some(&error));
                 }
                 of(shape, &stretch(1e-9), None);
-                // Half of a box is half a cell; two cells are the limit.
-                let limit = 0.5;
+                // Half of a box is half a cell; two cells are the limit, or what splines leave of them.
+                let limit = limit_of(shape);
                 let too_large = |half_size: f64| StepError::TooLarge {
                     step,
                     time,
@@ -103,8 +108,8 @@ fn initial_states_are_admitted_up_to_the_limits() {
                     half_size,
                     limit,
                 };
-                of(shape, &stretch(4.0), None);
-                let stretches = matches!(shape, Shape::Gimp | Shape::Cpdi);
+                of(shape, &stretch(limit / 0.125), None);
+                let stretches = matches!(shape, Shape::Gimp | Shape::Cpdi | Shape::GimpBspline2);
                 let error = too_large(0.125 * 4.5);
                 of(shape, &stretch(4.5), stretches.then_some(&error));
             }
@@ -114,9 +119,10 @@ fn initial_states_are_admitted_up_to_the_limits() {
                     body.half_edges.iter_mut().for_each(|E| E[(axis, axis)] = half);
                 }
             };
-            for shape in [Shape::Ugimp, Shape::Gimp, Shape::Cpdi] {
-                of(shape, &size(0.5), None);
-                let (half_size, limit, particle) = (0.5625, 0.5, 0);
+            for shape in [Shape::Ugimp, Shape::Gimp, Shape::Cpdi, Shape::GimpBspline2] {
+                let limit = limit_of(shape);
+                of(shape, &size(limit), None);
+                let (half_size, particle) = (0.5625, 0);
                 let error = StepError::TooLarge { step, time, particle, axis, half_size, limit };
                 of(shape, &size(0.5625), Some(&error));
             }

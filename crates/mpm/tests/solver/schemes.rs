@@ -8,12 +8,13 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
 use crate::reference::Reference;
 
-pub(crate) const SHAPES: [Shape; 7] = [
+pub(crate) const SHAPES: [Shape; 8] = [
     Shape::Linear,
     Shape::Ugimp,
     Shape::Gimp,
     Shape::Bspline2,
     Shape::Bspline3,
+    Shape::GimpBspline2,
     Shape::Cpdi,
     Shape::Cpdi2,
 ];
@@ -211,11 +212,13 @@ impl Scene {
             p.mass[k] *= 1.0 + 0.3 * noise(19 * k);
             p.volume[k] *= 1.0 + 0.3 * noise(23 * k);
         }
-        p.half_size *= self.overlap;
+        // Splines leave less room for boxes.
+        let overlap = if shape == Shape::GimpBspline2 { 0.75 * self.overlap } else { self.overlap };
+        p.half_size *= overlap;
         let half_edges = &mut body.half_edges;
         match self.edges {
             Edges::Boxes => half_edges.clear(),
-            _ => half_edges.iter_mut().for_each(|E| *E *= self.overlap),
+            _ => half_edges.iter_mut().for_each(|E| *E *= overlap),
         }
         if let (Edges::Sheared, Shape::Cpdi) = (self.edges, shape) {
             for (k, E) in half_edges.iter_mut().enumerate() {
@@ -727,7 +730,7 @@ fn set_ups_that_make_no_sense_are_refused() {
 #[test]
 fn a_domain_wider_than_the_grid_can_hold_is_refused() {
     let grid = open_grid::<2>(8);
-    for shape in [Shape::Gimp, Shape::Cpdi] {
+    for shape in [Shape::Gimp, Shape::Cpdi, Shape::GimpBspline2] {
         let mut body = Body::lattice(&grid, 1, 2.0, |X| X.norm() < 0.1);
         body.particles.F[0] = Matrix2::from_diagonal(&vector![5.0, 1.0]);
         let settings = settings(shape, Integrator::Cd, Transfer::Flip);

@@ -36,6 +36,7 @@ pub fn families(
             Shape::Cpdi2,
             Shape::Bspline2,
             Shape::Bspline3,
+            Shape::GimpBspline2,
         ];
         for shape in shapes.into_iter().filter(|shape| *shape != usual.shape) {
             add(Updated { shape, ..usual }, 2);

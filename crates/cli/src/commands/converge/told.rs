@@ -9,6 +9,7 @@ use mmsmith_verify::{
 use serde_json::{Map, Value, json};
 
 use super::Converge;
+use super::growing::Growing;
 use super::judged::{Judged, Verdicts, any, step};
 use crate::commands::inversion;
 use crate::commands::problem::extent;
@@ -25,8 +26,9 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
     let extent = extent(cases);
     let units = Units::of(&problem.selection);
     let advice = advice(asked, &judged.study)?;
+    let growing = Growing::find(asked, judged);
     let mut sections = sections(judged, sweep, units);
-    sections.push(Section::Note(notes(asked, judged, advice.as_ref())?));
+    sections.push(Section::Note(notes(asked, judged, advice.as_ref(), growing.as_ref())?));
     sections.push(Section::LeftOut("A wider terminal, --csv and --json have them."));
     sections.push(Section::Sheet(sheets::study(&judged.study)));
     sections.extend(
@@ -49,6 +51,9 @@ pub(super) fn report(asked: &Converge<'_>, judged: &Judged) -> Result<Report> {
         results.insert("not_judged".into(), json!(reason));
     }
     asked.warnings().insert(&mut results);
+    if let Some(growing) = &growing {
+        growing.insert(&mut results);
+    }
     if let Some((found, verdicts)) = &judged.differences {
         results.insert("temporal".into(), temporal_results(found, verdicts));
     }
@@ -94,7 +99,12 @@ fn sections(judged: &Judged, sweep: &Sweep, units: Option<Units>) -> Vec<Section
 }
 
 /// Lines below the tables.
-fn notes(asked: &Converge<'_>, judged: &Judged, advice: Option<&Advice>) -> Result<String> {
+fn notes(
+    asked: &Converge<'_>,
+    judged: &Judged,
+    advice: Option<&Advice>,
+    growing: Option<&Growing>,
+) -> Result<String> {
     let Converge { problem, base, .. } = asked;
     let Judged { study, verdicts, differences, .. } = judged;
     let mut notes = stops(study);
@@ -108,6 +118,7 @@ fn notes(asked: &Converge<'_>, judged: &Judged, advice: Option<&Advice>) -> Resu
     }
     notes += &judged.not_judged.iter().map(|reason| format!("{reason}\n")).collect::<String>();
     notes += &asked.warnings().text();
+    notes += &growing.map(Growing::text).unwrap_or_default();
     notes += &way_out(&problem.model.exact, base, study);
     notes += &advice.map(Advice::text).unwrap_or_default();
     let has_range = |judged: &Verdicts| any(judged, |one| !one.asymptotic_rows.is_empty());
