@@ -125,7 +125,7 @@ impl Fields {
 
 /// Refuses lengths that do not belong together.
 fn require(X: &[f64], dimension: usize, out: &[f64], entries: usize) -> PyResult<()> {
-    if X.len() % dimension != 0 || out.len() != X.len() / dimension * entries {
+    if !X.len().is_multiple_of(dimension) || out.len() != X.len() / dimension * entries {
         return Err(PyValueError::new_err(
             "out has another number of values than X has points for",
         ));

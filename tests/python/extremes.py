@@ -137,7 +137,7 @@ def judged(program, drawn, folder, key):
             # The points are drawn, so that the largest of them is a little less than that of the body.
             if row["errors"]["u"]["linf"] > 1.2 * amplitude > 0:
                 found.append(f"ok on {row['cells']} cells, error {row['errors']['u']['linf']:.2e} above the motion's {amplitude:.2e}")
-    reasons = [key for key in ("growth", "locking", "quadrature") if told.get(key)]
+    reasons = [key for key in ("growth", "locking", "quadrature", "refinement") if told.get(key)]
     if len(ok) == len(rows) == 2 and not reasons:
         for field in ("u", "P"):
             errors = [row["errors"][field]["l2"] for row in rows]

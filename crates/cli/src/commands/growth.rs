@@ -105,6 +105,11 @@ impl Warnings {
         self.growth.as_ref().map_or(1.0, |(found, _)| found.factor)
     }
 
+    /// Two numbers by which warnings are compared: the growth of errors, and lambda/mu where it locks.
+    pub(crate) fn severity(&self) -> (f64, f64) {
+        (self.factor(), self.locking.unwrap_or_default())
+    }
+
     /// Why orders that are missed prove nothing, where errors grow.
     pub(crate) fn not_judged(&self) -> Option<String> {
         let (found, instead) = self.growth.as_ref()?;

@@ -11,6 +11,7 @@ use mmsmith_verify::{
 };
 use serde_json::{Map, Value, json};
 
+use super::growth::Warnings;
 use super::problem::{Model, Problem, extent};
 use super::scheme::Settled;
 use super::study::{Request, Show, Study, conduct};
@@ -182,6 +183,12 @@ impl Study for Survey<'_> {
         let all = self.points.iter().zip(&rows);
         let all = all.map(|(point, row)| document(options, point, row));
         results.insert("rows".into(), all.collect::<Result<_>>()?);
+        let (place, warnings) = self.warnings();
+        warnings.insert(&mut results);
+        let mut warned = warnings.text();
+        if !warned.is_empty() && !place.is_empty() {
+            warned += &format!("  That is so at {place}, and may be at others.\n");
+        }
         Ok(Report {
             command: "stability",
             preface: common.settled.choice(),
@@ -191,7 +198,7 @@ impl Study for Survey<'_> {
                 Section::Table(title, self.table(&rows)),
                 Section::Note(LEGEND.into()),
                 Section::LeftOut("A wider terminal, --csv and --json have them."),
-                Section::Note(self.notes(&rows)),
+                Section::Note(self.notes(&rows) + &warned),
                 Section::Sheet(self.sheet(&rows)),
                 Section::Plot(picture(&common.selection, options, &rows)),
             ],
@@ -216,14 +223,18 @@ fn judge(options: &StabilityOptions, cfl: f64, criteria: &Criteria) -> Result<bo
             None => format!("CFL {cfl}: stable over {} steps\n", found.steps),
             Some(failure) => format!("CFL {cfl}: UNSTABLE: {}\n", told(failure)),
         };
+        let warnings = Warnings::of(&problem);
         let results = [("criteria", json!(criteria)), ("result", json!(found))];
+        let mut results: Map<String, Value> =
+            results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect();
+        warnings.insert(&mut results);
         let report = Report {
             command: "stability",
             preface: problem.settled.choice(),
             caption: problem.caption(extent),
-            sections: vec![Section::Note(definition(criteria) + &said)],
+            sections: vec![Section::Note(definition(criteria) + &said + &warnings.text())],
             settings: problem.settings(extent, options.grid_cells(), cfl),
-            results: results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect(),
+            results,
             verdict: Some(found.failure.is_none()),
         };
         report.publish(files)
@@ -282,6 +293,16 @@ fn told(failure: &Failure) -> String {
 }
 
 impl Survey<'_> {
+    /// The warnings of the point where errors of the motion grow most, and that point.
+    fn warnings(&self) -> (String, Warnings) {
+        let of = |point: &Point| (point.place(self.options, " = "), Warnings::of(&point.problem));
+        let all = self.points.iter().map(of);
+        let worse = |one: (String, Warnings), other: (String, Warnings)| {
+            if other.1.severity() > one.1.severity() { other } else { one }
+        };
+        all.reduce(worse).unwrap_or_else(|| (String::new(), Warnings::of(&self.common)))
+    }
+
     fn names(&self) -> Vec<&str> {
         self.options.over.iter().map(|(name, _)| name.as_str()).collect()
     }

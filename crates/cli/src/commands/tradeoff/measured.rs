@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use mmsmith_verify::{
-    Against, Case, Cheapest, Chosen, Effect, Entry, Field, Formulation, MARGIN, Named, Norm, Row,
-    Setting, Skip, Status, Tradeoff, leading,
+    Against, Case, Cheapest, Chosen, Effect, Entry, Field, MARGIN, Named, Norm, Row, Setting, Skip,
+    Status, Tradeoff, leading,
 };
 use serde_json::{Map, Value, json};
 
