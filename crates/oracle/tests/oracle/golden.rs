@@ -151,6 +151,57 @@ fn values_and_sensitivities() {
     }
 }
 
+/// A point of `tests/data/golden-isochoric.json`, whose stress is the first Piola-Kirchhoff stress.
+#[derive(Deserialize)]
+struct Isochoric {
+    X: Vec<f64>,
+    t: f64,
+    par: BTreeMap<String, f64>,
+    out: BTreeMap<String, Value>,
+}
+
+/// Motions that keep the volume, whose values are differences of motions that another program writes out (`tests/python/golden.py`).
+#[test]
+fn isochoric_motions_have_the_values_of_another_program() {
+    let file: Value = serde_json::from_str(&read("tests/data/golden-isochoric.json")).unwrap();
+    let problems: BTreeMap<String, Vec<Isochoric>> =
+        serde_json::from_value(file["problems"].clone()).unwrap();
+    assert_eq!(problems.len(), 3);
+    for (name, points) in problems {
+        let spec = of_library(&format!("incompressible/{name}"));
+        let fields = spec.derive().unwrap();
+        let all: Vec<_> =
+            by_letter(&fields).into_iter().filter(|(f, _)| !"HJ".contains(f)).collect();
+        let expressions: Vec<Expr> = all.iter().flat_map(|(_, e)| e.clone()).collect();
+        let mut oracle = Oracle::new(Oracle::USUAL_BITS).unwrap();
+        for (k, point) in points.iter().enumerate() {
+            let parameters = spec.parameters.iter().map(|p| point.par[&p.name]);
+            let doubles = point.X.iter().copied().chain([point.t]).chain(parameters);
+            let inputs = fields.inputs.iter().map(|(e, _)| *e);
+            let values: Vec<(Expr, Rational)> =
+                inputs.zip(doubles.map(|x| exact(x).unwrap())).collect();
+            let (graph, definitions) = (&fields.graph, fields.definitions.as_slice());
+            let at = Point { graph, definitions, values: &values };
+            let mut found = oracle.settle(&at, &expressions, 40).unwrap().into_iter();
+            for (field, _) in &all {
+                let rows: Vec<Value> = point.out[*field].as_array().unwrap().clone();
+                let flat = rows.iter().flat_map(|row| match row {
+                    Value::Array(row) => row.clone(),
+                    entry => vec![entry.clone()],
+                });
+                for (i, wanted) in flat.map(|entry| decimal(&entry)).enumerate() {
+                    let value = found.next().unwrap();
+                    let [own, stated] = [&value, &wanted].map(|number| scientific(number, 25));
+                    assert!(
+                        close(&value, &wanted, 1e-23),
+                        "{name}, point {k}, {field}[{i}]: {own} and {stated}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 fn by_letter(fields: &Fields) -> Vec<(&'static str, Vec<Expr>)> {
     vec![
         ("u", fields.u.clone()),
