@@ -5,6 +5,7 @@ use mmsmith_runtime::{AnySolution, Domain};
 
 use crate::case::{Arithmetic, Case, CflSpeed};
 use crate::discretized::Discretized;
+use crate::distortion::distortion;
 use crate::error::CaseError;
 use crate::run::{Outputs, Status};
 use crate::scheme::{GridPose, Placement, Scheme, Total, Updated};
@@ -107,6 +108,7 @@ fn candidates(exact: &AnySolution<f64>, stopped: &Case) -> Vec<Case> {
         let base = shortened.unwrap_or(*stopped);
         let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
         all.extend(updated_candidates(exact, updated).into_iter().map(scheme));
+        all.extend(sheared_candidate(exact, base));
     } else {
         let usual = Case { scheme: Scheme::Updated(Updated::default()), per_cell: 2, ..*stopped };
         let base = with_usual_step(exact, usual).unwrap_or(usual);
@@ -141,6 +143,29 @@ fn updated_candidates(exact: &AnySolution<f64>, own: &Updated) -> Vec<Updated> {
         all.push(Updated { shape, transfer, placement: clipped, ..*own });
     }
     all
+}
+
+/// The shear from which on a motion draws particles between corners out over the grid.
+const STRONG_SHEAR: f64 = 1.5;
+/// Over how many cells particles between corners may be drawn out: longer ones do not see what the velocity does between their ends.
+const LONGEST: f64 = 1.8;
+/// The share of the usual step that suits thin particles.
+const THIN: f64 = 0.6;
+
+/// Short particles, smooth functions at their corners and a short step, for a motion that shears strongly.
+fn sheared_candidate(exact: &AnySolution<f64>, base: Case) -> Option<Case> {
+    let shear = distortion(exact)?.shear;
+    if shear < STRONG_SHEAR || matches!(exact, AnySolution::One(_)) {
+        return None;
+    }
+    let scheme = Scheme::Updated(Updated {
+        shape: Shape::Bspline2,
+        transfer: Transfer::Apic,
+        placement: Placement::Clipped { offset: 0.0, pose: GridPose::default() },
+        ..Updated::default()
+    });
+    let per_cell = base.per_cell.max((shear / LONGEST).ceil() as usize);
+    Some(Case { scheme, per_cell, cfl: THIN * base.cfl, ..base })
 }
 
 /// The total formulation with cubic splines, as it is chosen for a solution.
