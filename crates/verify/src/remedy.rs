@@ -196,3 +196,23 @@ fn with_stable_step(exact: &AnySolution<f64>, case: Case) -> Option<Case> {
     let cfl = stable(cfl_speed)?;
     is_long.then_some(Case { cfl, cfl_speed, ..case })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn particles_are_short_and_steps_too_where_a_motion_shears_strongly() {
+        let build = |name| mmsmith_solutions::build::<f64>(name, &[]).unwrap().unwrap();
+        let base = Case::default();
+        let found = sheared_candidate(&build("vortex"), base).unwrap();
+        assert_eq!((found.per_cell, found.cfl), (4, THIN * base.cfl));
+        let updated = found.scheme.updated().unwrap();
+        assert_eq!((updated.shape, updated.transfer), (Shape::Bspline2, Transfer::Apic));
+        assert!(updated.placement.is_clipped());
+        // More than that stays.
+        let many = Case { per_cell: 6, ..base };
+        assert_eq!(sheared_candidate(&build("vortex"), many).map(|case| case.per_cell), Some(6));
+        assert_eq!(sheared_candidate(&build("ring"), base), None);
+    }
+}

@@ -46,7 +46,7 @@ fn every_scheme_has_its_order() {
         // Where particles cross few knots: else their sums, which are no integrals, spoil the order of splines.
         ("axis-aligned --shape bspline2 --set A=0.01 --cells 16,32", 2.0, 1.36e-4),
         ("axis-aligned --shape bspline3 --set A=0.01 --cells 16,32", 2.0, 1.76e-4),
-        ("axis-aligned --shape gimp-bspline2 --cells 16,32", 2.0, 1.50e-3),
+        ("axis-aligned --shape gimp-bspline2 --cells 16,32", 2.0, 1.48e-3),
         ("axis-aligned --shape gimp --transfer xpic2 --cells 16,32", 2.0, 1.01e-3),
         ("axis-aligned --shape gimp --transfer apic --cells 16,32", 2.0, 4.8e-4),
         ("axis-aligned --shape gimp --transfer pic --cells 16,32", 0.9, 1.12e-2),
@@ -86,6 +86,18 @@ fn means_of_splines_are_of_second_order_in_every_field_on_moving_particles() {
             let all = orders.iter().all(|order| order.as_f64().unwrap() > least);
             assert!(all, "{call} {field}: {orders:?}");
         }
+    }
+}
+
+/// Where two particles a direction turn inside out, or have errors of P that grow, four with splines at their corners have order 2 and more.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn short_polygons_follow_a_vortex_that_shears_by_seven() {
+    let scheme = "--layout clipped --shape bspline2 --transfer apic --ppc 4 --cfl 0.1";
+    let study = converge(&format!("vortex {scheme} --cells 24,48 --periods 0.25"));
+    for field in ["u", "P"] {
+        let order = at(&study, &["orders", field, "l2", "fit"]);
+        assert!(order > 1.9, "{field}: {order}");
     }
 }
 
