@@ -104,18 +104,20 @@ fn candidates(exact: &AnySolution<f64>, stopped: &Case) -> Vec<Case> {
     let mut all = Vec::new();
     let shortened = with_stable_step(exact, *stopped);
     all.extend(shortened);
-    if let Scheme::Updated(updated) = &stopped.scheme {
-        let base = shortened.unwrap_or(*stopped);
-        let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
-        all.extend(updated_candidates(exact, updated).into_iter().map(scheme));
-        all.extend(sheared_candidate(exact, base));
-    } else {
-        let usual = Case { scheme: Scheme::Updated(Updated::default()), per_cell: 2, ..*stopped };
-        let base = with_usual_step(exact, usual).unwrap_or(usual);
-        let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
-        all.push(base);
-        all.extend(updated_candidates(exact, &Updated::default()).into_iter().map(scheme));
-    }
+    let (base, updated) = match &stopped.scheme {
+        Scheme::Updated(updated) => (shortened.unwrap_or(*stopped), *updated),
+        Scheme::Total(_) => {
+            let updated = Updated::default();
+            let usual = Case { scheme: Scheme::Updated(updated), per_cell: 2, ..*stopped };
+            let base = with_usual_step(exact, usual).unwrap_or(usual);
+            all.push(base);
+            (base, updated)
+        }
+    };
+    let scheme = |updated: Updated| Case { scheme: Scheme::Updated(updated), ..base };
+    all.extend(updated_candidates(exact, &updated).into_iter().map(scheme));
+    all.extend(sheared_candidate(exact, base));
+    all.extend(smooth_candidate(exact, &updated).map(scheme));
     all.extend(total_candidate(exact, stopped));
     if shortened.is_none() {
         // Says whether the step has anything to do with it.
@@ -139,10 +141,20 @@ fn updated_candidates(exact: &AnySolution<f64>, own: &Updated) -> Vec<Updated> {
     }
     if !matches!(exact, AnySolution::One(_)) {
         all.push(cpdi2(clipped, apic));
-        let (shape, transfer) = (Shape::Bspline2, Transfer::Xpic(2));
-        all.push(Updated { shape, transfer, placement: clipped, ..*own });
     }
     all
+}
+
+/// Splines at the corners of polygons, and a transfer that filters short waves.
+fn smooth_candidate(exact: &AnySolution<f64>, own: &Updated) -> Option<Updated> {
+    let (shape, transfer) = (Shape::Bspline2, Transfer::Xpic(2));
+    let placement = Placement::Clipped { offset: 0.0, pose: GridPose::default() };
+    (!matches!(exact, AnySolution::One(_))).then_some(Updated {
+        shape,
+        transfer,
+        placement,
+        ..*own
+    })
 }
 
 /// The shear from which on a motion draws particles between corners out over the grid.
