@@ -87,6 +87,8 @@ pub enum Fault {
     BoundaryInertiaDropped,
     /// Total frame: sides with a given motion late by a stage.
     LateBoundary,
+    /// Statics: the stiffness without the stress of the deformation that is reached.
+    GeometricStiffnessDropped,
     /// Corners of CPDI2 that are never moved.
     CornersStay,
     /// APIC without its affine part.

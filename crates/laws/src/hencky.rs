@@ -1,8 +1,9 @@
 //! Hencky's law.
 
 use mmsmith_lanes::tensor::{determinant, inverse_transpose, product, real};
-use nalgebra::{Matrix3, RealField, SMatrix, Vector3};
+use nalgebra::{RealField, SMatrix};
 
+use super::principal::coaxial_in_space;
 use super::{LibraryLaw, finger_minus_identity, log_jacobian, plus_diagonal, quadratic_energy};
 
 /// Hencky's law, `W = lambda/2 (ln J)^2 + mu |ln V|^2`.
@@ -24,7 +25,7 @@ impl<T: RealField + Copy> LibraryLaw<T> for Hencky<T> {
         let two_log_V = match D {
             1 => SMatrix::repeat(log_jacobian(F) * real(2.0)),
             2 => two_log_stretch_in_the_plane(F),
-            _ => two_log_stretch_in_space(F),
+            _ => coaxial_in_space(F, |logarithms| logarithms),
         };
         plus_diagonal(two_log_V * self.mu, self.pressure(F))
     }
@@ -56,37 +57,4 @@ fn two_log_stretch_in_the_plane<T: RealField + Copy, const D: usize>(
     let B = finger_minus_identity(F);
     let deviator = plus_diagonal(B, -B.trace() * real(0.5));
     plus_diagonal(deviator * (factor / J), log_jacobian(F))
-}
-
-/// `2 ln V` in three dimensions, from principal stretches and directions.
-fn two_log_stretch_in_space<T: RealField + Copy, const D: usize>(
-    F: &SMatrix<T, D, D>,
-) -> SMatrix<T, D, D> {
-    let (directions, logarithms) = principal_logarithms(F);
-    SMatrix::from_fn(|i, j| {
-        (0..3)
-            .fold(T::zero(), |sum, k| sum + directions[(i, k)] * logarithms[k] * directions[(j, k)])
-    })
-}
-
-/// The principal directions of b, in columns, and the logarithms of the squared stretches along them, in three dimensions.
-///
-/// `NaN` where they cannot be found, which no finite deformation gradient has been seen to bring about.
-pub(super) fn principal_logarithms<T: RealField + Copy, const D: usize>(
-    F: &SMatrix<T, D, D>,
-) -> (Matrix3<T>, Vector3<T>) {
-    const MOST_ITERATIONS: usize = 1000;
-    let B = finger_minus_identity(F);
-    if B.norm() < real(0.5) {
-        // The eigenvalues of b - I are small differences, which b itself would not keep.
-        Matrix3::from_fn(|i, j| B[(i, j)])
-            .try_symmetric_eigen(T::default_epsilon(), MOST_ITERATIONS)
-            .map(|eigen| (eigen.eigenvectors, eigen.eigenvalues.map(|e| e.ln_1p())))
-    } else {
-        // The square in b would cost a very flat particle's smallest stretch its digits.
-        Matrix3::from_fn(|i, j| F[(i, j)])
-            .try_svd(true, false, T::default_epsilon(), MOST_ITERATIONS)
-            .and_then(|svd| Some((svd.u?, svd.singular_values.map(|s| s.ln() * real(2.0)))))
-    }
-    .unwrap_or((Matrix3::identity(), Vector3::repeat(real(f64::NAN))))
 }

@@ -22,6 +22,17 @@ pub trait ConstitutiveLaw<T, const D: usize>: fmt::Debug + Send + Sync {
     /// The stress of a particle must not depend on its place in the block, nor on the others.
     fn first_piola_kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], P: &mut [[[T; BLOCK]; D]; D]);
 
+    /// Derivatives of the stresses along one component of the deformation gradient, `A_iJkL = dP_iJ/dF_kL` for `kL = component`, in the
+    /// form of the stresses; false where the law does not tell them. Default: they are formed by differences of the stress.
+    fn slope(
+        &self,
+        _F: &[[[T; BLOCK]; D]; D],
+        _component: [usize; 2],
+        _A: &mut [[[T; BLOCK]; D]; D],
+    ) -> bool {
+        false
+    }
+
     /// Strain energy per reference volume, zero at rest; `None` where there is none or it is not known.
     fn strain_energy(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
         None
@@ -406,6 +417,15 @@ impl<T: RealField + Copy, const D: usize> BlockOfStresses<T, D> {
     /// Computes the stresses of the block.
     pub fn evaluate(&mut self, law: &dyn ConstitutiveLaw<T, D>) {
         law.first_piola_kirchhoff(&self.F, &mut self.P);
+    }
+
+    /// Computes derivatives of the stresses along a component of F in their place; false where the law does not tell them.
+    pub fn evaluate_slope(
+        &mut self,
+        law: &dyn ConstitutiveLaw<T, D>,
+        component: [usize; 2],
+    ) -> bool {
+        law.slope(&self.F, component, &mut self.P)
     }
 
     /// The stress of particle `n` of the block, not a number where F is no deformation.

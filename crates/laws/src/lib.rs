@@ -21,10 +21,13 @@ mod neo_hookean;
 mod ogden;
 mod orthotropic;
 mod plastic;
+mod principal;
 #[cfg(test)]
 mod printed_energies;
 mod projected;
+mod slopes;
 mod st_venant_kirchhoff;
+mod tangent;
 #[cfg(test)]
 mod tests;
 mod viscoelastic;
@@ -45,6 +48,7 @@ pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volume
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub use plastic::{Plastic, ReturnMap};
 pub use projected::{ProjectedVolume, Volume, projected_stress};
+pub use tangent::{Differentiated, Tangent};
 
 use crate::fault::Planted;
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
@@ -395,6 +399,12 @@ fn log_jacobian<T: RealField + Copy, const D: usize>(F: &SMatrix<T, D, D>) -> T 
         nalgebra::convert_unchecked(growth),
         nalgebra::convert_unchecked(determinant(F)),
     );
+    if const { slopes::carries_slopes::<T>() } {
+        // The derivative of the logarithm is the quotient.
+        let J = determinant(F);
+        let value = slopes::without_slopes(J);
+        return real::<T>(logarithm) + (J - value) / value;
+    }
     real(logarithm)
 }
 

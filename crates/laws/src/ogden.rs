@@ -3,7 +3,8 @@
 use mmsmith_lanes::tensor::{determinant, inverse_transpose, product, real};
 use nalgebra::{RealField, SMatrix};
 
-use super::hencky::principal_logarithms;
+use super::principal::{coaxial_in_space, principal_logarithms};
+use super::slopes::carries_slopes;
 use super::volumetric::VolumetricEnergy;
 use super::{LibraryLaw, Volumetric, finger_minus_identity, log_jacobian, plus_diagonal};
 
@@ -98,15 +99,7 @@ impl<T: RealField + Copy> LibraryLaw<T> for Ogden<T> {
                 let B = finger_minus_identity(F);
                 plus_diagonal(B * factor, within - B.trace() * factor * real(0.5))
             }
-            _ => {
-                let (directions, logarithms) = principal_logarithms(F);
-                let stresses = self.principal(isochoric(logarithms.into()));
-                SMatrix::from_fn(|i, j| {
-                    (0..3).fold(T::zero(), |sum, k| {
-                        sum + directions[(i, k)] * stresses[k] * directions[(j, k)]
-                    })
-                })
-            }
+            _ => coaxial_in_space(F, |logarithms| self.principal(isochoric(logarithms))),
         };
         plus_diagonal(isochoric, self.pressure(F))
     }
@@ -149,6 +142,10 @@ impl<T: RealField + Copy> Ratio<T> {
     fn of<const D: usize>(F: &SMatrix<T, D, D>) -> Self {
         let (stretch, shear) = (F[(0, 0)] - F[(1, 1)], F[(0, 1)] + F[(1, 0)]);
         let z = (stretch * stretch + shear * shear) / (determinant(F) * real(2.0));
+        if const { carries_slopes::<T>() } && z == T::zero() {
+            // All that follows from the ratio is even in it: where it is none it has no slope, though the root has one without bounds.
+            return Self { theta: T::zero(), sinh: T::zero() };
+        }
         let sinh = (z * (z + real(2.0))).sqrt();
         Self { theta: (z + sinh).ln_1p(), sinh }
     }

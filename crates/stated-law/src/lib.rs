@@ -46,6 +46,7 @@ use mmsmith_expr::ParseError;
 use nalgebra::{RealField, SMatrix};
 use program::{Given, Portion, Program, deformations};
 use std::marker::PhantomData;
+use std::sync::{Arc, OnceLock};
 use stress::Kinematics;
 use tape::{Tape, Value};
 use thiserror::Error;
@@ -130,6 +131,9 @@ struct Programs {
     /// The normal stress along the axes left out.
     across: Option<Program>,
     moduli: Option<ModuliAtRest>,
+    /// The tape of the stress, for its derivatives, and these once they are asked for, by component of F.
+    formulas: Arc<(Tape, Vec<Value>)>,
+    slopes: OnceLock<Vec<Program>>,
 }
 
 impl Programs {
@@ -166,13 +170,27 @@ impl Programs {
                 (stress.collect::<Result<_, _>>()?, None, None)
             }
         };
+        let formulas = Arc::new((tape.clone(), stress.clone()));
         let stress = Program::new(&tape, &stress);
         let moduli = match dimension {
             1 => ModuliAtRest::of::<1>(&stress, across.as_ref()),
             2 => ModuliAtRest::of::<2>(&stress, across.as_ref()),
             _ => ModuliAtRest::of::<3>(&stress, across.as_ref()),
         };
-        Ok(Self { stress, energy, across, moduli })
+        Ok(Self { stress, energy, across, moduli, formulas, slopes: OnceLock::new() })
+    }
+
+    /// The derivatives of the stress with respect to the components of F, row by row.
+    fn slopes(&self, dimension: usize) -> &[Program] {
+        self.slopes.get_or_init(|| {
+            let (mut tape, stress) = (*self.formulas).clone();
+            let components = (0..dimension * dimension).map(|m| (m / dimension, m % dimension));
+            let of = |(row, column)| {
+                let slopes = tape.slopes(&stress, row, column);
+                Program::new(&tape, &slopes)
+            };
+            components.map(of).collect()
+        })
     }
 }
 
@@ -214,6 +232,24 @@ impl<T: RealField + Copy> StatedLaw<T> {
         self.assert_dimension(D);
         let results = P.iter_mut().flatten();
         self.programs.stress.run(Given::Deformation(F), Portion::Whole, results);
+    }
+
+    /// Derivatives of the stresses with respect to one component of F, row and column, by dual numbers over the text: in the form of
+    /// [`first_piola_kirchhoff`](Self::first_piola_kirchhoff), and not numbers where F is no deformation.
+    ///
+    /// # Panics
+    ///
+    /// Panics where `D` is not the [dimension](Self::dimension) of the law, and for a component beyond.
+    pub fn slope<const D: usize, const N: usize>(
+        &self,
+        F: &[[[T; N]; D]; D],
+        component: [usize; 2],
+        A: &mut [[[T; N]; D]; D],
+    ) {
+        self.assert_dimension(D);
+        let [row, column] = component;
+        let program = &self.programs.slopes(D)[row * D + column];
+        program.run(Given::Deformation(F), Portion::Whole, A.iter_mut().flatten());
     }
 
     /// The strain energy per reference volume above that at rest, a stress; `None` for a law that states its stress, and where F
@@ -287,6 +323,14 @@ pub trait Compiled<const D: usize>: RealField + Copy {
         P: &mut [[[Self; LANES]; D]; D],
     );
 
+    /// [`StatedLaw::slope`] of as many particles as a block has.
+    fn slope_of_block(
+        law: &StatedLaw<Self>,
+        F: &[[[Self; LANES]; D]; D],
+        component: [usize; 2],
+        A: &mut [[[Self; LANES]; D]; D],
+    );
+
     /// [`StatedLaw::strain_energy`].
     fn energy(law: &StatedLaw<Self>, F: &SMatrix<Self, D, D>) -> Option<Self>;
 
@@ -320,6 +364,15 @@ macro_rules! compiled {
                 P: &mut [[[Self; LANES]; $D]; $D],
             ) {
                 law.first_piola_kirchhoff(F, P);
+            }
+
+            fn slope_of_block(
+                law: &StatedLaw<Self>,
+                F: &[[[Self; LANES]; $D]; $D],
+                component: [usize; 2],
+                A: &mut [[[Self; LANES]; $D]; $D],
+            ) {
+                law.slope(F, component, A);
             }
 
             fn energy(law: &StatedLaw<Self>, F: &SMatrix<Self, $D, $D>) -> Option<Self> {

@@ -196,6 +196,15 @@ struct Entry {
     rest: Option<Rest>,
 }
 
+/// The variable of a derivative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Variable {
+    /// An argument, the others being held.
+    Argument(Argument),
+    /// A component of F.
+    Entry { row: usize, column: usize },
+}
+
 /// Operations in the order in which they are done; equal ones are one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
@@ -446,21 +455,46 @@ impl Tape {
     /// Forward: each number on the way becomes a dual number, whose second part is a number of this tape as well, with a value at
     /// rest and a deviation.
     pub(crate) fn derivative(&mut self, of: Value, argument: Argument) -> Value {
-        let Value::Varying(last) = of else { return Value::ZERO };
-        let mut dual = Vec::with_capacity(last.0 + 1);
-        for index in 0..=last.0 {
-            let derivative = self.dual_part(Node(index), argument, &dual);
+        self.derivatives(&[of], Variable::Argument(argument))[0]
+    }
+
+    /// Derivatives with respect to a component of F, on which all arguments depend.
+    pub(crate) fn slopes(&mut self, of: &[Value], row: usize, column: usize) -> Vec<Value> {
+        self.derivatives(of, Variable::Entry { row, column })
+    }
+
+    fn derivatives(&mut self, of: &[Value], variable: Variable) -> Vec<Value> {
+        let last = |value: &Value| match value {
+            Value::Varying(node) => node.0 + 1,
+            Value::Constant(_) => 0,
+        };
+        let count = of.iter().map(last).max().unwrap_or(0);
+        let mut dual = Vec::with_capacity(count);
+        for index in 0..count {
+            let derivative = self.dual_part(Node(index), variable, &dual);
             dual.push(derivative);
         }
-        dual[last.0]
+        let found = |value: &Value| match value {
+            Value::Varying(node) => dual[node.0],
+            Value::Constant(_) => Value::ZERO,
+        };
+        of.iter().map(found).collect()
     }
 
     /// The second part of the dual number of a node, from those of the nodes before it.
-    fn dual_part(&mut self, node: Node, argument: Argument, dual: &[Value]) -> Value {
+    fn dual_part(&mut self, node: Node, variable: Variable, dual: &[Value]) -> Value {
         let value = Value::Varying(node);
         let operation = self.operation(node);
-        if let Operation::Argument { argument: own, .. } = operation {
-            return if own == argument { Value::ONE } else { Value::ZERO };
+        match (operation, variable) {
+            (Operation::Argument { argument: own, .. }, Variable::Argument(argument)) => {
+                return if own == argument { Value::ONE } else { Value::ZERO };
+            }
+            (Operation::Argument { value, .. }, Variable::Entry { .. }) => return dual[value.0],
+            (Operation::Entry { row, column }, variable) => {
+                let own = Variable::Entry { row, column };
+                return if own == variable { Value::ONE } else { Value::ZERO };
+            }
+            _ => {}
         }
         let Some([dx, dy]) = operation.operands().map(|nodes| nodes.map(|node| dual[node.0]))
         else {

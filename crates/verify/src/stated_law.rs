@@ -43,6 +43,17 @@ impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> 
         plant(self.planted, P);
     }
 
+    fn slope(
+        &self,
+        F: &[[[T; BLOCK]; D]; D],
+        component: [usize; 2],
+        A: &mut [[[T; BLOCK]; D]; D],
+    ) -> bool {
+        T::slope_of_block(&self.law, F, component, A);
+        plant(self.planted, A);
+        true
+    }
+
     fn strain_energy(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         T::energy(&self.law, F)
     }
