@@ -52,9 +52,11 @@ mod gradient;
 mod linearised;
 mod mass;
 mod projection;
+mod quadrature;
 mod set_up;
 mod simulation;
 mod solver;
+mod statics;
 mod stress;
 
 pub use axis::{Axis, End, Layout};
@@ -62,9 +64,11 @@ pub use boundary::{BoundaryData, HeldBoundary, Quantity, Side};
 pub use composition::Composition;
 pub use coordinates::Coordinates;
 pub use linearised::{Disturbed, Magnitude};
+pub use mmsmith_sparse::Factors;
 pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;
+pub use statics::{AtRest, Equilibrium, LoadStep, Loads, Obstacle, StaticsError};
 
 /// How many of so many numbers a thread takes at a time: four pieces for each thread, so that none waits long for the last, but not so few
 /// that handing them out takes longer than the work. No sum is cut, so that the bits do not depend on it.

@@ -17,21 +17,16 @@
 
 use std::array;
 
-use mmsmith_laws::{
-    BLOCK, BlockOfStresses, BlockWithMemory, InternalVariable, Law, SIDE_BY_SIDE, Stressed,
-};
+use mmsmith_laws::{BLOCK, Law, Stressed};
 use mmsmith_mpm::SetupError;
 use nalgebra::{SMatrix, SVector};
 
 use super::boundary::Face;
 use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
 use super::composition::Composition;
-use super::coordinates::{Coordinates, RowGeometry};
 use super::fit::Line;
-use super::gradient::Gradients;
-use super::set_up::{
-    Grid, MassMatrix, Scheme, bases, check, faces, fits, line, masses, particles, rows,
-};
+use super::quadrature::Quadrature;
+use super::set_up::{Grid, MassMatrix, Scheme, bases, check, faces, fits, line, masses};
 
 /// The largest strain of the difference that stands for the tangent.
 const STRAIN: f64 = 1e-5;
@@ -93,7 +88,7 @@ macro_rules! disturbed {
 
             impl Disturbed<$D> for Disturbance<$D> {
                 fn positions(&self) -> &[SVector<f64, $D>] {
-                    &self.X
+                    &self.at.X
                 }
 
                 fn start(&mut self, velocity: &[SVector<f64, $D>]) {
@@ -122,7 +117,7 @@ macro_rules! disturbed {
                     F: &mut dyn FnMut(usize, &mut Vec<SMatrix<f64, $D, $D>>),
                     seen: &mut dyn FnMut(usize, &mut dyn Disturbed<$D>) -> bool,
                 ) {
-                    let mut now = vec![SMatrix::identity(); self.X.len()];
+                    let mut now = vec![SMatrix::identity(); self.at.X.len()];
                     F(0, &mut now);
                     self.accelerate(&now);
                     for step in 1..=steps {
@@ -157,16 +152,7 @@ struct Disturbance<const D: usize> {
     components: [Component<D>; D],
     /// Sides whose motion is given.
     held: Vec<Face<D>>,
-    coordinates: Coordinates,
-    rows: Vec<RowGeometry<D>>,
-    reciprocal_radius: Vec<f64>,
-    /// Quadrature points, Cartesian, and the volumes that they stand for.
-    X: Vec<SVector<f64, D>>,
-    volume: Vec<f64>,
-    law: Law<f64, D>,
-    variables: Vec<InternalVariable>,
-    /// Values of the law that depend on the place, those of a point one after the other.
-    given: Vec<f64>,
+    at: Quadrature<D>,
 }
 
 /// How large a field is.
@@ -197,33 +183,20 @@ where
         let bases = bases(grid, degree, &lines)?;
         let mass = masses(grid, &scheme, &bases, &lines, density)?;
         let fits = Ok(fits(grid, &bases, &lines).map_err(singular)?);
-        let bodies = particles(grid, &lines, density);
-        let given = match &law {
-            Law::WithMemory(law) => bodies.X.iter().flat_map(|X| law.initial(X)).collect(),
-            Law::Library(_) | Law::Own(_) => Vec::new(),
-        };
         Ok(Self {
             held: faces(grid, &lines).into_iter().filter(|face| face.moved).collect(),
             components: array::from_fn(|index| Component::new(index, &bases)),
             operators: Operators { bases, mass, fits },
-            coordinates: grid.coordinates,
-            rows: rows(grid, &lines),
-            reciprocal_radius: lines[0].points.iter().map(|R| R.recip()).collect(),
-            X: bodies.X,
-            volume: bodies.volume,
-            variables: law.variables(),
-            law,
-            given,
+            at: Quadrature::new(grid, &lines, law),
         })
     }
 
     /// See [`Disturbed::start`].
     fn fit(&mut self, velocity: &[SVector<f64, D>]) {
-        let row = self.row();
         for (p, value) in velocity.iter().enumerate() {
-            let value = self.rows.get(p / row).map_or(*value, |row| row.frame.tr_mul(value));
+            let value = self.at.in_frame(p, value);
             for component in &mut self.components {
-                component.values[p] = value[component.index] * self.volume[p];
+                component.values[p] = value[component.index] * self.at.volume[p];
             }
         }
         let Self { operators: Operators { bases, fits, .. }, held, components, .. } = self;
@@ -276,7 +249,7 @@ where
     }
 
     fn magnitude(&mut self, field: Field) -> Magnitude {
-        let Self { components, operators, volume, .. } = self;
+        let Self { components, operators, at: Quadrature { volume, .. }, .. } = self;
         each_component(components, &|component| {
             component.evaluate(&operators.bases, field, true);
         });
@@ -290,21 +263,16 @@ where
         Magnitude { largest: largest.sqrt(), mean: (sum / whole).sqrt() }
     }
 
-    /// Particles along axis 0.
-    fn row(&self) -> usize {
-        self.operators.bases[0][0].points
-    }
-
     /// The accelerations of the displacement, with the motion's deformation gradients.
     fn accelerate(&mut self, F: &[SMatrix<f64, D, D>]) {
-        let curvilinear = self.coordinates.are_curvilinear();
+        let curvilinear = self.at.coordinates.are_curvilinear();
         let Self { components, operators, .. } = self;
         each_component(components, &|component| {
             component.evaluate(&operators.bases, Field::Displacement, curvilinear);
         });
         let gradients = self.gradients();
         let changes = self.changes_of_stress(F, &gradients);
-        self.set_forces(&changes);
+        self.at.set_forces(&mut self.components, &changes);
         let factors = if curvilinear { Factors::Both } else { Factors::Slopes };
         let Self { components, operators, held, .. } = self;
         let held = &held[..];
@@ -315,10 +283,8 @@ where
 
     /// Gradients of what stands at the points, Cartesian.
     fn gradients(&self) -> Vec<SMatrix<f64, D, D>> {
-        let Self { components, coordinates, rows, reciprocal_radius, .. } = self;
-        let (row, coordinates) = (self.row(), *coordinates);
-        let at = Gradients { components, coordinates, row, rows, reciprocal_radius };
-        (0..self.X.len()).map(|p| at.at(p)).collect()
+        let at = self.at.of(&self.components);
+        (0..self.at.X.len()).map(|p| at.at(p)).collect()
     }
 
     /// `A : grad w` at the points.
@@ -339,79 +305,10 @@ where
                 let both = F[range.clone()].iter().zip(&gradients[range.clone()]);
                 both.map(|(F, H)| F + H * by).collect()
             };
-            let above = self.stresses(first, &moved(step));
-            let below = self.stresses(first, &moved(-step));
+            let above = self.at.stresses(first, &moved(step));
+            let below = self.at.stresses(first, &moved(-step));
             changes.extend(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)));
         }
         changes
     }
-
-    /// Stresses of a block of points.
-    fn stresses(&self, first: usize, F: &[SMatrix<f64, D, D>]) -> Vec<SMatrix<f64, D, D>> {
-        match &self.law {
-            law @ Law::Library(_) => side_by_side(law, F),
-            Law::Own(law) => {
-                let mut block = BlockOfStresses::at_rest();
-                F.iter().enumerate().for_each(|(n, F)| block.set(n, F));
-                block.evaluate(law.as_ref());
-                (0..F.len()).map(|n| block.stress(n)).collect()
-            }
-            Law::WithMemory(law) => {
-                let count = self.variables.len();
-                let mut block = BlockWithMemory::at_rest(&self.variables);
-                let given = &self.given[first * count..(first + F.len()) * count];
-                block.first_piola_kirchhoff(law.as_ref(), F, given);
-                (0..F.len()).map(|n| block.stress(n)).collect()
-            }
-        }
-    }
-
-    /// Puts the factors of the forces where the gradients stood.
-    fn set_forces(&mut self, changes: &[SMatrix<f64, D, D>]) {
-        let row = self.row();
-        let Self { components, coordinates, rows, reciprocal_radius, volume, .. } = self;
-        for (p, change) in changes.iter().enumerate() {
-            let mut force = change * -volume[p];
-            if let Some(at) = rows.get(p / row) {
-                let local = at.frame.transpose() * force * at.frame;
-                let of_values;
-                (of_values, force) =
-                    coordinates.transposed_gradient(&local, reciprocal_radius[p % row], at);
-                for (c, component) in components.iter_mut().enumerate() {
-                    component.values[p] = of_values[c];
-                }
-            }
-            for (c, component) in components.iter_mut().enumerate() {
-                for k in 0..D {
-                    component.slopes[k][p] = force[(c, k)];
-                }
-            }
-        }
-    }
-}
-
-/// The stresses of a law of the library.
-fn side_by_side<const D: usize>(
-    law: &Law<f64, D>,
-    F: &[SMatrix<f64, D, D>],
-) -> Vec<SMatrix<f64, D, D>>
-where
-    f64: Stressed<D>,
-{
-    let mut stresses = Vec::with_capacity(F.len());
-    for F in F.chunks(SIDE_BY_SIDE) {
-        let of = |n: usize| F.get(n).copied().unwrap_or_else(SMatrix::identity);
-        let (mut lanes, mut P) = ([[[0.0; SIDE_BY_SIDE]; D]; D], [[[0.0; SIDE_BY_SIDE]; D]; D]);
-        for n in 0..SIDE_BY_SIDE {
-            let F = of(n);
-            for i in 0..D {
-                for j in 0..D {
-                    lanes[i][j][n] = F[(i, j)];
-                }
-            }
-        }
-        law.first_piola_kirchhoff_side_by_side(&lanes, &mut P);
-        stresses.extend((0..F.len()).map(|n| SMatrix::from_fn(|i, j| P[i][j][n])));
-    }
-    stresses
 }

@@ -217,19 +217,29 @@ pub(super) fn check<const D: usize>(
     density: f64,
     time_step: f64,
 ) -> Result<(), SetupError> {
-    let positive = |quantity: &str, value: f64| {
-        if value > 0.0 && value.is_finite() {
-            return Ok(());
-        }
-        Err(SetupError::NotPositive { quantity: quantity.into(), value })
-    };
     positive("the time step", time_step)?;
-    positive("the density", density)?;
-    positive("the number of particles per cell", grid.per_cell as f64)?;
     let degree = scheme.degree;
     if !(2..=MOST_DEGREE).contains(&degree) {
         return Err(SetupError::Degree { degree, most: MOST_DEGREE });
     }
+    check_grid(grid, degree, density)
+}
+
+fn positive(quantity: &str, value: f64) -> Result<(), SetupError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(SetupError::NotPositive { quantity: quantity.into(), value })
+}
+
+/// Refuses a body and its grid where they make no sense for splines of a degree.
+pub(super) fn check_grid<const D: usize>(
+    grid: &Grid<D>,
+    degree: usize,
+    density: f64,
+) -> Result<(), SetupError> {
+    positive("the density", density)?;
+    positive("the number of particles per cell", grid.per_cell as f64)?;
     for (k, axis) in grid.axes.iter().enumerate() {
         if axis.cells == 0 {
             return Err(SetupError::NoCells { axis: k });
