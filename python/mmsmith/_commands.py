@@ -96,6 +96,10 @@ def run(
     set: Mapping[str, float] | None = None,
     threads: int | None = None,
     json: str | os.PathLike[str] | None = None,
+    static: bool = False,
+    dynamic: bool = False,
+    load_steps: int | None = None,
+    moment: float | None = None,
     vtk: str | os.PathLike[str] | None = None,
     frames: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -189,6 +193,12 @@ def run(
         set: Value of a parameter, in place of its default.
         threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
+        static: Solve for the equilibrium from rest by Newton's method, in the reference configuration: with the body force without inertia,
+            b - a, at the moment of moment. Default where nothing of the solution moves, unless an option of runs through time is given.
+        dynamic: Step through time from the exact state, though nothing of the solution moves.
+        load_steps: Load steps of equal length; one that Newton's method does not take is halved. Default: 1.
+        moment: Moment of the motion that is held, in periods of the solution. Default: 0.25, or another one where the body passes through
+            rest then.
         vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder.
         frames: Number of particle files, spread evenly from the first state to the last. Default: 20.
         checkpoint: Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one.
@@ -253,6 +263,10 @@ def converge(
     set: Mapping[str, float] | None = None,
     threads: int | None = None,
     json: str | os.PathLike[str] | None = None,
+    static: bool = False,
+    dynamic: bool = False,
+    load_steps: int | None = None,
+    moment: float | None = None,
     progress: Progress = None,
 ) -> Convergence:
     """Measure orders of accuracy over grids (cells 16,32,64) or time steps (cells 32 cfls 0.1,0.2,0.4).
@@ -349,6 +363,12 @@ def converge(
         set: Value of a parameter, in place of its default.
         threads: Number of threads. Default: all cores.
         json: Keep the JSON of the result in this file.
+        static: Solve for the equilibrium from rest by Newton's method, in the reference configuration: with the body force without inertia,
+            b - a, at the moment of moment. Default where nothing of the solution moves, unless an option of runs through time is given.
+        dynamic: Step through time from the exact state, though nothing of the solution moves.
+        load_steps: Load steps of equal length; one that Newton's method does not take is halved. Default: 1.
+        moment: Moment of the motion that is held, in periods of the solution. Default: 0.25, or another one where the body passes through
+            rest then.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
             where standard error is a terminal.
     """

@@ -18,6 +18,7 @@ mod scheme;
 mod score;
 mod shared;
 mod stability;
+mod statics;
 mod texts;
 mod tradeoff;
 mod values;
@@ -48,6 +49,7 @@ pub(crate) use scheme::{HighDegree, Layout, Precision, SchemeOptions, Weights};
 pub(crate) use score::ScoreOptions;
 pub(crate) use shared::KeepOptions;
 pub(crate) use stability::StabilityOptions;
+pub(crate) use statics::StaticOptions;
 pub(crate) use texts::{CompletionsOptions, ManOptions, ReferenceOptions};
 pub(crate) use tradeoff::TradeoffOptions;
 

@@ -27,6 +27,7 @@ mod schemas;
 mod scheme;
 mod score;
 mod stability;
+mod statics;
 mod study;
 mod tabulated;
 mod texts;

@@ -1,5 +1,6 @@
 //! Why a case cannot be run.
 
+use mmsmith_galerkin::StaticsError;
 use mmsmith_mpm::SetupError;
 use mmsmith_runtime::{Condition, Surface};
 use mmsmith_stated_law::StatedLawError;
@@ -52,6 +53,9 @@ pub enum CaseError {
     /// The solver refused the set-up.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// A body at rest could not be set up.
+    #[error(transparent)]
+    Statics(StaticsError),
     /// A particle file could not be written.
     #[error(transparent)]
     Frames(#[from] mmsmith_vtk::Error),

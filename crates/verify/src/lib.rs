@@ -55,6 +55,7 @@ mod score;
 mod stability;
 mod state_of_stress;
 mod stated_law;
+mod statics;
 mod study;
 mod temporal;
 mod timing;
@@ -113,6 +114,10 @@ pub use stability::{
     Criteria, Search, SearchProgress, StabilityRow, is_stable, p_wave_limit, stability,
 };
 pub use state_of_stress::Extremes;
+pub use statics::{
+    StaticCase, StaticErrors, StaticPlan, StaticProblem, StaticRow, StaticStep, StaticStudy,
+    expected_of_statics, is_at_rest, usual_moment,
+};
 pub use study::{Study, Sweep, converge};
 pub use temporal::{Temporal, TemporalRow};
 pub use timing::Timing;

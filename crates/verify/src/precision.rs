@@ -1,6 +1,6 @@
 //! The numbers of runs.
 
-use mmsmith_galerkin::{BoundaryData, Disturbed, Grid, SetUp};
+use mmsmith_galerkin::{AtRest, BoundaryData, Disturbed, Grid, SetUp, StaticsError};
 use mmsmith_measure::Compared;
 use mmsmith_mpm::{Law, Scalar, SetupError, Solver, Stressed};
 use mmsmith_runtime::Real;
@@ -23,6 +23,14 @@ pub(crate) trait Precision<const D: usize>:
         law: Law<Self, D>,
         density: f64,
     ) -> Result<Box<dyn Disturbed<D>>, SetupError>;
+
+    /// An undeformed body on a grid with splines of a degree, with a law and a density; in double precision alone.
+    fn at_rest(
+        grid: &Grid<D>,
+        degree: usize,
+        law: Law<Self, D>,
+        density: f64,
+    ) -> Result<Box<dyn AtRest<D>>, StaticsError>;
 }
 
 macro_rules! precisions {
@@ -44,6 +52,15 @@ macro_rules! precisions {
                 ) -> Result<Box<dyn Disturbed<$D>>, SetupError> {
                     grid.undisturbed(degree, law, density)
                 }
+
+                fn at_rest(
+                    grid: &Grid<$D>,
+                    degree: usize,
+                    law: Law<Self, $D>,
+                    density: f64,
+                ) -> Result<Box<dyn AtRest<$D>>, StaticsError> {
+                    grid.at_rest(degree, law, density)
+                }
             }
 
             impl Precision<$D> for f32 {
@@ -61,6 +78,15 @@ macro_rules! precisions {
                     _: f64,
                 ) -> Result<Box<dyn Disturbed<$D>>, SetupError> {
                     Err(SetupError::DoublePrecisionOnly)
+                }
+
+                fn at_rest(
+                    _: &Grid<$D>,
+                    _: usize,
+                    _: Law<Self, $D>,
+                    _: f64,
+                ) -> Result<Box<dyn AtRest<$D>>, StaticsError> {
+                    Err(SetupError::DoublePrecisionOnly.into())
                 }
             }
         )*

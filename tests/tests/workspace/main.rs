@@ -20,5 +20,6 @@ mod projected_volume;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;
 mod staged;
+mod statics;
 mod structure;
 mod updated_frame;

@@ -38,18 +38,19 @@ const FAULTS: [(&str, Fault); Fault::XpicSign as usize + 1] = faults! {
     WeightsOfNewPosition LastNodeSkipped SinglePrecision PicForFlip NoReprojection
     StressOfOldStretch MassBandDropped WeightOff StageOff StagesAtOneTime MirrorSign
     HoopStressDropped HoopShearDropped CotangentDropped TractionSign BoundaryInertiaDropped
-    LateBoundary CornersStay AffinePartDropped XpicSign
+    LateBoundary GeometricStiffnessDropped CornersStay AffinePartDropped XpicSign
 };
 
 /// The problems that a check finds, with this fault in the solver.
 type Check = fn(Option<Fault>) -> Vec<String>;
 
 /// Checks that are no study.
-const COMPUTED: [(&str, Check); 4] = [
+const COMPUTED: [(&str, Check); 5] = [
     ("agreement", computed::agreement_of_two_solvers),
     ("momentum", computed::momentum_and_free_flight),
     ("energy", computed::energy_of_a_free_body),
     ("fields", computed::fields_against_the_law),
+    ("newton", computed::newton_on_the_way_to_equilibrium),
 ];
 
 /// The file.

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::scheme::SchemeOptions;
 use super::shared::KeepOptions;
+use super::statics::StaticOptions;
 use super::values::{positive_count, positive_number};
 
 #[derive(Args)]
@@ -42,4 +43,6 @@ pub(crate) struct ConvergeOptions {
     pub(crate) latex: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,
+    #[command(flatten)]
+    pub(crate) statics: StaticOptions,
 }

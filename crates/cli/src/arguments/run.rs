@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::scheme::SchemeOptions;
+use super::statics::StaticOptions;
 use super::values::{cell_count, time};
 
 #[derive(Args)]
@@ -18,6 +19,8 @@ pub(crate) struct RunOptions {
     pub(crate) cells: Option<usize>,
     #[command(flatten)]
     pub(crate) scheme: SchemeOptions,
+    #[command(flatten)]
+    pub(crate) statics: StaticOptions,
     /// Write particle files (.vtu, and a .pvd that lists them) to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) vtk: Option<PathBuf>,

@@ -18,6 +18,7 @@ use super::growth::Warnings;
 use super::predict::announce;
 use super::problem::{Problem, extent};
 use super::remedy::Given;
+use super::statics;
 use super::study::{Request, Show, Study, conduct};
 use crate::arguments::{ConvergeOptions, SchemeOptions};
 use crate::expect;
@@ -32,6 +33,10 @@ pub(super) use told::{
 
 pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let of_time = [("--cfls", !options.cfls.is_empty())];
+    if statics::is_asked(&selection, &options.statics, &options.scheme, &of_time)? {
+        return statics::converge(selection, options);
+    }
     let sweep = sweep(options)?;
     let orders = Orders::asked(options)?;
     // The CFL numbers of a study in time are said, and the speed that they refer to is the one that such numbers have.

@@ -15,7 +15,7 @@ use super::picture::Picture;
 use super::predict::announce;
 use super::problem::{Model, Problem};
 use super::remedy::{Advice, Given};
-use super::{checkpoint_folder, inversion};
+use super::{checkpoint_folder, inversion, statics};
 use crate::arguments::RunOptions;
 use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
@@ -30,6 +30,17 @@ use crate::{number, processes, sheets, terminal};
 
 /// A run, by the words of its command line.
 pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
+    let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
+    let of_time = [
+        ("--vtk", options.vtk.is_some()),
+        ("--checkpoint", options.checkpoint.is_some()),
+        ("--history", options.history.is_some()),
+        ("--plot", options.plot.is_some()),
+        ("--picture", options.picture.file.is_some()),
+    ];
+    if statics::is_asked(&selection, &options.statics, &options.scheme, &of_time)? {
+        return statics::run(selection, options);
+    }
     follow(options, Origin::Line(line))
 }
 

@@ -17,6 +17,7 @@ mod score_readings;
 mod shards;
 mod simulate;
 mod stability;
+mod statics;
 #[cfg(unix)]
 mod terminal;
 mod tradeoff;

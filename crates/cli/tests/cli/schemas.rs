@@ -110,6 +110,8 @@ fn every_command_keeps_to_its_schema() {
         ("converge axis-aligned-1d --cells 8 --cfls 0.4,0.2,0.1", 0),
         ("converge axis-aligned-1d --cells 4,8 --cfl 4", 1),
         ("converge shear-wave --cells 4,8", 0),
+        ("run skew-2d --static --cells 4", 0),
+        ("converge skew-2d --static --cells 4,8", 0),
         (
             "stability axis-aligned-1d --cells 4 --width 0.3 --over shape=gimp,linear --over nu=0,0.3",
             0,

@@ -44,6 +44,7 @@ pub use motion::RecordedMotion;
 pub use options::{Exchange, Input, Placing, Points, Resolution, ScoreOptions, Times};
 pub use quantity::Quantity;
 pub use row::{ScoreRow, Source};
+pub(crate) use times::is_static;
 
 use std::collections::{BTreeMap, BTreeSet};
 

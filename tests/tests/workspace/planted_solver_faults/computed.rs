@@ -6,7 +6,8 @@ use mmsmith_galerkin::{
 use mmsmith_mpm::fault::Fault;
 use mmsmith_mpm::{Body, Grid, Material, NoBodyForce, Particles, Settings, Simulation};
 use mmsmith_verify::{
-    Composition, Coordinates, Integrator, Layout, Shape, Transfer, Verdict, check,
+    Case, Composition, Coordinates, Integrator, Layout, Shape, StaticCase, StaticProblem, Total,
+    Transfer, Verdict, check,
 };
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 use std::sync::LazyLock;
@@ -252,4 +253,19 @@ pub(super) fn fields_against_the_law(fault: Option<Fault>) -> Vec<String> {
     let report = with(fault, || check(&solution("skew-2d", &[]), 40)).unwrap();
     let failed = report.findings.iter().filter(|f| f.verdict != Verdict::Passed);
     failed.map(|f| format!("{} against {}", f.what, f.against)).collect()
+}
+
+/// Newton's method that does not get to equilibrium, or not by the squares of its residuals.
+pub(super) fn newton_on_the_way_to_equilibrium(fault: Option<Fault>) -> Vec<String> {
+    const QUADRATIC: f64 = 1.8;
+    let exact = solution("skew-2d", &[]);
+    let total = Total { layout: Layout::Gauss, ..Total::of_degree(2) };
+    let case = Case { cells: 6, per_cell: 3, ..Case::default() };
+    let case = StaticCase { case, total, load_steps: 1, moment: 0.25 };
+    let solve = || StaticProblem::new(&exact, &case)?.solve(&mut |_, _| {});
+    let row = with(fault, solve).unwrap();
+    let exponent = row.exponent();
+    let is_slow = exponent.is_none_or(|exponent| exponent < QUADRATIC);
+    let slow = is_slow.then(|| format!("exponent {exponent:.2?}"));
+    row.stopped.into_iter().chain(slow).collect()
 }

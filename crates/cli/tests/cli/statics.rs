@@ -1,0 +1,98 @@
+//! Equilibrium from rest: what is said and written, and what is refused.
+
+use std::path::Path;
+
+use crate::command::{mms, read_json, refuses};
+
+#[test]
+fn a_motion_is_held_at_a_moment_and_newton_converges_quadratically() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let called = mms(at, "run skew-2d --static --cells 8 --shape bspline2 --json made.json");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    for expected in ["at 0.25 periods with b - a", "status: ok", "converged quadratically"] {
+        assert!(called.stdout.contains(expected), "{}", called.stdout);
+    }
+    let made = read_json(&at.join("made.json"));
+    assert_eq!(made["settings"]["moment"], 0.25);
+    let step = &made["result"]["load_steps"][0];
+    assert_eq!((&step["factor"], &step["factors"]), (&1.0.into(), &"cholesky".into()));
+    assert!(step["exponent"].as_f64().unwrap() >= 1.8, "{step}");
+    assert!(step["residuals"].as_array().unwrap().len() >= 4, "{step}");
+}
+
+#[test]
+fn orders_are_judged_by_theory_and_by_what_is_asked_for() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let series = "converge skew-2d --static --shape linear --cells 8,16,32 --csv made.csv";
+    let called = mms(at, series);
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(called.stdout.contains("passed, asymptotic"), "{}", called.stdout);
+    let sheet = std::fs::read_to_string(at.join("made.csv")).unwrap();
+    assert_eq!(sheet.lines().count(), 4, "{sheet}");
+    let called = mms(at, "converge skew-2d --static --shape linear --cells 8,16 --expect u=3");
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    assert!(called.stdout.contains("FAILED"), "{}", called.stdout);
+}
+
+#[test]
+fn what_does_not_move_is_solved_from_rest_unless_a_run_through_time_is_asked_for() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/tests/data/ok/static-bend.toml");
+    let run = |options: &str| {
+        let called = mms(at, &format!("run {} --cells 4 {options}", file.display()));
+        assert_eq!(called.status, 0, "{options}: {}", called.stderr);
+        called.stdout
+    };
+    for options in ["", "--static", "--load-steps 3"] {
+        assert!(run(options).contains("equilibrium from rest by Newton's method, bspline3"));
+    }
+    for options in ["--dynamic", "--cfl 0.2", "--composition 4"] {
+        assert!(run(options).contains("steps of dt"), "{options}");
+    }
+}
+
+#[test]
+fn a_load_that_is_not_reached_says_where_and_what_to_write() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    // A bar that is turned inside out.
+    let text = "name = 'folded'\ntitle = 'Folded'\ncoordinates = 'cartesian'\ndimension = 1\n\
+        boundary = [{ surface = 'X-lower', condition = 'prescribed-motion' }, { surface = 'X-upper', condition = 'prescribed-motion' }]\n\
+        [parameters]\nA = { default = 2, range = '> 0', unit = 'm', description = 'amplitude' }\n\
+        mu = { default = 1000, range = '> 0', unit = 'Pa', description = 'shear modulus' }\n\
+        lambda = { default = 1000, range = '> 0', unit = 'Pa', description = 'first Lame constant' }\n\
+        rho0 = { default = 2, range = '> 0', unit = 'kg/m^3', description = 'reference density' }\n\
+        [displacement]\nX = '-A*X'\n[material]\nlaw = 'linear-elastic'\nlambda = 'lambda'\nmu = 'mu'\n\
+        [domain]\nshape = 'box'\nlower = [0]\nupper = [1]\n";
+    std::fs::write(at.join("folded.toml"), text).unwrap();
+    let called = mms(at, "run folded.toml --static --cells 4 --json made.json");
+    assert_eq!(called.status, 1, "{}{}", called.stdout, called.stderr);
+    for expected in ["NOT REACHED: load factor", "J = ", "mms run folded.toml --static --cells 4"] {
+        assert!(called.stdout.contains(expected), "{}", called.stdout);
+    }
+    let made = read_json(&at.join("made.json"));
+    assert!(made["passed"] == false && made["result"]["errors"].is_null(), "{made}");
+}
+
+#[test]
+fn options_without_a_meaning_are_refused_by_their_names() {
+    let place = tempfile::tempdir().unwrap();
+    for (call, expected) in [
+        ("run skew-2d --static --cfl 0.2", "--cfl: an equilibrium from rest has no steps in time"),
+        ("run skew-2d --static --integrator usl", "leave --integrator out"),
+        ("run skew-2d --static --shape gimp", "--shape: an equilibrium"),
+        ("run skew-2d --static --vtk frames", "leave --vtk out"),
+        ("converge skew-2d --static --cells 8 --cfls 0.1,0.2", "leave --cfls out"),
+        (
+            "run skew-2d --load-steps 4",
+            "--load-steps: only an equilibrium from rest has it; add --static",
+        ),
+        ("run skew-2d --moment 0.5", "add --static"),
+        ("run skew-2d --static --dynamic", "cannot be used with"),
+    ] {
+        refuses(place.path(), call, &[expected]);
+    }
+}
