@@ -81,7 +81,7 @@ fn a_sweep_keeps_its_budget_and_its_promises() {
     assert_eq!(document["effects"].as_array().map(Vec::len), Some(report.found.effects.len()));
     let advice = report.advice();
     assert!(advice.contains("## What accuracy costs"), "{advice}");
-    assert!(advice.contains("For an error of 1e-2 take"), "{advice}");
+    assert!(advice.contains("For an error of 1e-2, the cheapest setting"), "{advice}");
     assert!(report.report().expect("a report").plot().contains("class=\"pareto\""));
     // The same again: nothing depends on what else the machine does.
     let again = sweep_of(&options).found;
