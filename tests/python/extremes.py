@@ -44,7 +44,7 @@ SHARES_OF_AMPLITUDE = (0.01, 0.1, 0.5, 1.0, 1.5)
 # Their sides are moved or loaded, which lattices of boxes cannot be in the updated formulation.
 HELD = ("ring-isochoric", "shears", "shears-loaded", "shears-3d", "skew-2d", "vortex")
 CLIPPED = ("cpdi2", "bspline2", "bspline3")
-UPDATED = ("linear", "gimp", "ugimp", "cpdi", "cpdi2", "bspline2", "bspline3")
+UPDATED = ("linear", "gimp", "ugimp", "cpdi", "cpdi2", "gimp-bspline2", "bspline2", "bspline3")
 TRANSFERS = ("flip", "pic", "apic", "xpic2")
 INTEGRATORS = ("usl", "usf", "musl", "cd")
 TOTAL = ("bspline2", "bspline3", "bspline4")
