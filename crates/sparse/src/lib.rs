@@ -212,7 +212,8 @@ mod tests {
             std::cmp::Ordering::Equal => 2.0,
             std::cmp::Ordering::Greater => -1.5,
         };
-        let all: [(&dyn Fn(usize, usize) -> f64, bool, Factors); 3] = [
+        type Entry = dyn Fn(usize, usize) -> f64;
+        let all: [(&Entry, bool, Factors); 3] = [
             (&spring, true, Factors::Cholesky),
             (&indefinite, true, Factors::Elimination),
             (&drift, false, Factors::Elimination),
