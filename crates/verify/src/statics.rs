@@ -22,7 +22,7 @@ use crate::scene::Scene;
 use crate::scheme::{Scheme, Total};
 use crate::score::is_static;
 use crate::total::ExactBoundary;
-use crate::verdict::{Behaviour, Verdict};
+use crate::verdict::Verdict;
 
 /// A body that is taken from rest to one moment of its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,12 @@ impl<T> StaticErrors<T> {
     /// The fields by name.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, &T)> {
         [("u", &self.u), ("F", &self.F), ("P", &self.P)].into_iter()
+    }
+
+    /// The field with a name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&T> {
+        self.iter().find(|(own, _)| *own == name).map(|(_, found)| found)
     }
 
     /// These errors with a change of each.
@@ -270,12 +276,7 @@ where
     let grid = case.total.grid(&scene, case.case.per_cell)?;
     let law = law_of(exact.law(), &case.case)?;
     let begun = Instant::now();
-    let made = f64::at_rest(&grid, case.total.degree, law, exact.density());
-    let mut body = made.map_err(|error| match error {
-        StaticsError::Setup(error) => error.into(),
-        StaticsError::Degree { degree } => CaseError::setting("degree", degree, "from 1 to 5"),
-        other => CaseError::Statics(other),
-    })?;
+    let mut body = f64::at_rest(&grid, case.total.degree, law, exact.density())?;
     let time = case.moment * exact.period();
     let boundary = ExactBoundary::new(exact);
     let moves = !is_static(exact);
@@ -413,19 +414,8 @@ impl StaticStudy {
     /// Leaves verdicts open that promises of theory alone do not allow: of errors at rounding, of orders that have not settled and are
     /// better, and of grids that are too coarse.
     pub fn spare_coarse_grids(&mut self) {
-        let coarsest = self.rows.iter().map(|row| row.cells).min().unwrap_or(usize::MAX);
-        let settle = |one: &Verdict| {
-            let above = one.finest.zip(one.expected).map(|(order, expected)| order - expected);
-            let is_unjudged = match one.behaviour {
-                Behaviour::NoOrder | Behaviour::AtRounding => true,
-                Behaviour::NotSettled => above.is_some_and(|above| above > one.tolerance),
-                _ => false,
-            };
-            match is_unjudged {
-                true => Verdict { passed: None, ..one.clone() },
-                false => one.clone().sparing_coarse_grids(coarsest),
-            }
-        };
+        let coarsest = self.rows.iter().map(|row| row.cells).min();
+        let settle = |one: &Verdict| one.clone().of_theory_alone(coarsest);
         self.verdicts = self.verdicts.map(|norms| norms.map(settle));
     }
 
@@ -468,6 +458,7 @@ impl From<StaticsError> for CaseError {
     fn from(error: StaticsError) -> Self {
         match error {
             StaticsError::Setup(error) => Self::from(error),
+            StaticsError::Degree { degree } => Self::setting("degree", degree, "from 1 to 5"),
             other => Self::Statics(other),
         }
     }

@@ -169,6 +169,24 @@ const FEWEST_CELLS: usize = 8;
 const HIDDEN: f64 = 0.125;
 
 impl Verdict {
+    /// This verdict, but open where an expectation that nobody has stated cannot be judged: of errors at rounding, and of an order that has
+    /// not settled and is better than theory promises, which is no failure and no proof; with the cells of the coarsest grid also
+    /// as [`sparing_coarse_grids`](Self::sparing_coarse_grids) has it.
+    #[must_use]
+    pub fn of_theory_alone(self, coarsest: Option<usize>) -> Self {
+        let above = self.finest.zip(self.expected).map(|(order, expected)| order - expected);
+        let is_unjudged = match self.behaviour {
+            Behaviour::NoOrder | Behaviour::AtRounding => true,
+            Behaviour::NotSettled => above.is_some_and(|above| above > self.tolerance),
+            _ => false,
+        };
+        match coarsest {
+            _ if is_unjudged => Self { passed: None, ..self },
+            Some(cells) => self.sparing_coarse_grids(cells),
+            None => self,
+        }
+    }
+
     /// This verdict, but without a failure where the coarsest grid has fewer than eight cells and the order is short of the expected
     /// one by no more than an eighth of it: such grids may lie before the asymptotic range.
     #[must_use]

@@ -23,7 +23,7 @@ use super::study::{Request, Show, Study, conduct};
 use crate::arguments::{ConvergeOptions, SchemeOptions};
 use crate::expect;
 use crate::library::Selection;
-use crate::report::{Asked, Form, Report};
+use crate::report::Report;
 use crate::terminal;
 use judged::Judged;
 pub(super) use judged::{Verdicts, judge, judge_differences};
@@ -56,24 +56,7 @@ pub(crate) fn converge(options: &ConvergeOptions) -> Result<bool> {
     let given = Given::of(&options.name, &options.scheme);
     let warnings = OnceLock::new();
     let study = Converge { problem, given, sweep, base, cases, orders, warnings };
-    let files = Asked(vec![
-        (Form::Json, &options.scheme.json),
-        (Form::Plot, &options.plot),
-        (Form::Csv, &options.csv),
-        (Form::Markdown, &options.markdown),
-        (Form::Latex, &options.latex),
-    ]);
-    let request = Request {
-        solution: &options.name,
-        kept: &options.kept,
-        threads: options.scheme.threads,
-        files,
-        others: &[
-            ("--expect", options.expect.is_some()),
-            ("--tolerance", options.tolerance.is_some()),
-        ],
-    };
-    conduct(&study, &request)
+    conduct(&study, &Request::of_orders(options))
 }
 
 fn sweep(options: &ConvergeOptions) -> Result<Sweep> {

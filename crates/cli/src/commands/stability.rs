@@ -88,7 +88,7 @@ fn request(options: &StabilityOptions) -> Request<'_> {
         kept: &options.kept,
         threads: options.scheme.threads,
         files: Asked(vec![(Form::Json, &scheme.json), (Form::Plot, plot), (Form::Csv, csv)]),
-        others: &[],
+        others: vec![],
     }
 }
 

@@ -221,24 +221,7 @@ pub(super) fn converge(selection: Selection, options: &ConvergeOptions) -> Resul
         tolerance: options.tolerance.unwrap_or(ORDER_TOLERANCE),
         is_strict: options.expect.is_some() || options.tolerance.is_some(),
     };
-    let files = Asked(vec![
-        (Form::Json, &options.scheme.json),
-        (Form::Plot, &options.plot),
-        (Form::Csv, &options.csv),
-        (Form::Markdown, &options.markdown),
-        (Form::Latex, &options.latex),
-    ]);
-    let request = Request {
-        solution: &options.name,
-        kept: &options.kept,
-        threads: options.scheme.threads,
-        files,
-        others: &[
-            ("--expect", options.expect.is_some()),
-            ("--tolerance", options.tolerance.is_some()),
-        ],
-    };
-    conduct(&study, &request)
+    conduct(&study, &Request::of_orders(options))
 }
 
 /// A series of grids.

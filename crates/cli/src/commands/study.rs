@@ -9,11 +9,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::arguments::KeepOptions;
+use crate::arguments::{ConvergeOptions, KeepOptions};
 use crate::keep::{Found, Keep, Order};
 use crate::processes::with_threads;
 use crate::progress::Bar;
-use crate::report::{Asked, Report};
+use crate::report::{Asked, Form, Report};
 use crate::terminal;
 
 /// A study: its cases, each with a result, and the report on all results.
@@ -101,12 +101,35 @@ pub(super) struct Request<'a> {
     pub(super) threads: Option<usize>,
     pub(super) files: Asked<'a>,
     /// Options that a shard cannot follow, beside those for files, and whether they are given.
-    pub(super) others: &'a [(&'static str, bool)],
+    pub(super) others: Vec<(&'static str, bool)>,
+}
+
+impl<'a> Request<'a> {
+    /// For a series of grids or of time steps.
+    pub(super) fn of_orders(options: &'a ConvergeOptions) -> Self {
+        let ConvergeOptions { scheme, plot, csv, markdown, latex, .. } = options;
+        Self {
+            solution: &options.name,
+            kept: &options.kept,
+            threads: scheme.threads,
+            files: Asked(vec![
+                (Form::Json, &scheme.json),
+                (Form::Plot, plot),
+                (Form::Csv, csv),
+                (Form::Markdown, markdown),
+                (Form::Latex, latex),
+            ]),
+            others: vec![
+                ("--expect", options.expect.is_some()),
+                ("--tolerance", options.tolerance.is_some()),
+            ],
+        }
+    }
 }
 
 /// Does a study and publishes its report; whether all that was promised holds. A shard does its part, and tells of it.
 pub(super) fn conduct<S: Study>(study: &S, request: &Request<'_>) -> Result<bool> {
-    let options = [&request.files.options(), request.others].concat();
+    let options = [&request.files.options()[..], &request.others].concat();
     let keep = Keep::open(request.kept, request.solution, &options)?;
     let files = request.files.prepare()?;
     with_threads(request.threads, || {

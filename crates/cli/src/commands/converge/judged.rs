@@ -2,9 +2,8 @@
 
 use mmsmith_solutions::{AnySolution, Smoothness};
 use mmsmith_verify::{
-    Behaviour, Discretized, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep,
-    Temporal, Values, expected_in_space, expected_in_time, history_of, orders_above,
-    verdicts_above,
+    Discretized, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
+    Values, expected_in_space, expected_in_time, history_of, orders_above, verdicts_above,
 };
 
 use super::Converge;
@@ -77,7 +76,7 @@ impl Judged {
         let coarsest = coarsest(&study, sweep);
         let settle = |judged: Verdicts| match orders.strict {
             true => judged,
-            false => unless_unjudged(judged, coarsest),
+            false => judged.map(|norms| norms.map(|one| one.clone().of_theory_alone(coarsest))),
         };
         let verdicts = settle(judge_above(&study, sweep, &in_space, orders.tolerance, &floors));
         let differences = differences.map(|found| {
@@ -169,25 +168,6 @@ fn coarsest(study: &Study, sweep: &Sweep) -> Option<usize> {
         Sweep::Cells(_) => study.rows.iter().map(|row| row.cells).min(),
         Sweep::Cfls(_) => None,
     }
-}
-
-/// Verdicts where an expectation that nothing can judge is none. Errors on coarse grids may fall faster than theory promises, or
-/// somewhat slower: that is no failure, and no proof before the order has settled.
-fn unless_unjudged(judged: Verdicts, coarsest: Option<usize>) -> Verdicts {
-    let settle = |one: OrderVerdict| {
-        let above = one.finest.zip(one.expected).map(|(order, expected)| order - expected);
-        let is_unjudged = match one.behaviour {
-            Behaviour::NoOrder | Behaviour::AtRounding => true,
-            Behaviour::NotSettled => above.is_some_and(|above| above > one.tolerance),
-            _ => false,
-        };
-        match coarsest {
-            _ if is_unjudged => OrderVerdict { passed: None, ..one },
-            Some(cells) => one.sparing_coarse_grids(cells),
-            None => one,
-        }
-    };
-    PerField::from_fn(|field| PerNorm::from_fn(|norm| settle(judged[field][norm].clone())))
 }
 
 /// Judges the differences on one grid.

@@ -1,6 +1,6 @@
 //! Reports on equilibria.
 
-use mmsmith_verify::{Behaviour, Norm, OrderVerdict, PerNorm, StaticRow, StaticStep, StaticStudy};
+use mmsmith_verify::{Behaviour, Norm, OrderVerdict, StaticRow, StaticStep, StaticStudy};
 use serde_json::{Map, json};
 
 use super::Problem;
@@ -210,14 +210,12 @@ fn on_verdicts(study: &StaticStudy) -> String {
 fn errors(study: &StaticStudy, field: &str) -> Table {
     let header = ["cells", "h", "linf", "rate", "l2", "rate", "l1", "rate", "Newton"];
     let mut table = Table::new(0, header);
-    let orders = study.orders.iter().find(|(name, _)| *name == field).map(|(_, found)| found);
+    let orders = study.orders.get(field);
     for (index, row) in study.rows.iter().enumerate() {
         let mut cells = vec![row.cells.to_string(), table::error(row.h)];
-        let own = row.errors.as_ref().and_then(|errors| {
-            errors.iter().find(|(name, _)| *name == field).map(|(_, norms)| *norms)
-        });
+        let own = row.errors.as_ref().and_then(|errors| errors.get(field));
         for norm in Norm::ALL {
-            let error = own.map_or(f64::NAN, |norms: PerNorm<f64>| norms[norm]);
+            let error = own.map_or(f64::NAN, |norms| norms[norm]);
             let local = index.checked_sub(1).and_then(|pair| orders?[norm].local[pair]);
             cells.extend([table::error(error), table::rate(local)]);
         }
@@ -279,9 +277,7 @@ fn sheet(study: &StaticStudy) -> Sheet {
             row.stopped.clone().unwrap_or_else(|| "ok".into()),
         ];
         let errors = study.orders.iter().flat_map(|(field, _)| {
-            let own = row.errors.as_ref().and_then(|errors| {
-                errors.iter().find(|(name, _)| *name == field).map(|(_, norms)| *norms)
-            });
+            let own = row.errors.as_ref().and_then(|errors| errors.get(field));
             Norm::ALL.map(|norm| digits(own.map_or(f64::NAN, |norms| norms[norm])))
         });
         sheet.row(first.into_iter().chain(errors.collect::<Vec<_>>()));
