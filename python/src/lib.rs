@@ -198,10 +198,7 @@ impl Fields {
         t: f64,
         out: PyReadwriteArrayDyn<'_, f64>,
     ) -> PyResult<()> {
-        let axes = 0..self.arrays.dimension();
-        let faces = axes.flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]);
-        let mut surfaces = faces
-            .chain([Surface::Inner, Surface::Outer])
+        let mut surfaces = Surface::all(self.arrays.dimension())
             .map(Quantity::Traction)
             .filter(|&quantity| self.arrays.entries(quantity).is_some());
         let name = |quantity: &Quantity| match quantity {

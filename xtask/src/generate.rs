@@ -2,8 +2,8 @@
 
 use crate::{read, write};
 use anyhow::{Context, anyhow, bail};
-use mmsmith_codegen::{Code, HOSTS, Host, Names, Unwritable, registry_source};
-use mmsmith_spec::Spec;
+use mmsmith_codegen::{Code, HOSTS, Host, Names, Origin, Unwritable, registry_source};
+use mmsmith_spec::{Coordinates, Spec};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -216,7 +216,13 @@ fn generate(repository: &Path, path: &Path, hosts: &[&Host]) -> anyhow::Result<G
     lap();
     let mut texts = Vec::new();
     for host in hosts {
-        texts.push(source(host, &code)?);
+        let own = match spec.coordinates {
+            Coordinates::Axisymmetric if host.in_half_plane => {
+                Some(Code::for_host(&spec, Origin::library(&spec), host)?)
+            }
+            _ => None,
+        };
+        texts.push(source(host, own.as_ref().unwrap_or(&code))?);
         lap();
     }
     Ok(Generated { name: spec.name.clone(), texts, times })

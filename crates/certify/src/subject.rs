@@ -108,6 +108,8 @@ impl Subject {
             bounds[axis] = match &spec.domain {
                 Domain::Box { .. } => around(ends[1 + axis], ends[1 + spec.dimension + axis]),
                 Domain::Annulus { .. } => around(Interval::ZERO, ends[2]),
+                Domain::Tube { .. } if axis < 2 => around(Interval::ZERO, ends[2]),
+                Domain::Tube { .. } => around(ends[3], ends[4]),
             };
         }
         override_with(&mut bounds, 0..first);
@@ -162,6 +164,7 @@ fn program(spec: &Spec, fields: Fields) -> (Program, Vec<Judged>, Program) {
     match &staged.constants.domain {
         Measures::Box { lower, upper } => measures.extend(lower.iter().chain(upper)),
         Measures::Annulus { inner, outer } => measures.extend([inner, outer]),
+        Measures::Tube(of) => measures.extend(of.clone().list()),
     }
     (program, judged, staged.program().part(&measures))
 }

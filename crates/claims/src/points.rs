@@ -98,6 +98,9 @@ fn place(
     match &spec.domain {
         Domain::Box { lower, upper } => measures.extend(lower.iter().chain(upper)),
         Domain::Annulus { inner, outer } => measures.extend([inner, outer]),
+        Domain::Tube { inner, outer, lower, upper, .. } => {
+            measures.extend([inner, outer, lower, upper]);
+        }
     }
     let point = Point { graph, definitions: &[], values: parameters };
     let measures = Oracle::new(Oracle::USUAL_BITS).ok()?.evaluate(&point, &measures).ok()?;
@@ -117,6 +120,20 @@ fn place(
             };
             let shares: Vec<&Rational> = (1..n).map(share).collect();
             direction(&shares).into_iter().map(|e| e * &radius).collect()
+        }
+        Domain::Tube { .. } => {
+            let radius = match surface {
+                Some(Surface::Inner) => measures[0].clone(),
+                Some(Surface::Outer) => measures[1].clone(),
+                _ => between(&measures[0], &measures[1], share(0)),
+            };
+            let height = match surface {
+                Some(Surface::Lower(_)) => measures[2].clone(),
+                Some(Surface::Upper(_)) => measures[3].clone(),
+                _ => between(&measures[2], &measures[3], share(2)),
+            };
+            let across = direction(&[share(1)]).into_iter().map(|e| e * &radius);
+            across.chain([height]).collect()
         }
     };
     match (surface, &spec.domain) {

@@ -2,8 +2,9 @@
 
 use crate::fault::{Fault, NoEffect};
 use crate::table::Tabulated;
+use crate::target::Host;
 use mmsmith_expr::{Function, Operation};
-use mmsmith_spec::{DeriveError, Fields, Spec};
+use mmsmith_spec::{Coordinates, DeriveError, Fields, Spec};
 use mmsmith_stage::Staged;
 
 /// A solution whose fields are derived and staged, ready to be written down in Rust or in C.
@@ -13,6 +14,8 @@ pub struct Code<'a> {
     pub(crate) origin: Origin,
     /// The mistake that the fields have on purpose, if any.
     pub(crate) wrong: Option<String>,
+    /// Whether places and components are those of the half plane of a body of revolution.
+    pub(crate) is_of_half_plane: bool,
     /// The table of the fields that follow from histories, if there are such fields.
     pub(crate) table: Option<Tabulated>,
 }
@@ -47,7 +50,19 @@ impl<'a> Code<'a> {
     /// Stages `fields`, which are those of `spec`.
     #[must_use]
     pub fn of(spec: &'a Spec, fields: Fields, origin: Origin) -> Self {
-        Code { spec, staged: Staged::of(spec, fields), origin, wrong: None, table: None }
+        let staged = Staged::of(spec, fields);
+        Code { spec, staged, origin, wrong: None, is_of_half_plane: false, table: None }
+    }
+
+    /// Derives and stages the fields in the components in which a host computes.
+    ///
+    /// # Errors
+    ///
+    /// [`DeriveError`] where a field is nowhere defined.
+    pub fn for_host(spec: &'a Spec, origin: Origin, host: &Host) -> Result<Self, DeriveError> {
+        let is_of_half_plane = host.in_half_plane && spec.coordinates == Coordinates::Axisymmetric;
+        let fields = if is_of_half_plane { spec.derive_for_hosts()? } else { spec.derive()? };
+        Ok(Code { is_of_half_plane, ..Code::of(spec, fields, origin) })
     }
 
     /// Stages `fields` with a fault planted in them, which the head of the code states.

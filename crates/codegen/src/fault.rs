@@ -320,6 +320,13 @@ fn is_noticed(spec: &Spec, fields: &mut Fields, before: &[Expr], after: &[Expr])
             let root = fields.graph.number(Rational::new(7.into(), 10.into()));
             [inner, outer].map(|&radius| vec![fields.graph.mul(root, radius); n])
         }
+        Domain::Tube { inner, outer, lower, upper, .. } => {
+            let root = fields.graph.number(Rational::new(7.into(), 10.into()));
+            [(inner, lower), (outer, upper)].map(|(&radius, &height)| {
+                let X = fields.graph.mul(root, radius);
+                vec![X, X, height]
+            })
+        }
     };
     let corners = measures.concat();
     let constants: Vec<Expr> = corners.into_iter().chain([spec.period]).collect();

@@ -7,7 +7,7 @@ use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};
 use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
-use mmsmith_stage::{Block, FieldName, Measures, Shape};
+use mmsmith_stage::{Block, FieldName, Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeSet;
 
@@ -153,6 +153,21 @@ impl Code<'_> {
                 constant("inner", "the body's inner radius", &[*inner]),
                 constant("outer", "the body's outer radius", &[*outer]),
             ]),
+            Measures::Tube(measures) => {
+                let TubeMeasures { inner, outer, lower, upper, around } = measures.clone();
+                all.extend([
+                    constant("inner", "the body's inner radius", &[inner]),
+                    constant("outer", "the body's outer radius", &[outer]),
+                    constant("lower", "the body's smallest Z", &[lower]),
+                    constant("upper", "the body's largest Z", &[upper]),
+                ]);
+                if let Some([from, to]) = around.angles() {
+                    all.extend([
+                        constant("from", "the body's smallest angle", &[from]),
+                        constant("to", "the body's largest angle", &[to]),
+                    ]);
+                }
+            }
         }
         all
     }
@@ -198,17 +213,28 @@ impl Code<'_> {
         lines.push(String::new());
         lines.extend(host.lines().map(str::to_owned));
         lines.extend(self.about_table());
+        let coordinates = match self.is_of_half_plane {
+            true => {
+                "coordinates: X is {R, theta, Z}, the REFERENCE radius, an angle on which nothing depends, and the height; components are \
+                 those along e_R, e_theta and e_Z at X, also of the current state: u is the displacement of X in this basis. Integrals over \
+                 the half plane have the weight 2 pi R."
+            }
+            false => {
+                "coordinates: X is the REFERENCE position, in Cartesian components. A host that gives the current position x = X + u has to \
+                 find X first."
+            }
+        };
         lines.extend(
-            "
+            format!("
 force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/J. The balance \
 is rho0 a = Div P + rho0 b, so that it stands on the side of the stresses, with a plus sign.
-coordinates: X is the REFERENCE position, in Cartesian components. A host that gives the current position x = X + u has to find X first.
+{coordinates}
 stress: P is the first Piola-Kirchhoff stress, P[i][J] with i spatial and J reference, and the traction P N is per reference area. The nominal \
 stress is P transposed; the Cauchy stress is P F^T/J.
 time: t is the time of the state whose accelerations the force causes: the old time of an explicit step with centred differences, the new \
 time of an implicit step, and for generalised-alpha schemes the time at which they balance momentum. A static problem has the deformation of a time t that stays, with the force -Div P = rho0 (b - a), static_force; a load \
 factor is that time.
-In two dimensions the deformation is plane strain. Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2."
+In two dimensions the deformation is plane strain. Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2.")
                 .lines()
                 .map(str::to_owned),
         );
@@ -294,6 +320,8 @@ pub(crate) fn surface_name(surface: Surface) -> String {
         Surface::Upper(i) => format!("{}-upper", axis(i)),
         Surface::Inner => "inner".into(),
         Surface::Outer => "outer".into(),
+        Surface::FirstAngle => "theta-lower".into(),
+        Surface::LastAngle => "theta-upper".into(),
     }
 }
 

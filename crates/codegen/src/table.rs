@@ -54,6 +54,9 @@ impl Normal {
             Surface::Upper(axis) => Normal::Axis(axis, 1.0),
             Surface::Inner => Normal::Radial(-1.0),
             Surface::Outer => Normal::Radial(1.0),
+            // A law with memory has no body of revolution yet, so that no table has these.
+            Surface::FirstAngle => Normal::Axis(1, -1.0),
+            Surface::LastAngle => Normal::Axis(1, 1.0),
         }
     }
 }

@@ -147,6 +147,8 @@ pub struct Host {
     pub about: &'static str,
     /// The end of a file's name, after the name of the module.
     pub ending: &'static str,
+    /// Whether its files have bodies of revolution in their half plane; else in Cartesian components in space.
+    pub in_half_plane: bool,
     /// Whether its files read tables of fields that follow from histories.
     pub reads_tables: bool,
     /// The text of the file.

@@ -17,6 +17,9 @@ pub enum End {
     Moved,
     /// No end: the other end of the axis follows, where this is `Periodic` too.
     Periodic,
+    /// No end, and the same all along the axis, where the other end is `Uniform` too: one cell, one particle at its lower end, and one
+    /// function, which is one. So a body of revolution whose motion does not depend on the angle has an angle without unknowns.
+    Uniform,
 }
 
 impl End {
@@ -56,6 +59,16 @@ impl Axis {
         (self.upper - self.lower) / self.cells as f64
     }
 
+    /// Whether all is the same along the axis.
+    pub(crate) fn is_uniform(&self) -> bool {
+        self.ends == [End::Uniform; 2]
+    }
+
+    /// How many particles lie along it, with so many in a cell.
+    pub fn count(&self, per_cell: usize) -> usize {
+        if self.is_uniform() { 1 } else { self.cells * per_cell }
+    }
+
     /// Which ends have a given motion.
     pub(crate) fn moved(&self) -> [bool; 2] {
         self.ends.map(|end| end == End::Moved)
@@ -63,6 +76,9 @@ impl Axis {
 
     /// Coordinates and weights of the particles along this axis, `per_cell` in each cell, cell after cell.
     pub(crate) fn points(&self, per_cell: usize, layout: Layout) -> (Vec<f64>, Vec<f64>) {
+        if self.is_uniform() {
+            return (vec![self.lower], vec![self.upper - self.lower]);
+        }
         let rule: Vec<(f64, f64)> = match layout {
             Layout::Lattice => {
                 let part = 1.0 / per_cell as f64;

@@ -56,6 +56,9 @@ impl Basis {
     /// The basis of splines at `points`, which are the same number in each cell, cell after cell. `normal` says whether
     /// the component is the one that vanishes on the walls of this axis. `None` where no function is left.
     pub(crate) fn new(axis: &Axis, degree: usize, normal: bool, points: &[f64]) -> Option<Self> {
+        if axis.is_uniform() {
+            return Some(Self::uniform(points.len()));
+        }
         let p = degree;
         let n = axis.cells;
         let knots = knots(axis, p);
@@ -117,6 +120,22 @@ impl Basis {
         }
         basis.put_together();
         Some(basis)
+    }
+
+    /// The one function that is one everywhere.
+    fn uniform(points: usize) -> Self {
+        let mut basis = Self {
+            functions: 1,
+            points,
+            width: 1,
+            first: vec![0; points],
+            value: vec![1.0; points],
+            slope: vec![0.0; points],
+            together: Vec::new(),
+            together_of: Vec::new(),
+        };
+        basis.put_together();
+        basis
     }
 
     fn put_together(&mut self) {

@@ -8,6 +8,10 @@
 //! polar      H = | u_R,R   (u_R,th - u_th)/R |
 //!                | u_th,R  (u_th,th + u_R)/R |
 //!
+//! cylindrical    | u_R,R   (u_R,th - u_th)/R   u_R,Z  |
+//!            H = | u_th,R  (u_th,th + u_R)/R   u_th,Z |
+//!                | u_Z,R   u_Z,th/R            u_Z,Z  |
+//!
 //! spherical      | u_R,R   (u_R,th - u_th)/R  (u_R,ph/sin th - u_ph)/R           |
 //!            H = | u_th,R  (u_th,th + u_R)/R  (u_th,ph/sin th - u_ph cot th)/R   |
 //!                | u_ph,R  u_ph,th/R          (u_ph,ph/sin th + u_R + u_th cot th)/R |
@@ -26,6 +30,9 @@ pub enum Coordinates {
     /// Radius and angle of the reference position, in two dimensions. Unknowns are the components along `e_R` and
     /// `e_theta` at the reference position, so that planes of symmetry through the origin are ends of the angle's axis.
     Polar,
+    /// Polar coordinates in the plane of the first two axes, and the reference position along the third, in three dimensions. Unknowns are
+    /// the components along `e_R`, `e_theta` and `e_Z`. The radius may begin at the axis, where no particle lies.
+    Cylindrical,
     /// Radius, polar angle from the third axis, and azimuth from the first of the reference position, in three dimensions.
     /// Unknowns are the components along `e_R`, `e_theta` and `e_phi` there, so that planes of symmetry through the third
     /// axis are ends of the azimuth's axis, and that across it is the end of the polar angle's axis at a right angle: the
@@ -56,7 +63,13 @@ impl Coordinates {
     pub(crate) fn place<const D: usize>(self, coordinates: &SVector<f64, D>) -> SVector<f64, D> {
         match self.frame(coordinates) {
             None => *coordinates,
-            Some(frame) => frame.column(0) * coordinates[0],
+            Some(frame) => {
+                let mut place = frame.column(0) * coordinates[0];
+                if self == Self::Cylindrical {
+                    place[D - 1] = coordinates[D - 1];
+                }
+                place
+            }
         }
     }
 
@@ -67,11 +80,13 @@ impl Coordinates {
     ) -> Option<SMatrix<f64, D, D>> {
         match self {
             Self::Cartesian => None,
-            Self::Polar => {
+            Self::Polar | Self::Cylindrical => {
                 let (sin, cos) = coordinates[1].sin_cos();
                 Some(SMatrix::from_fn(|i, k| match (i, k) {
                     (0, 1) => -sin,
                     (1, 0) => sin,
+                    (2, 2) => 1.0,
+                    (2, _) | (_, 2) => 0.0,
                     _ => cos,
                 }))
             }
@@ -100,7 +115,7 @@ impl Coordinates {
     ) -> Option<RowGeometry<D>> {
         let frame = self.frame(coordinates)?;
         let [cosecant, cotangent] = match self {
-            Self::Cartesian | Self::Polar => [1.0, 0.0],
+            Self::Cartesian | Self::Polar | Self::Cylindrical => [1.0, 0.0],
             Self::Spherical => {
                 let (sin, cos) = coordinates[1].sin_cos();
                 [sin.recip(), cos / sin]
@@ -114,7 +129,7 @@ impl Coordinates {
         let mut scales = SVector::repeat(1.0);
         match self {
             Self::Cartesian => {}
-            Self::Polar => scales[1] = coordinates[0],
+            Self::Polar | Self::Cylindrical => scales[1] = coordinates[0],
             Self::Spherical => {
                 scales[1] = coordinates[0];
                 scales[2] = coordinates[0] * coordinates[1].sin();
@@ -126,7 +141,7 @@ impl Coordinates {
     /// The factor of the volume that belongs to axis `k`; the product over the axes is that of the scales.
     pub(crate) fn density(self, k: usize, coordinate: f64) -> f64 {
         match (self, k) {
-            (Self::Polar, 0) => coordinate,
+            (Self::Polar | Self::Cylindrical, 0) => coordinate,
             (Self::Spherical, 0) => coordinate * coordinate,
             (Self::Spherical, 1) => coordinate.sin(),
             _ => 1.0,
@@ -145,9 +160,12 @@ impl Coordinates {
         let mut H = *slopes;
         match self {
             Self::Cartesian => {}
-            Self::Polar => {
+            Self::Polar | Self::Cylindrical => {
                 H[(0, 1)] = (slopes[(0, 1)] - u[1]) * reciprocal_radius;
                 H[(1, 1)] = (slopes[(1, 1)] + u[0]) * reciprocal_radius;
+                if D == 3 {
+                    H[(2, 1)] = slopes[(2, 1)] * reciprocal_radius;
+                }
             }
             Self::Spherical => {
                 let RowGeometry { cosecant, cotangent, .. } = *row;
@@ -174,7 +192,7 @@ impl Coordinates {
         let (mut values, mut slopes) = (SVector::zeros(), *force);
         match self {
             Self::Cartesian => {}
-            Self::Polar => {
+            Self::Polar | Self::Cylindrical => {
                 for c in 0..D {
                     slopes[(c, 1)] *= reciprocal_radius;
                 }
@@ -204,8 +222,12 @@ impl Coordinates {
         match self {
             Self::Cartesian => Ok(()),
             Self::Polar if D != 2 => Err(SetupError::PolarDimension { dimension: D }),
-            Self::Spherical if D != 3 => Err(SetupError::SphericalDimension { dimension: D }),
+            Self::Spherical | Self::Cylindrical if D != 3 => {
+                Err(SetupError::SphericalDimension { dimension: D })
+            }
             Self::Polar => positive("the inner radius", axes[0][0]),
+            Self::Cylindrical if axes[0][0] == 0.0 => Ok(()),
+            Self::Cylindrical => positive("the inner radius", axes[0][0]),
             Self::Spherical => {
                 positive("the inner radius", axes[0][0])?;
                 positive("the least polar angle", axes[1][0])?;
@@ -229,11 +251,8 @@ mod tests {
     }
 
     /// Components of the field and their derivatives by the coordinates, these by differences of fourth order.
-    fn in_components(q: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        let components = |q: &Vector3<f64>| {
-            let frame = Coordinates::Spherical.frame(q).unwrap();
-            frame.tr_mul(&field(&Coordinates::Spherical.place(q)).0)
-        };
+    fn in_components(of: Coordinates, q: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        let components = |q: &Vector3<f64>| of.frame(q).unwrap().tr_mul(&field(&of.place(q)).0);
         const STEP: f64 = 1e-3;
         let slopes = Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|k| {
             let at = |steps: f64| {
@@ -246,17 +265,19 @@ mod tests {
         (components(q), slopes)
     }
 
+    const OF_SPACE: [Coordinates; 2] = [Coordinates::Spherical, Coordinates::Cylindrical];
+
     const PLACES: [[f64; 3]; 3] = [[0.5, 0.8, 0.3], [0.9, 2.4, -1.2], [1.3, 1.5, 4.0]];
 
     #[test]
-    fn gradients_in_spherical_coordinates_are_the_cartesian_ones() {
-        for q in PLACES.map(Vector3::from) {
-            let (u, slopes) = in_components(&q);
-            let row = Coordinates::Spherical.row(&q).unwrap();
-            let H = Coordinates::Spherical.gradient(&u, &slopes, q[0].recip(), &row);
-            let expected = field(&Coordinates::Spherical.place(&q)).1;
+    fn gradients_in_coordinates_of_space_are_the_cartesian_ones() {
+        for (of, q) in OF_SPACE.into_iter().flat_map(|of| PLACES.map(|q| (of, Vector3::from(q)))) {
+            let (u, slopes) = in_components(of, &q);
+            let row = of.row(&q).unwrap();
+            let H = of.gradient(&u, &slopes, q[0].recip(), &row);
+            let expected = field(&of.place(&q)).1;
             let off = (row.frame * H * row.frame.transpose() - expected).norm();
-            assert!(off < 1e-10, "{q:?}: {off:e}");
+            assert!(off < 1e-10, "{of:?} {q:?}: {off:e}");
         }
     }
 
@@ -276,27 +297,26 @@ mod tests {
         }
         for q in PLACES {
             check::<2>(Coordinates::Polar, q);
-            check::<3>(Coordinates::Spherical, q);
+            OF_SPACE.into_iter().for_each(|of| check::<3>(of, q));
         }
     }
 
     #[test]
     fn frames_are_the_directions_of_the_coordinates_and_scales_their_lengths() {
         const STEP: f64 = 1e-5;
-        for q in PLACES.map(Vector3::from) {
-            let (frame, scales) =
-                (Coordinates::Spherical.frame(&q).unwrap(), Coordinates::Spherical.scales(&q));
+        for (of, q) in OF_SPACE.into_iter().flat_map(|of| PLACES.map(|q| (of, Vector3::from(q)))) {
+            let (frame, scales) = (of.frame(&q).unwrap(), of.scales(&q));
             for k in 0..3 {
                 let at = |step: f64| {
                     let mut moved = q;
                     moved[k] += step;
-                    Coordinates::Spherical.place(&moved)
+                    of.place(&moved)
                 };
                 let tangent = (at(STEP) - at(-STEP)) / (2.0 * STEP);
                 assert!((tangent - frame.column(k) * scales[k]).norm() < 1e-9, "{q:?} {k}");
             }
             assert!((frame.determinant() - 1.0).abs() < 1e-15);
-            let densities: f64 = (0..3).map(|k| Coordinates::Spherical.density(k, q[k])).product();
+            let densities: f64 = (0..3).map(|k| of.density(k, q[k])).product();
             assert!((densities - scales.product()).abs() < 1e-15);
         }
     }

@@ -255,6 +255,10 @@ pub(super) fn check_grid<const D: usize>(
         if lower != upper {
             return Err(SetupError::HalfPeriodic { axis: k });
         }
+        let [first, last] = of(End::Uniform);
+        if first != last || (first && axis.cells != 1) {
+            return Err(SetupError::HalfUniform { axis: k });
+        }
         if lower && axis.cells <= degree {
             return Err(SetupError::TooFewCells { axis: k, cells: axis.cells, least: degree + 1 });
         }
@@ -268,7 +272,7 @@ pub(super) fn reserve<const D: usize>(
     degree: usize,
     variables: usize,
 ) -> Result<(), SetupError> {
-    let points = grid.axes.iter().map(|axis| axis.cells as f64 * grid.per_cell as f64);
+    let points = grid.axes.iter().map(|axis| axis.count(grid.per_cell) as f64);
     let of_memory = match variables {
         0 => 0.0,
         variables => points.product::<f64>() * (variables + D * D) as f64,
@@ -289,7 +293,7 @@ pub(super) fn doubles<const D: usize>(grid: &Grid<D>, degree: usize) -> f64 {
     let in_vector = D as f64;
     let in_matrix = in_vector * in_vector;
     let in_frame = if curvilinear { in_matrix } else { 0.0 };
-    let points = grid.axes.each_ref().map(|axis| axis.cells as f64 * grid.per_cell as f64);
+    let points = grid.axes.each_ref().map(|axis| axis.count(grid.per_cell) as f64);
     let functions = grid.axes.each_ref().map(|axis| axis.cells as f64 + degree as f64);
     let width = degree as f64 + 1.0;
     let count = |along: &dyn Fn(usize) -> f64| (0..D).map(along).product::<f64>();

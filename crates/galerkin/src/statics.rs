@@ -258,7 +258,8 @@ struct Statics<const D: usize> {
     at: Quadrature<D>,
     particles: Particles<f64, D>,
     cells: [usize; D],
-    per_cell: usize,
+    /// Points of a cell along each axis.
+    per_cell: [usize; D],
     density: f64,
     numbering: Numbering<D>,
     pattern: Pattern,
@@ -307,7 +308,7 @@ impl<const D: usize> Statics<D> {
             P: vec![SMatrix::zeros(); count],
             tangents: vec![[[SMatrix::zeros(); D]; D]; count],
             cells: grid.axes.each_ref().map(|axis| axis.cells),
-            per_cell: grid.per_cell,
+            per_cell: grid.axes.each_ref().map(|axis| axis.count(grid.per_cell) / axis.cells),
             planted: Planted::here(),
             bases,
             fits,

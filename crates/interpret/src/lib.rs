@@ -20,12 +20,12 @@ use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_history::HistoryError;
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
-    AnySolution, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields, HistoryReport,
-    InternalAtPoints, Lattice, Law, ParameterError, PlainPoints, Real, Solution, StateAtPoints,
-    StateRun, Surface,
+    AnySolution, Around, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields,
+    HistoryReport, InternalAtPoints, Lattice, Law, ParameterError, PlainPoints, Real, Solution,
+    StateAtPoints, StateRun, Surface,
 };
 use mmsmith_spec::{self as spec, Coordinates, DeriveError, Spec};
-use mmsmith_stage::{FieldName, Measures, Sides, Staged};
+use mmsmith_stage::{FieldName, Measures, Sides, Staged, TubeMeasures};
 use staged::PointStages;
 use std::ops::Range;
 use thiserror::Error;
@@ -221,6 +221,16 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             &Measures::Annulus { inner, outer } => {
                 Domain::Annulus { inner: constant(inner), outer: constant(outer) }
             }
+            Measures::Tube(measures) => {
+                let TubeMeasures { inner, outer, lower, upper, around } =
+                    measures.clone().map(constant);
+                let around = match around {
+                    spec::Around::Axisymmetric => Around::Axisymmetric,
+                    spec::Around::Whole => Around::Whole,
+                    spec::Around::Sector { from, to } => Around::Sector { from, to },
+                };
+                Domain::Tube { inner, outer, lower, upper, around }
+            }
         };
         let field = |name: FieldName| part(staged.field(name));
         let law = staged.constants.law.clone().map(constant);
@@ -302,6 +312,8 @@ fn surface(surface: spec::Surface) -> Surface {
         spec::Surface::Upper(axis) => Surface::Upper(axis),
         spec::Surface::Inner => Surface::Inner,
         spec::Surface::Outer => Surface::Outer,
+        spec::Surface::FirstAngle => Surface::FirstAngle,
+        spec::Surface::LastAngle => Surface::LastAngle,
     }
 }
 

@@ -238,7 +238,7 @@ fn over_body<const K: usize, const D: usize>(
     };
     let frame = match coordinates {
         Coordinates::Cartesian => "cartesian",
-        Coordinates::Polar | Coordinates::Cylindrical => "polar",
+        Coordinates::Polar | Coordinates::Cylindrical | Coordinates::Axisymmetric => "polar",
         Coordinates::Spherical => "spherical",
     };
     let _ = write!(text, "chart {chart}\nframe {frame}\naxes {K}\n");

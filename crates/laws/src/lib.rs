@@ -10,6 +10,7 @@ mod arruda_boyce;
 #[doc(hidden)]
 pub mod fault;
 mod gent;
+mod half_plane;
 mod hencky;
 mod holzapfel_gasser_ogden;
 mod isochoric;
@@ -37,6 +38,7 @@ mod yeoh;
 use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
+pub use half_plane::{HalfPlane, Hoop, with_hoop_stretch};
 #[doc(hidden)]
 pub use law::BlockOfStresses;
 pub use law::{ConstitutiveLaw, Law, LawCheck};

@@ -7,7 +7,7 @@ use mmsmith_lanes::tensor::{determinant, inverse_transpose, product, real};
 use mmsmith_vocabulary::Material;
 use nalgebra::{Matrix3, RealField, SMatrix, SVector};
 
-use crate::{BLOCK, ConstitutiveLaw, jacobian};
+use crate::{BLOCK, ConstitutiveLaw, Law, jacobian};
 
 /// The entries of a symmetric tensor in the order of internal variables.
 pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -109,6 +109,12 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
 
     /// The normal Kirchhoff stress of a particle along the axes that F leaves out, where the stretch is one; `None` where it is not known.
     fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>, _q: &[T]) -> Option<T> {
+        None
+    }
+
+    /// The law of space, where this is that of a [half plane](crate::HalfPlane): solvers set the internal variables then, and the stress
+    /// around the axis acts on the grid. Default: it is not.
+    fn of_half_plane(&self) -> Option<&Law<T, 3>> {
         None
     }
 

@@ -207,6 +207,12 @@ pub enum SetupError {
         /// The axis.
         axis: usize,
     },
+    /// An axis that is uniform at one end, or in more than one cell.
+    #[error("axis {axis} has to be uniform at both ends and in one cell, or at none")]
+    HalfUniform {
+        /// The axis.
+        axis: usize,
+    },
     /// A quantity that has to be finite is not.
     #[error("{quantity} has to be finite")]
     NotFinite {
@@ -267,8 +273,10 @@ pub enum SetupError {
         /// The grid's dimension.
         dimension: usize,
     },
-    /// Spherical coordinates in a dimension other than three.
-    #[error("spherical grids are three-dimensional; this one has dimension {dimension}")]
+    /// Spherical or cylindrical coordinates in a dimension other than three.
+    #[error(
+        "spherical and cylindrical grids are three-dimensional; this one has dimension {dimension}"
+    )]
     SphericalDimension {
         /// The grid's dimension.
         dimension: usize,

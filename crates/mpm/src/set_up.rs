@@ -16,6 +16,7 @@ use crate::grid::state::GridState;
 use crate::grid::{Grid, Layout};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
+use crate::kernel::half_plane;
 use crate::particles::Particles;
 use crate::particles::body::Body;
 use crate::particles::columns::Shares;
@@ -36,7 +37,12 @@ pub(crate) fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn Bl
     let material = match law {
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
-        Law::WithMemory(law) => return Box::new(MemoryBlocks::new(law.clone())),
+        Law::WithMemory(law) => {
+            return match law.of_half_plane() {
+                Some(law) => half_plane::of_law(law, planted),
+                None => Box::new(MemoryBlocks::new(law.clone())),
+            };
+        }
     };
     // One law has kernels of its own; those of `AnyLaw` serve every law.
     if let Material::NeoHookean { lambda, mu } = material {

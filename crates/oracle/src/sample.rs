@@ -158,6 +158,10 @@ impl<'a> Sampler<'a> {
         match &spec.domain {
             Domain::Box { lower, upper } => outputs.extend(lower.iter().chain(upper)),
             Domain::Annulus { inner, outer } => outputs.extend([inner, outer]),
+            Domain::Tube { inner, outer, lower, upper, around } => {
+                outputs.extend([inner, outer, lower, upper]);
+                outputs.extend(around.angles().into_iter().flatten());
+            }
         }
         Sampler {
             spec,
@@ -309,6 +313,27 @@ impl<'a> Sampler<'a> {
                 };
                 in_class && position.iter().all(|&x| x >= 0.0)
             }
+            Domain::Tube { .. } => {
+                let [inner, outer, lower, upper] =
+                    [measures[0], measures[1], measures[2], measures[3]];
+                let (radius, height) = (length(&position[..2]), position[2]);
+                let near = |x: f64, end: f64, size: f64| (x - end).abs() <= NEXT_TO * size;
+                let in_body =
+                    radius_is_between(radius, inner, outer) && (lower..=upper).contains(&height);
+                let (across, along) = (outer - inner, upper - lower);
+                match class {
+                    Class::Far => (INNERMOST * inner..=FARTHEST_RADII * outer).contains(&radius),
+                    Class::NearOrigin => in_body && radius - inner <= 0.1 * across,
+                    Class::Boundary => {
+                        in_body
+                            && (near(radius, inner, across)
+                                || near(radius, outer, across)
+                                || near(height, lower, along)
+                                || near(height, upper, along))
+                    }
+                    _ => in_body,
+                }
+            }
         }
     }
 
@@ -325,6 +350,10 @@ impl<'a> Sampler<'a> {
             }
             Domain::Annulus { .. } => {
                 !radius_is_between(length(&inputs[..n]), measures[0], measures[1])
+            }
+            Domain::Tube { .. } => {
+                !radius_is_between(length(&inputs[..2]), measures[0], measures[1])
+                    || !(measures[2]..=measures[3]).contains(&inputs[2])
             }
         }
     }
@@ -345,6 +374,8 @@ impl<'a> Sampler<'a> {
             let (low, high) = match &self.spec.domain {
                 Domain::Box { .. } => (measures[i], measures[n + i]),
                 Domain::Annulus { .. } => (0.0, measures[1]),
+                Domain::Tube { .. } if i < 2 => (0.0, measures[1]),
+                Domain::Tube { .. } => (measures[2], measures[3]),
             };
             let far = if class == Class::Far { inputs[i].abs() } else { 0.0 };
             let middle = low + 0.5 * (high - low);
@@ -439,6 +470,13 @@ impl<'a> Sampler<'a> {
                 let is_disc = *inner == Graph::ZERO;
                 (measures[0] > 0.0 || is_disc) && measures[0] < measures[1]
             }
+            Domain::Tube { inner, .. } => {
+                let is_solid = *inner == Graph::ZERO;
+                (measures[0] > 0.0 || is_solid)
+                    && measures[0] < measures[1]
+                    && measures[2] < measures[3]
+                    && measures.get(4..6).is_none_or(|angles| angles[0] < angles[1])
+            }
         }
     }
 
@@ -489,7 +527,9 @@ impl<'a> Sampler<'a> {
         let (period, measures) = self.admitted(&inputs[n + 1..])?;
         let range = |axis: usize| match &self.spec.domain {
             Domain::Box { .. } if axis < n => (measures[axis], measures[n + axis]),
-            Domain::Annulus { .. } if axis < n => (inputs[axis], inputs[axis]),
+            Domain::Annulus { .. } | Domain::Tube { .. } if axis < n => {
+                (inputs[axis], inputs[axis])
+            }
             _ => (0.0, period),
         };
         let ranges: Vec<(f64, f64)> = (0..=n).map(range).collect();
@@ -584,21 +624,7 @@ impl<'a> Sampler<'a> {
                 })
                 .collect(),
             Domain::Annulus { .. } => {
-                let (inner, outer) = (measures[0], measures[1]);
-                let radius = match class {
-                    Class::NearOrigin => {
-                        let x = random.between(inner, outer);
-                        inner + (x - inner) * 10_f64.powf(-random.between(1.0, 15.0))
-                    }
-                    Class::Far if random.one_in(4) => {
-                        inner * INNERMOST.powf(random.between(0.0, 1.0))
-                    }
-                    // Most profiles grow fast: the nearer places are those that suit.
-                    Class::Far => {
-                        outer * (1.0 + FARTHEST_RADII * 10_f64.powf(-random.between(0.0, 6.0)))
-                    }
-                    _ => place(inner, outer, random),
-                };
+                let radius = distance(class, [measures[0], measures[1]], random, place);
                 let quarter = std::f64::consts::FRAC_PI_2;
                 let angle = place(0.0, quarter, random);
                 // On a plane of symmetry the coordinate is zero.
@@ -611,7 +637,33 @@ impl<'a> Sampler<'a> {
                 let distance = radius * polar.sin();
                 vec![distance * cosine, distance * angle.sin(), radius * height]
             }
+            Domain::Tube { .. } => {
+                let radius = distance(class, [measures[0], measures[1]], random, place);
+                let quarter = [0.0, std::f64::consts::FRAC_PI_2];
+                let angles = measures.get(4..6).map_or(quarter, |angles| [angles[0], angles[1]]);
+                let (sin, cos) = place(angles[0], angles[1], random).sin_cos();
+                vec![radius * cos, radius * sin, place(measures[2], measures[3], random)]
+            }
         }
+    }
+}
+
+/// The distance of a place of a class from the origin or the axis, of a body whose first measures are its radii.
+fn distance(
+    class: Class,
+    [inner, outer]: [f64; 2],
+    random: &mut Random,
+    place: impl Fn(f64, f64, &mut Random) -> f64,
+) -> f64 {
+    match class {
+        Class::NearOrigin => {
+            let x = random.between(inner, outer);
+            inner + (x - inner) * 10_f64.powf(-random.between(1.0, 15.0))
+        }
+        Class::Far if random.one_in(4) => inner * INNERMOST.powf(random.between(0.0, 1.0)),
+        // Most profiles grow fast: the nearer places are those that suit.
+        Class::Far => outer * (1.0 + FARTHEST_RADII * 10_f64.powf(-random.between(0.0, 6.0))),
+        _ => place(inner, outer, random),
     }
 }
 

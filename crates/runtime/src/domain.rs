@@ -24,6 +24,47 @@ pub enum Domain<T: Real, const D: usize> {
         /// Outer radius.
         outer: T,
     },
+    /// In three dimensions, the points between two radii about the axis `Z` and between two heights.
+    Tube {
+        /// Inner radius; zero for a solid cylinder.
+        inner: T,
+        /// Outer radius.
+        outer: T,
+        /// The smallest `Z`.
+        lower: T,
+        /// The largest `Z`.
+        upper: T,
+        /// How far the body reaches around the axis.
+        around: Around<T>,
+    },
+}
+
+/// How far a [tube](Domain::Tube) reaches around its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Around<T> {
+    /// All the way, and nothing depends on the angle: the half plane `Y = 0`, `X >= 0`, stands for the body.
+    Axisymmetric,
+    /// All the way.
+    Whole,
+    /// From an angle to another, in radians, `X = R cos(theta)`, `Y = R sin(theta)`.
+    Sector {
+        /// The smallest angle.
+        from: T,
+        /// The largest angle.
+        to: T,
+    },
+}
+
+impl<T> Around<T> {
+    /// This with `change` applied to each angle.
+    #[must_use]
+    pub fn map<U>(self, change: impl Fn(T) -> U) -> Around<U> {
+        match self {
+            Self::Axisymmetric => Around::Axisymmetric,
+            Self::Whole => Around::Whole,
+            Self::Sector { from, to } => Around::Sector { from: change(from), to: change(to) },
+        }
+    }
 }
 
 impl<T: Real, const D: usize> Domain<T, D> {
@@ -37,6 +78,13 @@ impl<T: Real, const D: usize> Domain<T, D> {
             Self::Annulus { inner, outer } => {
                 Domain::Annulus { inner: change(*inner), outer: change(*outer) }
             }
+            Self::Tube { inner, outer, lower, upper, around } => Domain::Tube {
+                inner: change(*inner),
+                outer: change(*outer),
+                lower: change(*lower),
+                upper: change(*upper),
+                around: around.map(&change),
+            },
         }
     }
 
@@ -47,13 +95,39 @@ impl<T: Real, const D: usize> Domain<T, D> {
             (axis < D).then(|| SVector::from_fn(|i, _| if i == axis { sign } else { T::zero() }))
         };
         match (self, surface) {
-            (Domain::Box { .. }, Surface::Upper(index)) => axis(index, T::one()),
+            (Domain::Tube { .. }, Surface::Lower(index)) if index != 2 => None,
+            (Domain::Box { .. } | Domain::Tube { .. }, Surface::Upper(index)) => {
+                axis(index, T::one())
+            }
             (_, Surface::Lower(index)) => axis(index, -T::one()),
             (Domain::Annulus { inner, .. }, Surface::Inner) => Some(X.map(|x| -x / *inner)),
             (Domain::Annulus { outer, .. }, Surface::Outer) => Some(X.map(|x| x / *outer)),
+            (Domain::Tube { inner, .. }, Surface::Inner) => Some(radial(X, -*inner)),
+            (Domain::Tube { outer, .. }, Surface::Outer) => Some(radial(X, *outer)),
+            (Domain::Tube { around: Around::Sector { from, .. }, .. }, Surface::FirstAngle) => {
+                Some(across(*from, -T::one()))
+            }
+            (Domain::Tube { around: Around::Sector { to, .. }, .. }, Surface::LastAngle) => {
+                Some(across(*to, T::one()))
+            }
             _ => None,
         }
     }
+}
+
+/// `X/radius` without the component along the third axis.
+fn radial<T: Real, const D: usize>(X: &SVector<T, D>, radius: T) -> SVector<T, D> {
+    SVector::from_fn(|i, _| if i < 2 { X[i] / radius } else { T::zero() })
+}
+
+/// The direction of growing angle at an angle, times a sign.
+fn across<T: Real, const D: usize>(angle: T, sign: T) -> SVector<T, D> {
+    let (sin, cos) = angle.sin_cos();
+    SVector::from_fn(|i, _| match i {
+        0 => -sin * sign,
+        1 => cos * sign,
+        _ => T::zero(),
+    })
 }
 
 /// A part of the body's boundary, or a plane that cuts the body in halves.
@@ -67,6 +141,18 @@ pub enum Surface {
     Inner,
     /// The outer rim.
     Outer,
+    /// The plane through the axis at the smallest angle of a sector.
+    FirstAngle,
+    /// The plane through the axis at the largest angle of a sector.
+    LastAngle,
+}
+
+impl Surface {
+    /// Every surface that a body in so many dimensions may have: rims and planes of angles first, then the ends of each axis.
+    pub fn all(dimension: usize) -> impl Iterator<Item = Self> + Clone {
+        let ends = (0..dimension).flat_map(|axis| [Self::Lower(axis), Self::Upper(axis)]);
+        [Self::Inner, Self::Outer, Self::FirstAngle, Self::LastAngle].into_iter().chain(ends)
+    }
 }
 
 /// The name that specifications have for it, such as `X-lower`.
@@ -78,6 +164,8 @@ impl fmt::Display for Surface {
             Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
             Self::Inner => f.pad("inner"),
             Self::Outer => f.pad("outer"),
+            Self::FirstAngle => f.pad("theta-lower"),
+            Self::LastAngle => f.pad("theta-upper"),
         }
     }
 }

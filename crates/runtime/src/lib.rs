@@ -22,7 +22,7 @@ mod real;
 mod solution;
 mod staged;
 
-pub use domain::{Boundary, Condition, Domain, Surface};
+pub use domain::{Around, Boundary, Condition, Domain, Surface};
 pub use history::HistoryReport;
 pub use history_table::{HistoryTable, PointSeries, TableError, TabulatedPoints};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};

@@ -102,6 +102,11 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
 
     /// The body's shape in the reference configuration.
     fn domain(&self) -> Domain<T, D>;
+    /// Whether this is the half plane of a body of revolution: positions are the radius and the height, integrals have the radius as a factor,
+    /// and the body is stretched around its axis too.
+    fn is_half_plane(&self) -> bool {
+        false
+    }
     /// The conditions on the body's boundary.
     fn boundaries(&self) -> &[Boundary];
     /// The length that a cell count divides: the grid spacing is this length over the number of cells.

@@ -12,16 +12,20 @@ pub enum Coordinates {
     Polar,
     /// `R`, `theta`, `Z`: polar coordinates in the plane of `X` and `Y`, and the height.
     Cylindrical,
+    /// `R` and `Z` of a body of revolution about the axis `Z`: cylindrical coordinates where nothing depends on `theta`. The body turns as
+    /// it deforms where the displacement has a component `theta`.
+    Axisymmetric,
     /// `R`, `theta`, `phi`: the distance from the origin, the angle from the axis `Z`, and the angle around it,
     /// `X = R sin(theta) cos(phi)`, `Y = R sin(theta) sin(phi)`, `Z = R cos(theta)`.
     Spherical,
 }
 
 impl Coordinates {
-    const NAMES: [(&'static str, Coordinates); 4] = [
+    const NAMES: [(&'static str, Coordinates); 5] = [
         ("cartesian", Coordinates::Cartesian),
         ("polar", Coordinates::Polar),
         ("cylindrical", Coordinates::Cylindrical),
+        ("axisymmetric", Coordinates::Axisymmetric),
         ("spherical", Coordinates::Spherical),
     ];
 
@@ -43,11 +47,14 @@ impl Coordinates {
         Self::NAMES.map(|(name, _)| format!("'{name}'")).join(" or ")
     }
 
+    /// Whether components may be so many.
     pub(crate) fn allows_dimension(self, dimension: usize) -> bool {
         match self {
             Coordinates::Cartesian => (1..=3).contains(&dimension),
             Coordinates::Polar => dimension == 2,
-            Coordinates::Cylindrical | Coordinates::Spherical => dimension == 3,
+            Coordinates::Cylindrical | Coordinates::Axisymmetric | Coordinates::Spherical => {
+                dimension == 3
+            }
         }
     }
 
@@ -55,18 +62,24 @@ impl Coordinates {
     pub(crate) fn dimensions(self) -> &'static str {
         match self {
             Coordinates::Cartesian => "1, 2 or 3",
-            Coordinates::Polar => "2",
+            Coordinates::Polar | Coordinates::Axisymmetric => "2",
             Coordinates::Cylindrical | Coordinates::Spherical => "3",
         }
     }
 
-    /// The names of the coordinates, in order.
+    /// The names of the coordinates that fields may depend on.
+    pub(crate) fn place_names(self, dimension: usize) -> Vec<&'static str> {
+        let names = self.coordinate_names(dimension).iter().copied();
+        names.filter(|name| self != Coordinates::Axisymmetric || *name != "theta").collect()
+    }
+
+    /// The names of the coordinates, in order, and so of the components of vectors.
     #[must_use]
     pub fn coordinate_names(self, dimension: usize) -> &'static [&'static str] {
         match self {
             Coordinates::Cartesian => &CARTESIAN[..dimension.min(3)],
             Coordinates::Polar => &["R", "theta"],
-            Coordinates::Cylindrical => &["R", "theta", "Z"],
+            Coordinates::Cylindrical | Coordinates::Axisymmetric => &["R", "theta", "Z"],
             Coordinates::Spherical => &["R", "theta", "phi"],
         }
     }
@@ -115,7 +128,9 @@ impl Geometry {
                 angles: Vec::new(),
                 transverse: None,
             },
-            Coordinates::Polar | Coordinates::Cylindrical => Self::around_axis(graph, cartesian),
+            Coordinates::Polar | Coordinates::Cylindrical | Coordinates::Axisymmetric => {
+                Self::around_axis(graph, cartesian)
+            }
             Coordinates::Spherical => Self::around_origin(graph, cartesian),
         }
     }
@@ -151,6 +166,16 @@ impl Geometry {
             angles: vec![Angle { symbol: theta, values: CosineAndSine { cosine, sine } }],
             transverse: None,
         }
+    }
+
+    /// The half plane of an axisymmetric body: positions are `R`, the angle, on which nothing depends, and `Z`, and components are along the
+    /// unit vectors of these.
+    pub(crate) fn of_half_plane(graph: &mut Graph) -> Self {
+        let cartesian: Vec<Expr> = CARTESIAN.iter().map(|name| graph.symbol(name)).collect();
+        let X = cartesian[0];
+        let around = Self::around_axis(graph, cartesian);
+        let R = around.coordinates[0];
+        Geometry { rotation: identity(3), definitions: vec![(R, X)], angles: Vec::new(), ..around }
     }
 
     /// Spherical coordinates.

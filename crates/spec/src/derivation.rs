@@ -19,8 +19,13 @@ pub(crate) struct Derivation {
 
 impl Derivation {
     pub(crate) fn new(spec: &Spec) -> Self {
+        Self::in_geometry(spec, |graph| Geometry::new(graph, spec.coordinates, spec.dimension))
+    }
+
+    /// With the geometry that `of` makes.
+    pub(crate) fn in_geometry(spec: &Spec, of: impl FnOnce(&mut Graph) -> Geometry) -> Self {
         let mut graph = spec.graph.clone();
-        let geometry = Geometry::new(&mut graph, spec.coordinates, spec.dimension);
+        let geometry = of(&mut graph);
         let time = graph.symbol("t");
         let variables = geometry.coordinates.iter().copied().chain([time]).collect();
         let derivatives = Derivatives::limited();

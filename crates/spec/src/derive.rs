@@ -100,7 +100,11 @@ impl Fields {
     }
 
     pub(crate) fn derive(spec: &Spec) -> Result<Self, DeriveError> {
-        let mut derivation = Derivation::new(spec);
+        Self::derive_in(spec, Derivation::new(spec))
+    }
+
+    /// In the coordinates of a derivation.
+    pub(crate) fn derive_in(spec: &Spec, mut derivation: Derivation) -> Result<Self, DeriveError> {
         let time = derivation.time;
         let n = spec.dimension;
 

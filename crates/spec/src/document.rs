@@ -196,10 +196,12 @@ pub(crate) struct StartTable {
 )]
 pub(crate) struct DomainTable {
     pub(crate) shape: Spanned<String>,
-    pub(crate) lower: Option<Spanned<List<Text>>>,
-    pub(crate) upper: Option<Spanned<List<Text>>>,
+    pub(crate) lower: Option<Spanned<List<Measure>>>,
+    pub(crate) upper: Option<Spanned<List<Measure>>>,
     pub(crate) inner: Option<Text>,
     pub(crate) outer: Option<Text>,
+    pub(crate) from: Option<Text>,
+    pub(crate) to: Option<Text>,
     pub(crate) corners: Option<Spanned<String>>,
     pub(crate) cell_length: Option<Text>,
 }
@@ -358,13 +360,35 @@ impl<'de> Deserialize<'de> for Dimension {
 }
 
 /// Entry of a list, and how such a list is written.
-pub(crate) trait Listed {
+pub(crate) trait Listed: Sized {
     /// For messages where there is something else.
     const FORM: &'static str;
+
+    /// The entry that a text or number alone stands for, where it may be a list of one entry.
+    fn alone(_text: &str) -> Option<Self> {
+        None
+    }
 }
 
 impl Listed for Text {
     const FORM: &'static str = "a list in brackets, as in ['...', '...']";
+}
+
+/// A coordinate of a corner; one alone needs no brackets.
+pub(crate) struct Measure(Text);
+
+impl<'de> Deserialize<'de> for Measure {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Text::deserialize(deserializer).map(Measure)
+    }
+}
+
+impl Listed for Measure {
+    const FORM: &'static str = "a list in brackets, as in ['...', '...']";
+
+    fn alone(text: &str) -> Option<Self> {
+        Some(Measure(Text { value: text.to_owned(), span: 0..0 }))
+    }
 }
 
 impl Listed for Spanned<String> {
@@ -420,8 +444,33 @@ impl<'de, V: Deserialize<'de> + Listed> Deserialize<'de> for List<V> {
                 }
                 Ok(List(values))
             }
+
+            fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<List<V>, E> {
+                let unexpected = serde::de::Unexpected::Str(value);
+                let alone = V::alone(value).ok_or_else(|| E::invalid_type(unexpected, &self))?;
+                Ok(List(vec![alone]))
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<List<V>, E> {
+                self.visit_str(&value.to_string())
+            }
+
+            fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<List<V>, E> {
+                self.visit_str(&format!("{value:?}"))
+            }
         }
-        deserializer.deserialize_seq(ListVisitor(PhantomData))
+        deserializer.deserialize_any(ListVisitor(PhantomData))
+    }
+}
+
+impl List<Measure> {
+    /// The entries of a list that stands at a place; an entry without brackets has the place of the list.
+    pub(crate) fn texts(list: &Spanned<Self>) -> Vec<Text> {
+        let placed = |Measure(text): &Measure| match text.span.is_empty() {
+            true => Text { value: text.value.clone(), span: list.span() },
+            false => text.clone(),
+        };
+        list.get_ref().0.iter().map(placed).collect()
     }
 }
 

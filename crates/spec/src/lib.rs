@@ -26,6 +26,7 @@ mod source;
 mod spec;
 mod surface;
 mod tensor;
+mod tube;
 
 pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
@@ -36,6 +37,7 @@ pub use read::{LONGEST_FILE, ReadError, read_text};
 pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};
 pub use spec::{
-    Bound, Boundary, Condition, Domain, Law, Parameter, Relation, Requirement, Spec, Surface,
+    Around, Bound, Boundary, Condition, Domain, Law, Parameter, Relation, Requirement, Spec,
+    Surface,
 };
 pub use surface::{Claim, ClaimKind, SurfaceFields};

@@ -1,16 +1,21 @@
 //! Is there a body, and a motion that lasts? Measures, density, speed and period at the defaults of the parameters.
 
-use crate::document::{Document, Text};
+use crate::document::{Document, List, Measure, Text};
 use crate::scope::Scope;
-use crate::{Diagnostic, Domain, Parameter, Spec};
+use crate::{Around, Diagnostic, Domain, Parameter, Spec};
 use mmsmith_expr::{Dependence, Expr, Program};
 use std::ops::Range;
+use toml::Spanned;
 
 /// Refuses a body without volume or mass, and a period or wave speed that is not positive.
 pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Result<(), Diagnostic> {
     let measures = match &spec.domain {
         Domain::Box { lower, upper } => [lower.as_slice(), upper].concat(),
         Domain::Annulus { inner, outer } => vec![*inner, *outer],
+        Domain::Tube { inner, outer, lower, upper, around } => match around {
+            Around::Axisymmetric | Around::Whole => vec![*inner, *lower, *outer, *upper],
+            Around::Sector { from, to } => vec![*inner, *lower, *from, *outer, *upper, *to],
+        },
     };
     let mut graph = spec.graph.clone();
     let density = spec.in_the_middle(&mut graph, spec.density);
@@ -37,22 +42,30 @@ pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Resu
         }
     }
     let (low, high) = measures.split_at(measures.len() / 2);
-    let [below, above] = match &spec.domain {
-        Domain::Box { .. } => ["lower", "upper"],
-        Domain::Annulus { .. } => ["inner", "outer"],
-    };
+    // The box of a half plane is written as a box.
+    let is_box = domain.inner.is_none() && domain.outer.is_none();
     for (axis, (&low, &high)) in low.iter().zip(high).enumerate() {
+        let [below, above] = match axis {
+            _ if is_box => ["lower", "upper"],
+            0 => ["inner", "outer"],
+            1 => ["lower", "upper"],
+            _ => ["from", "to"],
+        };
         let along = match &spec.domain {
+            Domain::Tube { .. } if is_box => format!(" along {}", ["R", "Z"][axis.min(1)]),
             Domain::Box { .. } => format!(" along {}", crate::coordinates::CARTESIAN[axis]),
-            Domain::Annulus { .. } => String::new(),
+            Domain::Annulus { .. } | Domain::Tube { .. } => String::new(),
         };
-        let (text_below, text_above) = match &spec.domain {
-            Domain::Box { .. } => (
-                domain.lower.as_ref().and_then(|corner| corner.get_ref().get(axis)),
-                domain.upper.as_ref().and_then(|corner| corner.get_ref().get(axis)),
-            ),
-            Domain::Annulus { .. } => (domain.inner.as_ref(), domain.outer.as_ref()),
+        let entry = |corner: &Option<Spanned<List<Measure>>>| {
+            let texts = corner.as_ref().map(List::texts)?;
+            texts.get(if is_box { axis } else { 0 }).cloned()
         };
+        let (text_below, text_above) = match below {
+            "lower" => (entry(&domain.lower), entry(&domain.upper)),
+            "inner" => (domain.inner.clone(), domain.outer.clone()),
+            _ => (domain.from.clone(), domain.to.clone()),
+        };
+        let (text_below, text_above) = (text_below.as_ref(), text_above.as_ref());
         if !(low < high && low.is_finite() && high.is_finite()) {
             let (low, high) = (figure(low), figure(high));
             let message = format!(
@@ -62,10 +75,18 @@ pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Resu
             let help = format!("{above} must be greater than {below}{}", given(&spec.parameters));
             return Err(scope.source.error(message, span, Some(help)));
         }
-        if matches!(spec.domain, Domain::Annulus { .. }) && low < 0.0 {
-            let message = format!("inner is {} with the default parameters", figure(low));
+        let is_radius = !matches!(spec.domain, Domain::Box { .. }) && axis == 0;
+        if is_radius && low < 0.0 {
+            let message = format!("{below} is {}{along} with the default parameters", figure(low));
             let span = place(text_below, document.domain.span());
             let help = "a radius is not negative".to_owned();
+            return Err(scope.source.error(message, span, Some(help)));
+        }
+        // A rounding more than a turn is one.
+        if below == "from" && high - low > std::f64::consts::TAU * (1.0 + 1e-12) {
+            let message = format!("the sector reaches around by {} radians", figure(high - low));
+            let span = place(text_above, document.domain.span());
+            let help = "a turn is 2*Pi; shape = 'tube' goes all the way around".to_owned();
             return Err(scope.source.error(message, span, Some(help)));
         }
     }

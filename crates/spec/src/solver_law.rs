@@ -2,7 +2,7 @@
 
 use crate::law::energy::{INVARIANTS, component_names, rate_names};
 use crate::law::energy_text;
-use crate::{Coordinates, Domain, Law, Spec};
+use crate::{Around, Coordinates, Domain, Law, Spec};
 use mmsmith_expr::{Expr, Graph};
 use mmsmith_vocabulary::{Components, Internal, Law as ForSolver, Response, Stated, WithMemory};
 
@@ -44,7 +44,9 @@ impl Spec {
         law.given = of_places.chain(law.given).collect();
         let distance = match self.coordinates {
             Coordinates::Cartesian => return law,
-            Coordinates::Polar | Coordinates::Cylindrical => "(sqrt(X^2 + Y^2))",
+            Coordinates::Polar | Coordinates::Cylindrical | Coordinates::Axisymmetric => {
+                "(sqrt(X^2 + Y^2))"
+            }
             Coordinates::Spherical => "(sqrt(X^2 + Y^2 + Z^2))",
         };
         let angle = match self.coordinates {
@@ -198,6 +200,13 @@ impl Spec {
                 let radius = middle(graph, *inner, *outer);
                 let rest = vec![Graph::ZERO; names.len().saturating_sub(1)];
                 [vec![radius], rest].concat()
+            }
+            Domain::Tube { inner, outer, lower, upper, around } => {
+                let angle = match around {
+                    Around::Axisymmetric | Around::Whole => Graph::ZERO,
+                    Around::Sector { from, to } => middle(graph, *from, *to),
+                };
+                vec![middle(graph, *inner, *outer), angle, middle(graph, *lower, *upper)]
             }
         };
         let symbols = names.iter().map(|name| graph.symbol(name)).collect::<Vec<_>>();

@@ -3,9 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use crate::coordinates::CARTESIAN;
+use crate::coordinates::{CARTESIAN, Geometry};
+use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
-use crate::document::{BoundaryTable, Document, DomainTable, Entries, List, ParameterEntry, Text};
+use crate::document::{
+    BoundaryTable, Document, DomainTable, Entries, List, Measure, ParameterEntry, Text,
+};
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::read::LONGEST_FILE;
 use crate::scope::Scope;
@@ -287,6 +290,54 @@ pub enum Domain {
         /// Outer radius.
         outer: Expr,
     },
+    /// In space, the points between two radii about the axis `Z` and between two heights.
+    Tube {
+        /// Inner radius; zero for a solid cylinder.
+        inner: Expr,
+        /// Outer radius.
+        outer: Expr,
+        /// The smallest `Z`.
+        lower: Expr,
+        /// The largest `Z`.
+        upper: Expr,
+        /// How far the body reaches around the axis.
+        around: Around<Expr>,
+    },
+}
+
+/// How far a [tube](Domain::Tube) reaches around its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Around<E> {
+    /// All the way, and nothing depends on the angle.
+    Axisymmetric,
+    /// All the way.
+    Whole,
+    /// From an angle to another, in radians.
+    Sector {
+        /// The smallest angle.
+        from: E,
+        /// The largest angle.
+        to: E,
+    },
+}
+
+impl<E> Around<E> {
+    /// This with `change` applied to each angle.
+    pub fn map<S>(self, mut change: impl FnMut(E) -> S) -> Around<S> {
+        match self {
+            Self::Axisymmetric => Around::Axisymmetric,
+            Self::Whole => Around::Whole,
+            Self::Sector { from, to } => Around::Sector { from: change(from), to: change(to) },
+        }
+    }
+
+    /// The angles, where there are such.
+    pub fn angles(self) -> Option<[E; 2]> {
+        match self {
+            Self::Axisymmetric | Self::Whole => None,
+            Self::Sector { from, to } => Some([from, to]),
+        }
+    }
 }
 
 /// A part of the boundary.
@@ -300,6 +351,10 @@ pub enum Surface {
     Inner,
     /// The outer rim.
     Outer,
+    /// The plane through the axis at the smallest angle of a sector.
+    FirstAngle,
+    /// The plane through the axis at the largest angle of a sector.
+    LastAngle,
 }
 
 impl fmt::Display for Surface {
@@ -310,6 +365,8 @@ impl fmt::Display for Surface {
             Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
             Self::Inner => f.pad("inner"),
             Self::Outer => f.pad("outer"),
+            Self::FirstAngle => f.pad("theta-lower"),
+            Self::LastAngle => f.pad("theta-upper"),
         }
     }
 }
@@ -503,11 +560,24 @@ impl Spec {
     pub fn derive(&self) -> Result<Fields, DeriveError> {
         Fields::derive(self)
     }
+
+    /// As [`derive`](Self::derive), in the components in which solvers in other languages compute: those along `R`, the angle and `Z` at
+    /// places `R`, any angle, `Z` for an axisymmetric body, and Cartesian ones for others.
+    ///
+    /// # Errors
+    ///
+    /// [`DeriveError`] where a field is nowhere defined.
+    pub fn derive_for_hosts(&self) -> Result<Fields, DeriveError> {
+        if self.coordinates != Coordinates::Axisymmetric {
+            return self.derive();
+        }
+        Fields::derive_in(self, Derivation::in_geometry(self, Geometry::of_half_plane))
+    }
 }
 
 pub(crate) struct Reader<'a> {
     pub(crate) scope: Scope<'a>,
-    coordinates: Coordinates,
+    pub(crate) coordinates: Coordinates,
     pub(crate) dimension: usize,
 }
 
@@ -524,13 +594,20 @@ impl<'a> Reader<'a> {
             return Err(source.error(message, document.coordinates.span(), Some(help)));
         };
         let dimension = document.dimension.get_ref().0;
+        // Components are those of space, also where places have two coordinates.
+        let dimension = match (coordinates, dimension) {
+            (Coordinates::Axisymmetric, 2) => 3,
+            (Coordinates::Axisymmetric, _) => 2,
+            (_, dimension) => dimension,
+        };
         if !coordinates.allows_dimension(dimension) {
+            let dimension = document.dimension.get_ref().0;
             let message =
                 format!("{} coordinates do not come in {dimension} dimensions", coordinates.name());
             let help = format!("dimension = {}", coordinates.dimensions());
             return Err(source.error(message, document.dimension.span(), Some(help)));
         }
-        let scope = Scope::new(source, coordinates.coordinate_names(dimension));
+        let scope = Scope::new(source, &coordinates.place_names(dimension));
         Ok(Reader { scope, coordinates, dimension })
     }
 
@@ -974,9 +1051,12 @@ impl<'a> Reader<'a> {
             ("inner", keys.inner.is_some()),
             ("outer", keys.outer.is_some()),
         ];
+        // Turned about the axis, an annulus about the origin is a shell.
+        let is_turned = self.coordinates == Coordinates::Axisymmetric;
         let (needed, annulus) = match shape {
+            _ if crate::tube::is_shape(shape) => return self.tube(table),
             "box" => (["lower", "upper"], false),
-            "annulus" if self.dimension == 2 => (["inner", "outer"], true),
+            "annulus" if self.dimension == 2 || is_turned => (["inner", "outer"], true),
             "shell" if self.dimension == 3 => (["inner", "outer"], true),
             "annulus" | "shell" => {
                 let message = "an annulus is a shape of the plane, a shell one of space";
@@ -986,8 +1066,8 @@ impl<'a> Reader<'a> {
             }
             _ => {
                 let message = format!("the shape '{shape}' is not known");
-                let help = "shape = 'box', 'annulus' or 'shell'";
-                return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
+                let help = format!("shape = 'box', 'annulus', 'shell', {}", crate::tube::NAMES);
+                return Err(self.scope.source.error(message, keys.shape.span(), Some(help)));
             }
         };
         self.refuse_spheres_and_boxes(keys)?;
@@ -998,6 +1078,9 @@ impl<'a> Reader<'a> {
                 let help = format!("give {} and {}", needed[0], needed[1]);
                 return Err(self.scope.source.error(message, table.span(), Some(help)));
             }
+        }
+        if is_turned && !annulus {
+            return self.turned_box(keys);
         }
         if annulus {
             let mut radius = |text: &Option<Text>, key: &str| match text {
@@ -1031,21 +1114,21 @@ impl<'a> Reader<'a> {
             "shell" => refuse(
                 "a shell lies between two spheres, and R of cylindrical coordinates is the distance from the axis Z",
                 keys.shape.span(),
-                "a shell needs coordinates = 'spherical' or 'cartesian'; a tube is no shape that is known: take a box outside of the \
-                 axis, as shape = 'box', corners = 'cartesian', lower = ['1/2', '1/2', 0], upper = [1, 1, 1]",
+                "a shell needs coordinates = 'spherical' or 'cartesian'; a tube is shape = 'tube', inner = '1/2', outer = 1, lower = 0, \
+                 upper = 1",
             ),
             "box" if keys.corners.is_none() => refuse(
                 "the corners of a box have Cartesian coordinates X, Y, Z, also where the displacement is stated in cylindrical ones: \
                  this box is no tube",
                 keys.shape.span(),
-                "write corners = 'cartesian' below it if a Cartesian box is meant, and keep it off the axis R = 0; a tube is no shape \
-                 that is known",
+                "write shape = 'tube', inner = '1/2', outer = 1, lower = 0, upper = 1, or shape = 'sector' and the angles from = 0, \
+                 to = 'Pi/2' too; where a Cartesian box is meant, write corners = 'cartesian' below it, and keep it off the axis R = 0",
             ),
             _ => Ok(()),
         }
     }
 
-    fn corner(&mut self, texts: &Option<Spanned<List<Text>>>) -> Result<Vec<Expr>, Diagnostic> {
+    fn corner(&mut self, texts: &Option<Spanned<List<Measure>>>) -> Result<Vec<Expr>, Diagnostic> {
         let Some(texts) = texts else { return Ok(Vec::new()) };
         if texts.get_ref().0.len() != self.dimension {
             let message = format!(
@@ -1055,7 +1138,7 @@ impl<'a> Reader<'a> {
             );
             return Err(self.scope.source.error(message, texts.span(), None));
         }
-        texts.get_ref().0.iter().map(|text| self.scope.constant(text, "a corner")).collect()
+        List::texts(texts).iter().map(|text| self.scope.constant(text, "a corner")).collect()
     }
 
     fn boundary(&mut self, table: &BoundaryTable, domain: &Domain) -> Result<Boundary, Diagnostic> {
@@ -1069,6 +1152,10 @@ impl<'a> Reader<'a> {
         if matches!(domain, Domain::Annulus { .. }) {
             surfaces.push(("inner".into(), Surface::Inner));
             surfaces.push(("outer".into(), Surface::Outer));
+        }
+        if let Domain::Tube { inner, around, .. } = domain {
+            let of_tube = crate::tube::surfaces(*inner, *around);
+            surfaces = of_tube.into_iter().map(|(name, surface)| (name.into(), surface)).collect();
         }
         let known = surfaces.iter().map(|(name, surface)| (name.as_str(), *surface));
         self.refuse_radial_planes(&table.surface, domain)?;
@@ -1096,6 +1183,9 @@ impl<'a> Reader<'a> {
         let of_coordinate =
             surface.get_ref().strip_suffix("-lower").or(surface.get_ref().strip_suffix("-upper"));
         let Some(coordinate @ ("R" | "theta" | "phi")) = of_coordinate else { return Ok(()) };
+        if matches!(domain, Domain::Tube { .. }) {
+            return Ok(());
+        }
         let message =
             format!("there is no surface of constant {coordinate} called '{}'", surface.get_ref());
         let help = match (domain, coordinate) {
@@ -1107,8 +1197,10 @@ impl<'a> Reader<'a> {
             }
             (Domain::Box { .. }, _) => {
                 "the surfaces of a box are planes, X-lower, X-upper, ...; for a body between two radii write shape = 'annulus' \
-                 (dimension = 2) or 'shell' (dimension = 3, spherical or Cartesian coordinates) with inner and outer"
+                 (dimension = 2), 'tube' (dimension = 3, cylindrical coordinates) or 'shell' (dimension = 3, spherical ones) with inner \
+                 and outer"
             }
+            (Domain::Tube { .. }, _) => "",
         };
         Err(self.scope.source.error(message, surface.span(), Some(help.into())))
     }

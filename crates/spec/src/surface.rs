@@ -5,7 +5,7 @@
 //! simplifies to zero, in symbols.
 
 use crate::coordinates::{Geometry, turn_vector};
-use crate::{Boundary, Condition, Coordinates, Domain, Spec, Surface};
+use crate::{Around, Boundary, Condition, Coordinates, Domain, Spec, Surface};
 use mmsmith_expr::{Expr, Graph, Replacement};
 
 /// Fields on one surface of the body.
@@ -51,6 +51,15 @@ impl Domain {
             Domain::Annulus { .. } => {
                 [Surface::Inner, Surface::Outer].into_iter().chain(planes).collect()
             }
+            Domain::Tube { inner, around, .. } => {
+                let inner = (*inner != Graph::ZERO).then_some(Surface::Inner);
+                let angles = match around {
+                    Around::Axisymmetric | Around::Whole => [None, None],
+                    Around::Sector { .. } => [Some(Surface::FirstAngle), Some(Surface::LastAngle)],
+                };
+                let ends = [Surface::Outer, Surface::Lower(2), Surface::Upper(2)];
+                inner.into_iter().chain(ends).chain(angles.into_iter().flatten()).collect()
+            }
         }
     }
 }
@@ -61,6 +70,8 @@ fn opposite(surface: Surface) -> Surface {
         Surface::Upper(axis) => Surface::Lower(axis),
         Surface::Inner => Surface::Outer,
         Surface::Outer => Surface::Inner,
+        Surface::FirstAngle => Surface::LastAngle,
+        Surface::LastAngle => Surface::FirstAngle,
     }
 }
 
@@ -102,14 +113,18 @@ struct OnSurface<'a, 'b> {
 fn fixed_coordinate(geometry: &Geometry, spec: &Spec, surface: Surface) -> Option<(Expr, Expr)> {
     match plane(spec, surface) {
         Some((axis, value)) => Some((geometry.cartesian[axis], value)),
-        None if spec.coordinates == Coordinates::Cartesian => None,
-        None => Some((geometry.coordinates[0], radius(spec, surface))),
+        None => {
+            let own = own_axis(spec, surface)?;
+            Some((geometry.coordinates[own], own_value(spec, surface)))
+        }
     }
 }
 
 /// The axis and the place of a plane surface.
 fn plane(spec: &Spec, surface: Surface) -> Option<(usize, Expr)> {
     match (surface, &spec.domain) {
+        (Surface::Lower(axis), Domain::Tube { lower, .. }) => Some((axis, *lower)),
+        (Surface::Upper(axis), Domain::Tube { upper, .. }) => Some((axis, *upper)),
         (Surface::Lower(axis), Domain::Box { lower, .. }) => Some((axis, lower[axis])),
         (Surface::Upper(axis), Domain::Box { upper, .. }) => Some((axis, upper[axis])),
         (Surface::Lower(axis) | Surface::Upper(axis), _) => Some((axis, Graph::ZERO)),
@@ -117,28 +132,47 @@ fn plane(spec: &Spec, surface: Surface) -> Option<(usize, Expr)> {
     }
 }
 
-fn radius(spec: &Spec, surface: Surface) -> Expr {
+/// The coordinate of the specification that is fixed on a surface which is no plane of a Cartesian coordinate, if one is.
+fn own_axis(spec: &Spec, surface: Surface) -> Option<usize> {
+    use Coordinates::{Axisymmetric, Cylindrical, Polar, Spherical};
+    match (surface, &spec.domain, spec.coordinates) {
+        (Surface::Inner | Surface::Outer, Domain::Annulus { .. }, Polar | Spherical)
+        | (Surface::Inner | Surface::Outer, Domain::Tube { .. }, Cylindrical | Axisymmetric) => {
+            Some(0)
+        }
+        (Surface::FirstAngle | Surface::LastAngle, Domain::Tube { .. }, Cylindrical) => Some(1),
+        _ => None,
+    }
+}
+
+/// The radius or the angle of a surface.
+fn own_value(spec: &Spec, surface: Surface) -> Expr {
+    let radii = match &spec.domain {
+        Domain::Annulus { inner, outer } | Domain::Tube { inner, outer, .. } => [*inner, *outer],
+        Domain::Box { .. } => [Graph::ONE; 2],
+    };
     match (surface, &spec.domain) {
-        (Surface::Inner, Domain::Annulus { inner, .. }) => *inner,
-        (_, Domain::Annulus { outer, .. }) => *outer,
-        _ => Graph::ONE,
+        (Surface::Inner, _) => radii[0],
+        (Surface::FirstAngle, Domain::Tube { around: Around::Sector { from, .. }, .. }) => *from,
+        (Surface::LastAngle, Domain::Tube { around: Around::Sector { to, .. }, .. }) => *to,
+        _ => radii[1],
     }
 }
 
 impl OnSurface<'_, '_> {
     fn derive(&mut self) -> SurfaceFields {
         // The traction and the displacement in components of which one is along the normal, where there are such.
-        let radial = matches!(self.spec.coordinates, Coordinates::Polar | Coordinates::Spherical);
-        let (traction, displacement, normal) =
-            match (plane(self.spec, self.surface), radius(self.spec, self.surface)) {
-                (Some((axis, _)), _) => {
-                    (self.column(self.fields.P, axis), self.fields.u, Some(axis))
-                }
-                (None, _) if radial => {
-                    (self.column(self.fields.own_P, 0), self.fields.own_u, Some(0))
-                }
-                (None, radius) => (self.across(radius), self.fields.u, None),
-            };
+        let own = own_axis(self.spec, self.surface);
+        let (traction, displacement, normal) = match (plane(self.spec, self.surface), own) {
+            (Some((axis, _)), _) => (self.column(self.fields.P, axis), self.fields.u, Some(axis)),
+            (None, Some(axis)) => {
+                (self.column(self.fields.own_P, axis), self.fields.own_u, Some(axis))
+            }
+            (None, None) => {
+                let radius = own_value(self.spec, self.surface);
+                (self.across(radius), self.fields.u, None)
+            }
+        };
         let mut traction: Vec<Expr> = traction.into_iter().map(|t| self.placed(t)).collect();
         let mut claims = Vec::new();
         let declared: Vec<Condition> = self.conditions();
@@ -165,7 +199,7 @@ impl OnSurface<'_, '_> {
                 Condition::PrescribedTraction | Condition::PrescribedMotion => {}
             }
         }
-        if plane(self.spec, self.surface).is_none() && radial {
+        if plane(self.spec, self.surface).is_none() && own.is_some() {
             traction = turn_vector(self.graph, self.geometry, &traction);
             traction = traction.into_iter().map(|t| self.placed(t)).collect();
         }
@@ -179,7 +213,7 @@ impl OnSurface<'_, '_> {
 
     /// Whether the outward normal points the way of the coordinate.
     fn outward(&self) -> bool {
-        matches!(self.surface, Surface::Upper(_) | Surface::Outer)
+        matches!(self.surface, Surface::Upper(_) | Surface::Outer | Surface::LastAngle)
     }
 
     fn column(&mut self, P: &[Vec<Expr>], j: usize) -> Vec<Expr> {
@@ -191,7 +225,12 @@ impl OnSurface<'_, '_> {
     fn across(&mut self, radius: Expr) -> Vec<Expr> {
         let outward = self.outward();
         let P = self.fields.P;
-        let X = &self.geometry.cartesian;
+        // About an axis the normal has no component along it.
+        let round = match &self.spec.domain {
+            Domain::Tube { .. } => 2,
+            Domain::Box { .. } | Domain::Annulus { .. } => self.geometry.cartesian.len(),
+        };
+        let X = &self.geometry.cartesian[..round];
         P.iter()
             .map(|row| {
                 let terms: Vec<Expr> =

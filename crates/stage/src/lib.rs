@@ -24,4 +24,5 @@ pub use block::{Block, Operand, Stage};
 pub use field::{Field, FieldName, Shape};
 pub use staged::{
     BodyForceOperations, Constants, History, Lattice, Measures, Sides, Staged, Stages, Traction,
+    TubeMeasures,
 };

@@ -6,7 +6,7 @@ use crate::outputs::{Group, Outputs, Single};
 use mmsmith_expr::{
     Dependence, Expr, MOST_KEPT_OF_STATES, OperationCount, OperationsByStage, Program, Slot,
 };
-use mmsmith_spec::{Domain, Fields, HistoryFields, Spec, Surface};
+use mmsmith_spec::{Around, Domain, Fields, HistoryFields, Spec, Surface};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeMap;
 
@@ -125,6 +125,46 @@ pub enum Measures {
         /// The larger.
         outer: Slot,
     },
+    /// The measures of a tube.
+    Tube(TubeMeasures<Slot>),
+}
+
+/// The measures of a tube: radii, heights, and where it is a sector angles.
+#[derive(Clone, Debug)]
+pub struct TubeMeasures<E> {
+    /// The inner radius.
+    pub inner: E,
+    /// The outer radius.
+    pub outer: E,
+    /// The smallest height.
+    pub lower: E,
+    /// The largest height.
+    pub upper: E,
+    /// How far the body reaches around its axis.
+    pub around: Around<E>,
+}
+
+impl<E> TubeMeasures<E> {
+    /// These with `change` applied to each.
+    #[must_use]
+    pub fn map<S>(self, mut change: impl FnMut(E) -> S) -> TubeMeasures<S> {
+        let Self { inner, outer, lower, upper, around } = self;
+        TubeMeasures {
+            inner: change(inner),
+            outer: change(outer),
+            lower: change(lower),
+            upper: change(upper),
+            around: around.map(&mut change),
+        }
+    }
+
+    /// The measures in the order of the fields.
+    #[must_use]
+    pub fn list(self) -> Vec<E> {
+        let mut list = vec![self.inner, self.outer, self.lower, self.upper];
+        list.extend(self.around.angles().into_iter().flatten());
+        list
+    }
 }
 
 /// The traction on a surface.
@@ -180,6 +220,7 @@ struct ConstantOutputs {
 enum DomainOutputs {
     Box { lower: Group, upper: Group },
     Annulus { inner: Single, outer: Single },
+    Tube(TubeMeasures<Single>),
 }
 
 impl Staged {
@@ -436,6 +477,10 @@ impl ConstantOutputs {
                     inner: outputs.add_one(*inner),
                     outer: outputs.add_one(*outer),
                 },
+                &Domain::Tube { inner, outer, lower, upper, around } => {
+                    let measures = TubeMeasures { inner, outer, lower, upper, around };
+                    DomainOutputs::Tube(measures.map(|expr| outputs.add_one(expr)))
+                }
             },
         }
     }
@@ -453,6 +498,9 @@ impl ConstantOutputs {
                 }
                 DomainOutputs::Annulus { inner, outer } => {
                     Measures::Annulus { inner: inner.slot(program), outer: outer.slot(program) }
+                }
+                DomainOutputs::Tube(measures) => {
+                    Measures::Tube(measures.map(|of| of.slot(program)))
                 }
             },
         }

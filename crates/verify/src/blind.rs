@@ -4,7 +4,7 @@ use mmsmith_runtime::{AnySolution, Solution};
 use serde::Serialize;
 use std::fmt;
 
-use crate::case::law;
+use crate::case::law_of_body;
 use crate::dimension::in_dimension;
 use crate::points;
 use crate::precision::Precision;
@@ -91,7 +91,7 @@ where
 {
     let domain = solution.domain();
     let Some(size) = points::size(&domain) else { return Vec::new() };
-    let law = law::<f64, D>(solution.law()).ok();
+    let law = law_of_body::<f64, D>(solution).ok();
     let density = solution.density();
     let mut largest = Largest::default();
     for n in 0..POINTS {

@@ -1,6 +1,6 @@
 //! The settings of one simulation.
 
-use mmsmith_laws::{ReturnMap, Stressed, Volume, with_memory, with_projected_volume};
+use mmsmith_laws::{HalfPlane, ReturnMap, Stressed, Volume, with_memory, with_projected_volume};
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{Integrator, Law, Material, SetupError, Shape};
 use mmsmith_runtime::{AnySolution, Real, Solution};
@@ -95,7 +95,7 @@ impl CflSpeed {
         match self {
             Self::Bar => Ok(exact.wave_speed()),
             Self::PWave => {
-                let law = law::<f64, D>(exact.law())?;
+                let law = law_of_body::<f64, D>(exact)?;
                 Ok((p_wave_modulus(&law, exact) / exact.density()).sqrt())
             }
         }
@@ -218,12 +218,31 @@ pub(crate) fn law<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: us
     law_by(law, ReturnMap::default())
 }
 
-/// The solver's own law for a solution's, as a case asks for it.
-pub(crate) fn law_of<T: Real + Compiled<D> + Stressed<D> + Stressed<3>, const D: usize>(
-    law: mmsmith_runtime::Law<T>,
+/// The solver's own law for the body of a solution.
+pub(crate) fn law_of_body<T: Precision<D>, const D: usize>(
+    solution: &dyn Solution<T, D>,
+) -> Result<Law<T, D>, SceneError> {
+    law_of_body_by(solution, ReturnMap::default())
+}
+
+/// As [`law_of_body`], with a return map.
+fn law_of_body_by<T: Precision<D>, const D: usize>(
+    solution: &dyn Solution<T, D>,
+    map: ReturnMap,
+) -> Result<Law<T, D>, SceneError> {
+    if !solution.is_half_plane() {
+        return law_by(solution.law(), map);
+    }
+    let in_space = law_by::<T, 3>(solution.law(), map)?;
+    Ok(Law::with_memory(HalfPlane::new(in_space).ok_or(SceneError::LawOfHalfPlane)?))
+}
+
+/// The solver's own law for the body of a solution, as a case asks for it.
+pub(crate) fn law_of<T: Precision<D>, const D: usize>(
+    solution: &dyn Solution<T, D>,
     case: &Case,
 ) -> Result<Law<T, D>, CaseError> {
-    let law = law_by(law, case.return_map.unwrap_or_default())?;
+    let law = law_of_body_by(solution, case.return_map.unwrap_or_default())?;
     match case.volume {
         Volume::Pointwise => Ok(law),
         Volume::Projected => Ok(with_projected_volume(law).ok_or(SetupError::ProjectedMemory)?),

@@ -6,12 +6,14 @@
 //! definition; nothing lies below it. Derivatives are extrapolated finite differences that know their own error.
 
 use mmsmith_mpm::{Law, Material};
-use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Fields, Solution, Surface};
+use mmsmith_runtime::{
+    AnySolution, Around, Boundary, Condition, Domain, Fields, Solution, Surface,
+};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::case::law;
+use crate::case::law_of_body;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
@@ -211,6 +213,14 @@ fn body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> Result<(), NoBody
         Domain::Annulus { inner, outer } => {
             (0.0 <= inner && inner < outer, format!("from radius {inner:?} to radius {outer:?}"))
         }
+        Domain::Tube { inner, outer, lower, upper, around } => {
+            let turns = match around {
+                Around::Sector { from, to } => from < to,
+                _ => true,
+            };
+            let is_solid = 0.0 <= inner && inner < outer && lower < upper && turns;
+            (is_solid, format!("from radius {inner:?} to {outer:?}, from Z {lower:?} to {upper:?}"))
+        }
         _ => (true, String::new()),
     };
     if !is_solid {
@@ -237,10 +247,6 @@ pub fn has_body(solution: &AnySolution<f64>) -> bool {
 
 fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
     let domain = solution.domain();
-    let surfaces: Vec<Surface> = (0..D)
-        .flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)])
-        .chain([Surface::Inner, Surface::Outer])
-        .collect();
     let keeps_volume = |X: &SVector<f64, D>, t: f64| {
         let J = solution.jacobian(X, t);
         J >= LEAST_VOLUME && J.is_finite()
@@ -250,7 +256,7 @@ fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
             .filter_map(|n| Some((n, points::interior(&domain, solution.period(), n)?)))
             .all(|(n, (X, t))| {
                 // Stretches are extreme on surfaces.
-                let mut on = surfaces.iter().filter_map(|at| points::surface(&domain, *at, n));
+                let mut on = Surface::all(D).filter_map(|at| points::surface(&domain, at, n));
                 keeps_volume(&X, t) && on.all(|(X, _)| keeps_volume(&X, t))
             })
 }
@@ -270,7 +276,7 @@ where
         return Err(CheckError::NoPoints);
     }
     let domain = solution.domain();
-    let law = match law(solution.law()) {
+    let law = match law_of_body(solution) {
         Err(SceneError::CurvilinearComponents) => None,
         known => Some(known?),
     };
@@ -286,8 +292,7 @@ where
         };
         (0..count).map_while(place).collect()
     };
-    let planes = (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]);
-    for surface in [Surface::Inner, Surface::Outer].into_iter().chain(planes) {
+    for surface in Surface::all(D) {
         findings.extend(traction_finding(solution, surface, &places(surface), &samples));
     }
     for boundary in solution.boundaries() {

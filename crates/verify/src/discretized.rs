@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use mmsmith_measure::norms::PerField;
-use mmsmith_runtime::AnySolution;
+use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
-use crate::error::{CaseError, StudyError};
+use crate::error::{CaseError, SceneError, StudyError};
+use crate::half_plane::{self, HalfPlane};
 use crate::observe::{self, Limits, Observed, Scales};
 use crate::on_grid::{OnGrid, Plan};
 use crate::precision::Precision;
@@ -36,6 +37,24 @@ impl<'a> Discretized<'a> {
         arithmetic: Arithmetic<'a>,
         case: &Case,
     ) -> Result<Self, CaseError> {
+        if let (AnySolution::Three(exact_in_space), true) = (exact, case.scheme.updated().is_some())
+            && let Some(own) = HalfPlane::new(exact_in_space.as_ref())
+        {
+            let of_revolution = |why| CaseError::from(SceneError::OfRevolution { why });
+            if half_plane::turns(exact_in_space.as_ref()) {
+                return Err(of_revolution(
+                    "this body turns about its axis, and the updated Lagrangian formulation has the radius and the height alone",
+                ));
+            }
+            let (plan, floors, on_grid): (_, _, Box<dyn Simulate + 'a>) = match arithmetic {
+                Arithmetic::Double => InHalfPlane::judged(own, exact_in_space.as_ref(), case)?,
+                Arithmetic::Single(AnySolution::Three(model)) => {
+                    InHalfPlane::judged(own, model.as_ref(), case)?
+                }
+                Arithmetic::Single(_) => return Err(CaseError::Dimension),
+            };
+            return Ok(Self { exact, arithmetic, case: *case, plan, floors, on_grid });
+        }
         let (plan, floors, on_grid): (_, _, Box<dyn Simulate + 'a>) = in_arithmetic!(
             exact,
             arithmetic,
@@ -172,6 +191,62 @@ trait Simulate: Send + Sync {
     fn observe(&self, cfl: f64, end: f64, limits: Option<&Limits>) -> Result<Observed, CaseError>;
     /// The scales of runs at other CFL numbers.
     fn scales(&self) -> Result<Scales, CaseError>;
+}
+
+/// A case of a body of revolution in its half plane.
+struct InHalfPlane<'a, T: Precision<2>> {
+    exact: HalfPlane<'a, f64>,
+    model: HalfPlane<'a, T>,
+    case: Case,
+}
+
+/// A case that was judged, its rounding floors, and the runs of it.
+type Judged<'a> = (Plan, PerField<f64>, Box<dyn Simulate + 'a>);
+
+impl<'a, T: Precision<2>> InHalfPlane<'a, T> {
+    fn judged(
+        exact: HalfPlane<'a, f64>,
+        model: &'a dyn Solution<T, 3>,
+        case: &Case,
+    ) -> Result<Judged<'a>, CaseError> {
+        let model = HalfPlane::new(model).ok_or(CaseError::Dimension)?;
+        let own = Self { exact, model, case: *case };
+        let on_grid = own.on_grid()?;
+        let plan = on_grid.plan()?;
+        let floors = on_grid.floors(plan.round_off)?;
+        Ok((plan, floors, Box::new(own)))
+    }
+
+    fn on_grid(&self) -> Result<OnGrid<'_, T, 2>, CaseError> {
+        OnGrid::prepare(&self.exact, &self.model, &self.case)
+    }
+}
+
+impl<T: Precision<2>> Simulate for InHalfPlane<'_, T> {
+    fn run(&self, outputs: &mut Outputs<'_>) -> Result<Row, CaseError> {
+        self.on_grid()?.run(outputs)
+    }
+
+    fn time_steps(&self, most: u64, until: Option<Instant>) -> Result<Timing, CaseError> {
+        self.on_grid()?.time_steps(most, until)
+    }
+
+    fn differences(
+        &self,
+        cfls: &[f64],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Temporal, StudyError> {
+        let on_grid = self.on_grid().map_err(|cause| StudyError { index: 0, cause })?;
+        on_grid.differences(cfls, progress)
+    }
+
+    fn observe(&self, cfl: f64, end: f64, limits: Option<&Limits>) -> Result<Observed, CaseError> {
+        self.on_grid()?.observe(cfl, end, limits)
+    }
+
+    fn scales(&self) -> Result<Scales, CaseError> {
+        self.on_grid()?.scales()
+    }
 }
 
 impl<T: Precision<D>, const D: usize> Simulate for OnGrid<'_, T, D>

@@ -219,6 +219,10 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
             };
             let F = self.model.deformation_gradient(X, t);
             *stress = P * F.transpose() / self.model.jacobian(X, t);
+            if self.model.is_half_plane() {
+                // Areas of a radian have the radius as a factor.
+                *stress *= X[0] + self.model.displacement(X, t)[0];
+            }
         }
     }
 

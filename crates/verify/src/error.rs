@@ -120,6 +120,21 @@ pub enum SceneError {
         /// Where.
         surfaces: Vec<Surface>,
     },
+    /// A body of revolution that the updated Lagrangian formulation has no half plane of.
+    #[error(
+        "{why}; it runs in the total Lagrangian formulation: --formulation total-lagrangian --shape bspline3 --layout gauss --grid \
+         cylindrical --cfl 0.2 --cfl-speed p-wave"
+    )]
+    OfRevolution {
+        /// The reason in words.
+        why: &'static str,
+    },
+    /// A law that the half plane of a body of revolution has no form of.
+    #[error(
+        "the updated Lagrangian formulation runs bodies of revolution with isotropic elastic laws alone; this one runs with --formulation \
+         total-lagrangian --shape bspline3 --layout gauss --grid cylindrical"
+    )]
+    LawOfHalfPlane,
     /// The solver has no model for the body's shape or its material.
     #[error("the solver does not model this {what}: {value}")]
     Unknown {

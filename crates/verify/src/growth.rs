@@ -24,7 +24,7 @@ use mmsmith_runtime::{AnySolution, BLOCK, Domain, Solution, StateAtPoints, State
 use serde::Serialize;
 
 use self::disturbance::{disturbance, mixed};
-use crate::case::{Case, law};
+use crate::case::{Case, law_of_body};
 use crate::dimension::in_dimension;
 use crate::error::{CaseError, SceneError};
 use crate::flow::has_memory;
@@ -215,7 +215,7 @@ fn may_grow<const D: usize>(exact: &dyn Solution<f64, D>, periods: f64) -> Optio
 where
     f64: Precision<D>,
 {
-    let law = law::<f64, D>(exact.law()).ok()?;
+    let law = law_of_body::<f64, D>(exact).ok()?;
     if largest_pressure(exact, &law, periods) < HARMLESS_PRESSURE {
         return None;
     }
@@ -241,7 +241,7 @@ fn quotient_of_moduli<const D: usize>(exact: &dyn Solution<f64, D>) -> Option<f6
 where
     f64: Precision<D>,
 {
-    let (lambda, mu) = moduli(&law::<f64, D>(exact.law()).ok()?);
+    let (lambda, mu) = moduli(&law_of_body::<f64, D>(exact).ok()?);
     Some(lambda / mu)
 }
 
@@ -251,7 +251,7 @@ pub fn extremes_of(exact: &AnySolution<f64>, periods: f64) -> Option<Extremes> {
     if has_memory(exact) {
         return None;
     }
-    in_dimension!(exact, |s| Some(extremes(s, &law(s.law()).ok()?, periods)?.0), else None)
+    in_dimension!(exact, |s| Some(extremes(s, &law_of_body(s).ok()?, periods)?.0), else None)
 }
 
 /// The usual degree and number of cells by dimension: waves of a third of the body's length have four cells each of degree 4 in the plane.
@@ -270,7 +270,7 @@ fn measure<const D: usize>(
 where
     f64: Precision<D>,
 {
-    let law = law::<f64, D>(exact.law()).map_err(CaseError::from)?;
+    let law = law_of_body::<f64, D>(exact).map_err(CaseError::from)?;
     let (degree, cells) = usual(D);
     let (degree, cells) = (settings.degree.unwrap_or(degree), settings.cells.unwrap_or(cells));
     let end = settings.periods * exact.period();
@@ -326,6 +326,7 @@ fn grid<const D: usize>(
         coordinates: match exact.domain() {
             Domain::Annulus { .. } if D == 2 => Coordinates::Polar,
             Domain::Annulus { .. } => Coordinates::Spherical,
+            Domain::Tube { .. } => Coordinates::Cylindrical,
             _ => Coordinates::Cartesian,
         },
         ..Total::of_degree(degree)

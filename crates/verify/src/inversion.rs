@@ -56,10 +56,7 @@ fn inversion_in<const D: usize>(solution: &dyn Solution<f64, D>) -> Option<Inver
 
 fn places<const D: usize>(solution: &dyn Solution<f64, D>) -> Vec<SVector<f64, D>> {
     let domain = &solution.domain();
-    let surfaces = (0..D)
-        .flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)])
-        .chain([Surface::Inner, Surface::Outer]);
-    let on = surfaces
+    let on = Surface::all(D)
         .flat_map(|at| (0..PLACES).map_while(move |n| Some(points::surface(domain, at, n)?.0)));
     let within =
         (0..PLACES).filter_map(|n| Some(points::interior(domain, solution.period(), n)?.0));

@@ -6,7 +6,7 @@ use mmsmith_mpm::{Law, Particles, StepError};
 use mmsmith_runtime::{Real, Solution};
 use serde::{Deserialize, Serialize};
 
-use crate::case::{CflSpeed, law};
+use crate::case::{CflSpeed, law_of_body};
 use crate::drive::{Driven, Outcome, Stepped};
 use crate::error::CaseError;
 use crate::flow::prepare_until;
@@ -153,7 +153,7 @@ impl<const D: usize> Run<'_, D> {
         f64: Precision<D>,
     {
         let lag = driven.solver.velocity_lag().to_f64();
-        let law = law::<f64, D>(self.exact.law())?;
+        let law = law_of_body::<f64, D>(self.exact)?;
         let scales = self.largest(driven.solver.observe().0, &law);
         let (mut error, mut energy, mut momentum) = (0.0_f64, 0.0_f64, 0.0_f64);
         let mut steps = 0;
@@ -208,7 +208,7 @@ impl<const D: usize> Run<'_, D> {
         }
         let limits = self.limits?;
         let strain = limits.strain_floor / self.scene.spacing;
-        let modulus = law::<f64, D>(self.exact.law()).ok()?.p_wave_modulus();
+        let modulus = law_of_body::<f64, D>(self.exact).ok()?.p_wave_modulus();
         let volume = self.scene.size.powi(D as i32);
         let counts = largest_energy > modulus * volume * strain * strain;
         let most = limits.energy_drift + limits.energy_rate * (time / limits.period).max(1.0);

@@ -3,7 +3,7 @@
 use mmsmith_measure::norms::PerField;
 use mmsmith_runtime::Solution;
 
-use crate::case::{Case, CflSpeed, Extent, law};
+use crate::case::{Case, CflSpeed, Extent, law_of_body};
 use crate::error::{CaseError, MOST_STEPS};
 use crate::flow::prepare_until;
 use crate::precision::Precision;
@@ -62,7 +62,7 @@ where
         case.validate()?;
         let end = case.periods * exact.period();
         // First, since no other scheme would mend it.
-        law::<f64, D>(exact.law())?;
+        law_of_body::<f64, D>(exact)?;
         let scene = Scene::new(exact, case, end)?;
         let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
         let steps = Steps::new(case.cfl, end, waves)?;
@@ -84,8 +84,7 @@ where
             }
             Scheme::Total(total) => {
                 let grid = total.grid(scene, per_cell)?;
-                let particles =
-                    grid.axes.iter().map(|axis| axis.cells as f64 * per_cell as f64).product();
+                let particles = grid.axes.iter().map(|axis| axis.count(per_cell) as f64).product();
                 (particles, scene.bytes_expected(per_cell, size_of::<T>(), kept))
             }
         };

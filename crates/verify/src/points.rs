@@ -4,7 +4,7 @@
 //! fractional part of `1/2 + n g^-(j+1)`, `g` the positive root of `g^(d+1) = g + 1`. M. Roberts, "The
 //! unreasonable effectiveness of quasirandom sequences" (2018).
 
-use mmsmith_runtime::{Domain, Surface};
+use mmsmith_runtime::{Around, Domain, Surface};
 use nalgebra::SVector;
 
 /// Share of the body's size, and of the time span, that samples keep away from the ends.
@@ -44,9 +44,52 @@ pub(crate) fn interior<const D: usize>(
         Domain::Annulus { inner, outer } => {
             direction(q(1), q(D - 1)) * (inner + (outer - inner) * inside(q(0)))
         }
+        Domain::Tube { inner, outer, lower, upper, around } => {
+            let [from, to] = angles(around);
+            let place = TubePlace {
+                radius: inner + (outer - inner) * inside(q(0)),
+                angle: from + (to - from) * inside(q(1)),
+                height: lower + (upper - lower) * inside(q(2)),
+            };
+            place.cartesian()
+        }
         _ => return None,
     };
     Some((X, t))
+}
+
+/// The angles between which a tube lies.
+fn angles(around: &Around<f64>) -> [f64; 2] {
+    match around {
+        Around::Sector { from, to } => [*from, *to],
+        _ => [0.0, std::f64::consts::TAU],
+    }
+}
+
+/// A place in a tube, by its cylindrical coordinates.
+struct TubePlace {
+    radius: f64,
+    angle: f64,
+    height: f64,
+}
+
+impl TubePlace {
+    fn cartesian<const D: usize>(&self) -> SVector<f64, D> {
+        let (sin, cos) = self.angle.sin_cos();
+        let X = [self.radius * cos, self.radius * sin, self.height];
+        SVector::from_fn(|j, _| X.get(j).copied().unwrap_or(0.0))
+    }
+}
+
+/// The distance from the axis of a tube.
+fn from_axis<const D: usize>(X: &SVector<f64, D>) -> f64 {
+    X[0].hypot(X[1 % D])
+}
+
+/// The angle of a place from the middle of a sector, at most half a turn.
+fn from_middle<const D: usize>(X: &SVector<f64, D>, [from, to]: [f64; 2]) -> f64 {
+    let (sin, cos) = (0.5 * (from + to)).sin_cos();
+    (X[1 % D] * cos - X[0] * sin).atan2(X[0] * cos + X[1 % D] * sin).abs()
 }
 
 /// A unit vector: in the plane, `turn` of a full turn from the first axis; in space, with a last component that
@@ -67,6 +110,18 @@ pub(crate) fn reach<const D: usize>(
     match domain {
         Domain::Box { lower, upper } => (X[axis] - lower[axis]).min(upper[axis] - X[axis]),
         Domain::Annulus { inner, outer } => (X.norm() - inner).min(outer - X.norm()),
+        Domain::Tube { lower, upper, .. } if axis == 2 => (X[axis] - lower).min(upper - X[axis]),
+        Domain::Tube { inner, outer, around, .. } => {
+            let radius = from_axis(X);
+            let across = (radius - inner).min(outer - radius);
+            match around {
+                Around::Sector { from, to } if to - from < std::f64::consts::PI => {
+                    let rest = 0.5 * (to - from) - from_middle(X, [*from, *to]);
+                    across.min(radius * rest.sin())
+                }
+                _ => across,
+            }
+        }
         _ => 0.0,
     }
 }
@@ -81,6 +136,18 @@ pub(crate) fn outside<const D: usize>(domain: &Domain<f64, D>, X: &SVector<f64, 
             Some(distance / (upper - lower).amax())
         }
         Domain::Annulus { inner, outer } => Some((inner - X.norm()).max(X.norm() - outer) / outer),
+        Domain::Tube { inner, outer, lower, upper, around } => {
+            let radius = from_axis(X);
+            let across = (inner - radius).max(radius - outer);
+            let along = (lower - X[2 % D]).max(X[2 % D] - upper);
+            let turned = match around {
+                Around::Sector { from, to } => {
+                    radius * (from_middle(X, [*from, *to]) - 0.5 * (to - from))
+                }
+                _ => f64::NEG_INFINITY,
+            };
+            Some(across.max(along).max(turned) / outer.max(upper - lower))
+        }
         _ => None,
     }
 }
@@ -104,6 +171,7 @@ pub(crate) fn size<const D: usize>(domain: &Domain<f64, D>) -> Option<f64> {
     match domain {
         Domain::Box { lower, upper } => Some((upper - lower).norm()),
         Domain::Annulus { outer, .. } => Some(2.0 * outer),
+        Domain::Tube { outer, lower, upper, .. } => Some((2.0 * outer).hypot(upper - lower)),
         _ => None,
     }
 }
@@ -128,6 +196,26 @@ pub(crate) fn surface<const D: usize>(
             let (R, sign) = if surface == Surface::Inner { (*inner, -1.0) } else { (*outer, 1.0) };
             let n = direction(q(0), q(1));
             Some((n * R, n * sign))
+        }
+        (Domain::Tube { inner, outer, lower, upper, around }, _) => {
+            let [from, to] = angles(around);
+            let normal = domain.normal(surface, &SVector::zeros());
+            let mut place = TubePlace {
+                radius: inner + (outer - inner) * q(0),
+                angle: from + (to - from) * q(1),
+                height: lower + (upper - lower) * q(2),
+            };
+            match surface {
+                Surface::Inner if *inner > 0.0 => place.radius = *inner,
+                Surface::Outer => place.radius = *outer,
+                Surface::Lower(2) => place.height = *lower,
+                Surface::Upper(2) => place.height = *upper,
+                Surface::FirstAngle if normal.is_some() => place.angle = from,
+                Surface::LastAngle if normal.is_some() => place.angle = to,
+                _ => return None,
+            }
+            let X = place.cartesian();
+            Some((X, domain.normal(surface, &X)?))
         }
         // The plane through the origin; the body lies on its positive side.
         (Domain::Annulus { inner, outer }, Surface::Lower(axis)) if D > 1 && axis < D => {

@@ -8,7 +8,7 @@ use mmsmith_stated_law::Compiled;
 
 /// The numbers of runs in `D` dimensions: `f64` or `f32`. Files have stresses in space.
 pub(crate) trait Precision<const D: usize>:
-    Real + Scalar<D> + Stressed<3> + Compared<D> + Compiled<D>
+    Real + Scalar<D> + Stressed<3> + Compared<D> + Compiled<D> + Compiled<3>
 {
     /// The solver in the total Lagrangian formulation, which is in double precision alone.
     fn total_lagrangian<'a>(

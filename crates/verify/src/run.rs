@@ -13,7 +13,7 @@ use mmsmith_runtime::Solution;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use crate::case::law;
+use crate::case::law_of_body;
 use crate::checkpoint::{Checkpoints, Reached, TakenUp};
 use crate::drive::{Driven, Outcome, Seen, Stepped};
 use crate::error::CaseError;
@@ -421,7 +421,7 @@ where
             None => None,
         };
         let recorder = match history {
-            Some(moments) => Some(Recorder::new(moments, exact, law(exact.law())?, steps.count)),
+            Some(moments) => Some(Recorder::new(moments, exact, law_of_body(exact)?, steps.count)),
             None => None,
         };
         let mut watch = Self {

@@ -186,12 +186,20 @@ impl<const D: usize> Scene<D> {
         let quarter = quarter(solution, case.extent, clipped)?;
         let surfaces: Vec<Surface> = match domain {
             Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],
+            Domain::Tube { .. } => {
+                let is_own = |surface: &Surface| points::surface(&domain, *surface, 0).is_some();
+                Surface::all(D).filter(is_own).collect()
+            }
             _ => (0..D).flat_map(|axis| [Surface::Lower(axis), Surface::Upper(axis)]).collect(),
         };
         let declared = |s: &Surface| solution.boundaries().iter().any(|b| b.surface == *s);
         let surfaces: Vec<_> = surfaces.into_iter().filter(|surface| !declared(surface)).collect();
         if !surfaces.is_empty() {
             return Err(SceneError::Undeclared { surfaces });
+        }
+        if matches!(domain, Domain::Tube { .. }) && case.scheme.updated().is_some() {
+            let why = "the updated Lagrangian formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
+            return Err(SceneError::OfRevolution { why });
         }
         let mut walls = [[false; 2]; D];
         let mut sides = [[Condition::TractionFree; 2]; D];
@@ -210,13 +218,15 @@ impl<const D: usize> Scene<D> {
                     walls[axis][1] |= is_wall;
                     sides[axis][1] = condition;
                 }
+                Surface::FirstAngle => sides[1 % D][0] = condition,
+                Surface::LastAngle => sides[1 % D][1] = condition,
                 surface if is_wall => {
                     return Err(SceneError::Unmodelled { surface, condition, instead: "" });
                 }
                 _ => {}
             }
         }
-        if matches!(domain, Domain::Annulus { .. }) {
+        if matches!(domain, Domain::Annulus { .. } | Domain::Tube { .. }) {
             // The first axis is the radius.
             let on = |rim: Surface| solution.boundaries().iter().find(|b| b.surface == rim);
             let rim = |rim| on(rim).map_or(Condition::TractionFree, |b| b.condition);
@@ -242,6 +252,13 @@ impl<const D: usize> Scene<D> {
                 } else {
                     (SVector::repeat(-half * spacing), [(2.0 * half) as usize; D])
                 }
+            }
+            Domain::Tube { inner, outer, lower, upper, .. } => {
+                // None longer than the spacing; how many lie around the axis is for the grid to say.
+                let count = |length: f64| (length / spacing - 1e-9).ceil().max(2.0) as usize;
+                let cells = [count(outer - inner), 1, count(upper - lower)];
+                let corner = [*inner, 0.0, *lower];
+                (SVector::from_fn(|k, _| corner[k]), std::array::from_fn(|k| cells[k]))
             }
             _ => return Err(unknown()),
         };
@@ -321,6 +338,7 @@ impl<const D: usize> Scene<D> {
     pub(crate) fn reach(&self) -> f64 {
         let coordinate = match &self.domain {
             Domain::Box { lower, upper } => lower.amax().max(upper.amax()),
+            Domain::Tube { lower, upper, .. } => lower.abs().max(upper.abs()),
             _ => 0.0,
         };
         self.size.max(coordinate)

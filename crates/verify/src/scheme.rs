@@ -128,6 +128,7 @@ named! {
     Coordinates {
         Cartesian = "cartesian": "Cartesian";
         Polar = "polar": "Radius and angle";
+        Cylindrical = "cylindrical": "Radius, angle and height";
         Spherical = "spherical":
             "Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis";
     }

@@ -245,7 +245,7 @@ where
     let scene = admit(exact, case)?;
     let per_cell = case.case.per_cell;
     let grid = case.total.grid(&scene, per_cell)?;
-    let of_points = |axis: &mmsmith_galerkin::Axis| axis.cells as f64 * per_cell as f64;
+    let of_points = |axis: &mmsmith_galerkin::Axis| axis.count(per_cell) as f64;
     let points: f64 = grid.axes.iter().map(of_points).product();
     let functions = |axis: &mmsmith_galerkin::Axis| (axis.cells + case.total.degree) as f64;
     let unknowns = D as f64 * grid.axes.iter().map(functions).product::<f64>();
@@ -274,7 +274,7 @@ where
 {
     let scene = admit(exact, case)?;
     let grid = case.total.grid(&scene, case.case.per_cell)?;
-    let law = law_of(exact.law(), &case.case)?;
+    let law = law_of(exact, &case.case)?;
     let begun = Instant::now();
     let mut body = f64::at_rest(&grid, case.total.degree, law, exact.density())?;
     let time = case.moment * exact.period();

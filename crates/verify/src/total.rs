@@ -6,7 +6,7 @@ use mmsmith_galerkin::{
     Side,
 };
 use mmsmith_mpm::{SetupError, Solver};
-use mmsmith_runtime::{AnySolution, Condition, Domain, Law, Solution, Surface};
+use mmsmith_runtime::{AnySolution, Around, Condition, Domain, Law, Solution, Surface};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
@@ -59,6 +59,9 @@ impl Total {
             }
             AnySolution::Three(s) if matches!(s.domain(), Domain::Annulus { .. }) => {
                 Coordinates::Spherical
+            }
+            AnySolution::Three(s) if matches!(s.domain(), Domain::Tube { .. }) => {
+                Coordinates::Cylindrical
             }
             _ => Coordinates::Cartesian,
         }
@@ -162,6 +165,47 @@ impl Total {
                     "spherical for a shell in the total Lagrangian formulation",
                 ));
             }
+            (Domain::Tube { inner, outer, lower, upper, around }, Coordinates::Cylindrical)
+                if D == 3 =>
+            {
+                let across = Axis {
+                    lower: *inner,
+                    upper: *outer,
+                    cells: scene.cells[0],
+                    // The axis of a solid cylinder is no surface.
+                    ends: [
+                        if *inner == 0.0 { End::Free } else { end(scene.sides[0][0]) },
+                        end(scene.sides[0][1]),
+                    ],
+                };
+                let mean = 0.5 * (inner + outer);
+                let around = match around {
+                    Around::Sector { from, to } => Axis {
+                        lower: *from,
+                        upper: *to,
+                        cells: count((to - from) * mean).max(self.degree),
+                        ends: scene.sides[1].map(end),
+                    },
+                    Around::Whole => Axis {
+                        lower: 0.0,
+                        upper: TAU,
+                        cells: count(TAU * mean).max(self.degree + 1),
+                        ends: [End::Periodic; 2],
+                    },
+                    _ => Axis { lower: 0.0, upper: TAU, cells: 1, ends: [End::Uniform; 2] },
+                };
+                let (lower, upper) = (*lower, *upper);
+                let along = Axis {
+                    lower,
+                    upper,
+                    cells: scene.cells[2 % D],
+                    ends: scene.sides[2 % D].map(end),
+                };
+                std::array::from_fn(|k| [across, around, along][k])
+            }
+            (Domain::Tube { .. }, _) => {
+                return Err(CaseError::setting("grid", name, "cylindrical for a tube"));
+            }
             _ => return Err(CaseError::setting("grid", name, "cartesian for a box")),
         };
         Ok(Grid { axes, coordinates: self.coordinates, per_cell, layout: self.layout })
@@ -175,6 +219,8 @@ fn narrowest<const D: usize>(exact: &dyn Solution<f64, D>) -> f64 {
             let around = inner / (0.5 * (inner + outer));
             if D == 3 { around * POLAR_ANGLES[0].sin() } else { around }
         }
+        Domain::Tube { around: Around::Axisymmetric, .. } => 1.0,
+        Domain::Tube { inner, outer, .. } => inner / (0.5 * (inner + outer)),
         _ => 1.0,
     }
 }
@@ -231,8 +277,14 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
     ) {
         let exact = self.exact;
         let surface = match (exact.domain(), side) {
-            (Domain::Annulus { .. }, Side { axis: 0, upper: false }) => Surface::Inner,
-            (Domain::Annulus { .. }, Side { axis: 0, upper: true }) => Surface::Outer,
+            (Domain::Annulus { .. } | Domain::Tube { .. }, Side { axis: 0, upper: false }) => {
+                Surface::Inner
+            }
+            (Domain::Annulus { .. } | Domain::Tube { .. }, Side { axis: 0, upper: true }) => {
+                Surface::Outer
+            }
+            (Domain::Tube { .. }, Side { axis: 1, upper: false }) => Surface::FirstAngle,
+            (Domain::Tube { .. }, Side { axis: 1, upper: true }) => Surface::LastAngle,
             (_, Side { axis, upper: false }) => Surface::Lower(axis),
             (_, Side { axis, upper: true }) => Surface::Upper(axis),
         };
@@ -279,7 +331,7 @@ where
     let set_up = SetUp {
         grid: total.grid(scene, case.per_cell)?,
         scheme: Scheme { degree, mass, composition },
-        law: law_of(exact.law(), case)?,
+        law: law_of(exact, case)?,
         density: exact.density(),
         time_step: time_step.to_f64(),
         motion: &|X| [exact.displacement(X, 0.0), exact.velocity(X, 0.0)],

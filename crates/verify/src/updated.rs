@@ -14,6 +14,7 @@ use nalgebra::SVector;
 
 use crate::case::{Case, Extent, law_of};
 use crate::error::{CaseError, SceneError};
+use crate::half_plane::set_hoop_stretch;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Placement, Start, Updated};
@@ -219,7 +220,10 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
         return Err(SceneError::Empty { cells: case.cells }.into());
     }
     set_density(&mut body.particles, exact);
-    let law = law_of::<T, D>(model.law(), case)?;
+    if exact.is_half_plane() {
+        set_volumes_of_a_radian(&mut body.particles);
+    }
+    let law = law_of::<T, D>(model, case)?;
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());
     if let Some(Mesh { X, x, .. }) = &mut body.mesh {
@@ -247,6 +251,15 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     Ok(T::updated_lagrangian(scene.grid(), body, law, settings, share)?)
 }
 
+/// Gives particles of a half plane the volumes and masses of a radian about the axis. The radius of the centre integrates it exactly.
+fn set_volumes_of_a_radian<T: Real, const D: usize>(particles: &mut Particles<T, D>) {
+    let Particles { X, volume, mass, .. } = particles;
+    for ((X, volume), mass) in X.iter().zip(volume).zip(mass) {
+        *volume *= X[0];
+        *mass *= X[0];
+    }
+}
+
 /// Gives particles of a body whose density differs from place to place their masses.
 fn set_density<T: Real, const D: usize>(
     particles: &mut Particles<T, D>,
@@ -271,12 +284,15 @@ fn set_memory<T: Real, const D: usize>(
 ) {
     let Law::WithMemory(law) = law else { return };
     particles.internal = Vec::new();
-    for X in &particles.X {
+    for (X, x) in particles.X.iter().zip(&particles.x) {
         let place = X.map(Real::to_f64);
         let F = |t: f64| exact.deformation_gradient(&place, t);
         let rate = (F(dt) * 4.0 - F(2.0 * dt) - F(0.0) * 3.0) / (2.0 * dt);
         let mut q = law.initial(X);
         law.start_at_rate(&rate.map(Real::nearest), &mut q);
+        if law.of_half_plane().is_some() {
+            set_hoop_stretch(x[0], &mut q);
+        }
         particles.internal.extend(q);
     }
 }

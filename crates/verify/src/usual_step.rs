@@ -4,7 +4,7 @@ use mmsmith_mpm::Law;
 use mmsmith_runtime::{AnySolution, Solution};
 use nalgebra::{SMatrix, SVector};
 
-use crate::case::{Case, CflSpeed, law, two_digits};
+use crate::case::{Case, CflSpeed, law_of_body, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::points;
@@ -116,7 +116,7 @@ where
     f64: Precision<D>,
 {
     const SAMPLES: usize = 256;
-    let law = law::<f64, D>(exact.law())?;
+    let law = law_of_body::<f64, D>(exact)?;
     let at_rest = CflSpeed::PWave.of(exact)?;
     // Periodic motion repeats.
     let span = exact.period() * periods.min(1.0);
@@ -205,7 +205,7 @@ mod tests {
     fn waves_of_a_solid_at_rest_have_the_p_wave_modulus() {
         let exact = mmsmith_solutions::build::<f64>("axis-aligned-3d", &[]).unwrap().unwrap();
         let AnySolution::Three(exact) = exact else { panic!("it is solid") };
-        let law = law::<f64, 3>(exact.law()).unwrap();
+        let law = law_of_body::<f64, 3>(exact).unwrap();
         let modulus = largest_modulus(&law, &SMatrix::identity());
         assert!((modulus / law.p_wave_modulus() - 1.0).abs() < 1e-6, "{modulus}");
     }

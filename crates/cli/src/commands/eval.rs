@@ -20,6 +20,8 @@ use crate::progress::Bar;
 use crate::terminal;
 use points::Point;
 
+/// Coordinates and components of a body of revolution.
+const OF_REVOLUTION: [&str; 3] = ["R", "theta", "Z"];
 /// So many points are evaluated between two looks at the bar.
 const PORTION: usize = 4096;
 /// So many points that are not right are named; of the others the number is told.
@@ -28,14 +30,15 @@ const MOST_NAMED: usize = 5;
 pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let file = Source::of(&options.points);
-    let points = points::read(file, &selection)?;
+    let solution = selection.build()?;
+    let is_axisymmetric = mmsmith_verify::is_axisymmetric(&solution);
+    let points = points::read(file, &selection, is_axisymmetric)?;
     let json_file = Output::prepare_if(options.json.as_ref())?;
     let csv_file = Output::prepare_if(options.csv.as_ref())?;
     if let Some(folder) = &options.npy {
         json::prepare_folder(folder)?;
     }
 
-    let solution = selection.build()?;
     let bar = Bar::new("points");
     let mut rows = Vec::with_capacity(points.len());
     for portion in points.chunks(PORTION) {
@@ -53,7 +56,8 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     drop(bar);
 
     if let Some(file) = csv_file {
-        file.write_text(&csv(&points, &rows))?;
+        let axes = if is_axisymmetric { OF_REVOLUTION } else { points::AXES };
+        file.write_text(&csv(&axes, &points, &rows))?;
     }
     if let Some(folder) = &options.npy {
         write_arrays(folder, &rows)?;
@@ -61,14 +65,18 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     }
     let only_elsewhere = options.csv.is_some() || options.npy.is_some();
     if json_file.is_some() || !only_elsewhere {
+        let mut settings = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "solution": selection.name(),
+            "parameters": selection.parameters(),
+            "fields": selection.evaluation(),
+        });
+        if is_axisymmetric {
+            settings["components"] = json!(OF_REVOLUTION);
+        }
         let result = json!({
             "schema": "mmsmith.eval/1",
-            "settings": {
-                "version": env!("CARGO_PKG_VERSION"),
-                "solution": selection.name(),
-                "parameters": selection.parameters(),
-                "fields": selection.evaluation(),
-            },
+            "settings": settings,
             "fields": selection.evaluation(),
             "rows": rows,
         });
@@ -108,12 +116,12 @@ fn judge(file: Source, rows: &[FieldRow]) -> bool {
 
 /// A header and a line for each point: its place and time, then the fields, entries of matrices row by row; numbers in shortest
 /// round-trip form.
-fn csv(points: &[Point], rows: &[FieldRow]) -> String {
+fn csv(axes: &[&str; 3], points: &[Point], rows: &[FieldRow]) -> String {
     let mut text = String::new();
     for (index, (Point { X, t, .. }, row)) in points.iter().zip(rows).enumerate() {
         let fields = row.named();
         if index == 0 {
-            for name in &points::AXES[..X.len().min(points::AXES.len())] {
+            for name in &axes[..X.len().min(axes.len())] {
                 text += &format!("{name},");
             }
             text += "t,";

@@ -6,7 +6,7 @@ mod deformation;
 use anyhow::{Result, bail};
 use mmsmith_expr::{Expr, OperationCount};
 use mmsmith_solutions::CATALOGUE;
-use mmsmith_spec::{Domain, Fields, SolvedCondition, Spec};
+use mmsmith_spec::{Around, Domain, Fields, SolvedCondition, Spec};
 use mmsmith_stage::{BodyForceOperations, Staged};
 use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
 use serde_json::{Value, json};
@@ -257,6 +257,17 @@ fn domain(spec: &Spec) -> String {
         Domain::Box { lower, upper } => format!("box from ({}) to ({})", list(lower), list(upper)),
         Domain::Annulus { inner, outer } => {
             format!("{} <= R <= {}", spec.graph.print(*inner), spec.graph.print(*outer))
+        }
+        Domain::Tube { inner, outer, lower, upper, around } => {
+            let between = |low: Expr, name: &str, high: Expr| {
+                format!("{} <= {name} <= {}", spec.graph.print(low), spec.graph.print(high))
+            };
+            let angles = match around {
+                Around::Axisymmetric => ", turned about the axis Z".to_owned(),
+                Around::Whole => String::new(),
+                Around::Sector { from, to } => format!(", {}", between(*from, "theta", *to)),
+            };
+            format!("{}, {}{angles}", between(*inner, "R", *outer), between(*lower, "Z", *upper))
         }
     }
 }

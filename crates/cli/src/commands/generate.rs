@@ -30,11 +30,11 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
         }
     }
     refuse_what_does_not_fit(options, &spec, &found.file())?;
-    let fields = spec.derive().with_context(|| found.file())?;
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let mut table = None;
     let code = match options.fault {
         None if spec.has_history() && options.target.reads_tables => {
+            let fields = spec.derive().with_context(|| found.file())?;
             let staged = Staged::of(&spec, fields.clone());
             let file = tabulate(options, &spec, &staged).with_context(|| found.file())?;
             if file.error > CLOSE {
@@ -48,9 +48,12 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             table = Some(text);
             code
         }
-        None => Code::of(&spec, fields, origin),
-        Some(fault) => Code::with_fault(&spec, fields, origin, fault)
-            .context("--fault: choose another solution or another fault")?,
+        None => Code::for_host(&spec, origin, options.target).with_context(|| found.file())?,
+        Some(fault) => {
+            let fields = spec.derive().with_context(|| found.file())?;
+            Code::with_fault(&spec, fields, origin, fault)
+                .context("--fault: choose another solution or another fault")?
+        }
     };
     let text = options.target.source(&code)?;
     json::make_folder(&options.out)?;

@@ -135,6 +135,7 @@ impl Settled {
         let grid = match scheme.coordinates {
             Coordinates::Cartesian => "Cartesian",
             Coordinates::Polar => "polar",
+            Coordinates::Cylindrical => "cylindrical",
             Coordinates::Spherical => "spherical",
         };
         let layout = match scheme.layout {
@@ -217,6 +218,7 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
         ("--composition", options.composition.is_some_and(|order| order != Composition::Order2)),
         ("--layout gauss", options.layout == Some(Layout::Gauss)),
         ("--grid polar", options.grid == Some(Coordinates::Polar)),
+        ("--grid cylindrical", options.grid == Some(Coordinates::Cylindrical)),
         ("--grid spherical", options.grid == Some(Coordinates::Spherical)),
     ];
     if let Some((option, _)) = total_only.iter().find(|(_, given)| *given) {
@@ -391,7 +393,9 @@ pub(super) fn words(scheme: &Scheme) -> String {
         }
         Scheme::Total(total) => {
             let part = match total.coordinates {
-                Coordinates::Cartesian | Coordinates::Polar => String::new(),
+                Coordinates::Cartesian | Coordinates::Polar | Coordinates::Cylindrical => {
+                    String::new()
+                }
                 Coordinates::Spherical => {
                     let [from, to] = verify::POLAR_ANGLES.map(f64::to_degrees);
                     format!(" from {from} to {to} degrees off the third axis")

@@ -205,15 +205,32 @@ impl<'a> Planting<'a> {
         let n = self.spec.dimension;
         let Fields { graph, inputs, .. } = &mut *self.fields;
         let radius = match (surface, &self.spec.domain) {
-            (Surface::Inner, Domain::Annulus { inner, .. }) => graph.neg(*inner),
-            (Surface::Outer, Domain::Annulus { outer, .. }) => *outer,
+            (Surface::Inner, Domain::Annulus { inner, .. } | Domain::Tube { inner, .. }) => {
+                graph.neg(*inner)
+            }
+            (Surface::Outer, Domain::Annulus { outer, .. } | Domain::Tube { outer, .. }) => *outer,
             _ => Graph::ONE,
         };
+        // About an axis the normal has no component along it.
+        let round = if matches!(self.spec.domain, Domain::Tube { .. }) { 2 } else { n };
+        let angles = match &self.spec.domain {
+            Domain::Tube { around, .. } => around.angles(),
+            Domain::Box { .. } | Domain::Annulus { .. } => None,
+        };
+        let across = angles.filter(|_| matches!(surface, Surface::FirstAngle | Surface::LastAngle));
+        if let Some([from, to]) = across {
+            let last = surface == Surface::LastAngle;
+            let angle = if last { to } else { from };
+            let (cos, sin) =
+                (graph.call(Function::Cos, &[angle]), graph.call(Function::Sin, &[angle]));
+            let normal = if last { [graph.neg(sin), cos] } else { [sin, graph.neg(cos)] };
+            return [normal[0], normal[1], Graph::ZERO][..n].to_vec();
+        }
         let entry = |i: usize| match surface {
             Surface::Lower(axis) if axis == i => graph.integer(-1),
             Surface::Upper(axis) if axis == i => Graph::ONE,
-            Surface::Lower(_) | Surface::Upper(_) => Graph::ZERO,
-            Surface::Inner | Surface::Outer => graph.div(inputs[i].0, radius),
+            Surface::Inner | Surface::Outer if i < round => graph.div(inputs[i].0, radius),
+            _ => Graph::ZERO,
         };
         (0..n).map(entry).collect()
     }

@@ -2,8 +2,8 @@
 
 use super::Generator;
 use mmsmith_expr::Slot;
-use mmsmith_spec::{Boundary, Condition, Surface};
-use mmsmith_stage::{Measures, Shape};
+use mmsmith_spec::{Around, Boundary, Condition, Surface};
+use mmsmith_stage::{Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::{
     Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Stated,
     WithMemory,
@@ -280,6 +280,24 @@ impl Generator<'_> {
                 let (inner, outer) = (self.constant(*inner), self.constant(*outer));
                 quote!(#runtime::Domain::Annulus { inner: #inner, outer: #outer })
             }
+            Measures::Tube(measures) => {
+                let TubeMeasures { inner, outer, lower, upper, around } =
+                    measures.clone().map(|slot| self.constant(slot));
+                let around = match around {
+                    Around::Axisymmetric => quote!(Axisymmetric),
+                    Around::Whole => quote!(Whole),
+                    Around::Sector { from, to } => quote!(Sector { from: #from, to: #to }),
+                };
+                quote! {
+                    #runtime::Domain::Tube {
+                        inner: #inner,
+                        outer: #outer,
+                        lower: #lower,
+                        upper: #upper,
+                        around: #runtime::Around::#around,
+                    }
+                }
+            }
         }
     }
 }
@@ -314,5 +332,7 @@ fn surface_value(runtime: &TokenStream, surface: Surface) -> TokenStream {
         }
         Surface::Inner => quote!(#runtime::Surface::Inner),
         Surface::Outer => quote!(#runtime::Surface::Outer),
+        Surface::FirstAngle => quote!(#runtime::Surface::FirstAngle),
+        Surface::LastAngle => quote!(#runtime::Surface::LastAngle),
     }
 }

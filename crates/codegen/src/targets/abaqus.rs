@@ -36,6 +36,11 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
             "outer(s)",
             "norm2(X) >= inner(s) - slack .and. norm2(X) <= outer(s) + slack",
         ],
+        Measures::Tube(_) => [
+            "[-outer(s), -outer(s), lower(s)]",
+            "[outer(s), outer(s), upper(s)]",
+            "norm2(X(1:2)) >= inner(s) - slack .and. norm2(X(1:2)) <= outer(s) + slack .and. X(3) >= lower(s) - slack .and. &\n      X(3) <= upper(s) + slack",
+        ],
     };
     let routines = user_subroutines(code, include_str!("abaqus.f90"))
         .replace("CORNER_LOW", low)

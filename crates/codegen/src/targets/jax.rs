@@ -14,6 +14,7 @@ Python with JAX alone, in double precision: call jax.config.update(\"jax_enable_
 rho0_b, static_force, sigma, S and tractions as s.u(X, t), and constants as s.density(). X has the shape (..., dimension); results have the shapes (..., dimension), \
 (..., dimension, dimension) or (...). All of them can be traced, mapped and differentiated: jax.jacfwd(s.u)(X, t) at a point is s.H(X, t).
 JAX's functions differ from the C library's in last bits, and XLA may fuse a product with a sum.",
+    half_plane: "    if X.shape[-1:] == (2,):\n        return [X[..., 0], 0.0, X[..., 1]]\n",
     preamble: "
 import math
 

@@ -14,6 +14,7 @@ Python with NumPy alone. s = Solution(A=0.1) has u, v, a, H, F, J, P, b, rho0_b,
 X has the shape (..., dimension) and t is a number or an array of the shape (...); results have the shapes (..., dimension), (..., dimension, \
 dimension) or (...). Hosts that give points as columns, such as scikit-fem and dolfinx, take lambda x: s.u(x.T, t).T for a table of points.
 NumPy's functions differ from the C library's in last bits.",
+    half_plane: "    if X.shape[-1:] == (2,):\n        return [X[..., 0], 0.0, X[..., 1]]\n",
     preamble: "
 import math
 

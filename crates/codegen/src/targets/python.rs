@@ -17,6 +17,8 @@ pub(crate) struct Python {
     pub(crate) remarks: &'static str,
     /// Imports, and the functions `_position`, `_scalar`, `_vector` and `_matrix`, which shape results.
     pub(crate) preamble: &'static str,
+    /// Statements of `_position` for places that are radius and height.
+    pub(crate) half_plane: &'static str,
     /// The decorator before a function of the runtime.
     pub(crate) decorator: &'static str,
     /// The first statements of the constructor.
@@ -109,7 +111,19 @@ impl Python {
         // A first line without text of the specification: one of the first two lines may name another encoding.
         let mut text = String::from("# -*- coding: utf-8 -*-\n");
         text += &commented(&code.head_for_host(self.remarks), "#", 118);
-        text += self.preamble;
+        // A mesh of the half plane has the radius and the height alone.
+        let (checks, of_half_plane) = (self.preamble.find("    return [X["), self.half_plane);
+        match checks.filter(|_| code.is_of_half_plane) {
+            Some(place) => {
+                let (before, after) = self.preamble.split_at(place);
+                let checks = before.rfind("    if ").unwrap_or(place);
+                text += &before[..checks];
+                text += of_half_plane;
+                text += &before[checks..];
+                text += after;
+            }
+            None => text += self.preamble,
+        }
         text += &self.table_reader(code);
         for routine in code.routines(self) {
             text += &self.routine(&routine);

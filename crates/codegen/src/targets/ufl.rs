@@ -15,6 +15,7 @@ X = ufl.SpatialCoordinate(mesh) on the REFERENCE mesh and t a number or a Consta
 P[i, J] is what inner(P, grad(v)) takes with UFL's grad, whose last index is that of the derivative: no transpose. The form of the body force is \
 inner(s.rho0_b(X, t), v)*dx. Raise the quadrature degree: expressions have an estimated degree that is large.
 UFL has neither rounding to whole numbers nor ln(1 + x): sin(pi x) is formed as it stands, which costs some units in the last place.",
+    half_plane: "    if ufl.as_ufl(X).ufl_shape == (2,):\n        return [X[0], 0.0, X[1]]\n",
     preamble: "
 import math
 

@@ -23,7 +23,8 @@ const ASYMMETRY: f64 = 1e-9;
 pub(super) struct Cells<'a, const D: usize> {
     pub(super) bases: &'a [[Basis; 2]; D],
     pub(super) cells: [usize; D],
-    pub(super) per_cell: usize,
+    /// Points of a cell along each axis.
+    pub(super) per_cell: [usize; D],
     pub(super) at: &'a Quadrature<D>,
     pub(super) numbering: &'a Numbering<D>,
     /// The tangents at the points.
@@ -139,11 +140,11 @@ impl<const D: usize> Cells<'_, D> {
 
     /// The points of a cell, the first axis fastest.
     fn points(&self, cell: &[usize; D]) -> Vec<usize> {
-        let along = [self.per_cell; D];
-        let counts = self.cells.map(|cells| cells * self.per_cell);
+        let along = self.per_cell;
+        let counts: [usize; D] = std::array::from_fn(|k| self.cells[k] * along[k]);
         let place = |n: usize| {
             let at = split(n, &along);
-            let index = std::array::from_fn(|k| cell[k] * self.per_cell + at[k]);
+            let index = std::array::from_fn(|k| cell[k] * along[k] + at[k]);
             joined(&index, &counts)
         };
         (0..along.iter().product()).map(place).collect()
@@ -151,14 +152,14 @@ impl<const D: usize> Cells<'_, D> {
 
     /// The terms of a component's functions in a cell: `[q][term][function]`.
     fn functions(&self, c: usize, cell: &[usize; D], values: &mut Vec<f64>) {
-        let (along_axes, terms) = ([self.per_cell; D], self.terms());
+        let (along_axes, terms) = (self.per_cell, self.terms());
         let skipped = D + 1 - terms;
         let bases: [&Basis; D] = std::array::from_fn(|k| along(self.bases, k, c));
         let widths = bases.map(|basis| basis.width);
         values.clear();
         for q in 0..along_axes.iter().product() {
             let at = split(q, &along_axes);
-            let row = |k: usize, part| bases[k].row(cell[k] * self.per_cell + at[k], part).1;
+            let row = |k: usize, part| bases[k].row(cell[k] * along_axes[k] + at[k], part).1;
             let rows: [[&[f64]; 2]; D] =
                 std::array::from_fn(|k| [row(k, ValueOrSlope::Value), row(k, ValueOrSlope::Slope)]);
             for term in skipped..=D {

@@ -18,7 +18,7 @@ use crate::kernel::copies::{BLOCK, Kinematics};
 /// A law for blocks of particles.
 pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
     /// Sets the stress fluxes of particles with deformation gradients `F` and these internal variables, for the reference volumes in
-    /// `contributions.volume`.
+    /// `contributions.volume`; adds other forces of the stress to `contributions.value`, where there are such.
     fn stress(
         &self,
         c: &Constants<T, D>,
@@ -45,29 +45,32 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
     /// Writes the mean stresses of particles with these deformation gradients and projected changes of volume.
     fn mean_stresses(&self, _F: &[SMatrix<T, D, D>], _theta: &[T], _mean: &mut [T]) {}
 
-    /// Advances the internal variables of no more than a block of particles, whose deformation gradient goes from `start` to `end` in a
-    /// time.
-    fn evolve(
-        &self,
-        _time: T,
-        _start: &[SMatrix<T, D, D>],
-        _end: &[SMatrix<T, D, D>],
-        _internal: &mut [T],
-    ) {
-    }
+    /// Advances the internal variables of no more than a block of particles.
+    fn evolve(&self, _increment: BlockIncrement<'_, T, D>, _internal: &mut [T]) {}
 
     /// [`evolve`](Self::evolve) and [`stress`](Self::stress) at the end, of a whole block.
     fn evolve_to_stress(
         &self,
         c: &Constants<T, D>,
-        start: &[SMatrix<T, D, D>],
-        end: &[SMatrix<T, D, D>; BLOCK],
+        (start, end): (&[SMatrix<T, D, D>], &[SMatrix<T, D, D>; BLOCK]),
+        x: &[SVector<T, D>; BLOCK],
         internal: &mut [T],
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
-        self.evolve(c.time_step, start, end, internal);
+        self.evolve(BlockIncrement { time: c.time_step, start, end, x }, internal);
         self.stress(c, end, internal, contributions);
     }
+}
+
+/// An increment of the deformation of no more than a block of particles.
+pub(crate) struct BlockIncrement<'a, T, const D: usize> {
+    pub(crate) time: T,
+    /// Deformation gradients at the start.
+    pub(crate) start: &'a [SMatrix<T, D, D>],
+    /// Deformation gradients at the end.
+    pub(crate) end: &'a [SMatrix<T, D, D>],
+    /// Positions at the end.
+    pub(crate) x: &'a [SVector<T, D>],
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for L {
@@ -203,13 +206,8 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
         self.law.evaluate_projected(F, theta, &mut scaled, mean);
     }
 
-    fn evolve(
-        &self,
-        time: T,
-        start: &[SMatrix<T, D, D>],
-        end: &[SMatrix<T, D, D>],
-        internal: &mut [T],
-    ) {
+    fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
+        let BlockIncrement { time, start, end, .. } = increment;
         let mut block = BlockWithMemory::at_rest(&self.variables);
         block.evolve(self.law.as_ref(), start, end, time, internal);
     }
@@ -217,8 +215,8 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
     fn evolve_to_stress(
         &self,
         c: &Constants<T, D>,
-        start: &[SMatrix<T, D, D>],
-        end: &[SMatrix<T, D, D>; BLOCK],
+        (start, end): (&[SMatrix<T, D, D>], &[SMatrix<T, D, D>; BLOCK]),
+        _: &[SVector<T, D>; BLOCK],
         internal: &mut [T],
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {

@@ -15,6 +15,7 @@ pub(crate) mod block;
 pub(crate) mod buffers;
 pub(crate) mod copies;
 pub(crate) mod cpdi;
+pub(crate) mod half_plane;
 mod lanes_plane;
 mod lanes_space;
 pub(crate) mod points;

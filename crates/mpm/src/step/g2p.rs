@@ -20,7 +20,7 @@ use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::state::GridState;
 use crate::kernel::any::Interpolated;
-use crate::kernel::block::BlockLaw;
+use crate::kernel::block::{BlockIncrement, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::have_volume_next;
@@ -74,7 +74,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 }
                 let internal = of_internal.next().unwrap_or_default();
                 if !internal.is_empty() {
-                    law.evolve(time, F, F_early, internal);
+                    // Positions follow when forces are known; until then particles are as far as their velocity takes them.
+                    let ahead: Vec<SVector<T, D>> =
+                        x.iter().zip(interpolated).map(|(x, of)| x + of.velocity * time).collect();
+                    let end = &*F_early;
+                    law.evolve(BlockIncrement { time, start: F, end, x: &ahead }, internal);
                 }
             }
             buffers.give_back(grid.buffers);
@@ -272,7 +276,7 @@ impl<T: Lanes, const D: usize> Follow<'_, T, D> {
     /// F at the end of the step, and the internal variables.
     fn stretch(&self, interpolated: &[Interpolated<T, D>], particles: &mut Moving<'_, T, D>) {
         let Self { c, law, late, early } = *self;
-        let Moving { F, internal, .. } = particles;
+        let Moving { x, F, internal, .. } = particles;
         if let Some(early) = early {
             F.copy_from_slice(early.F);
             internal.copy_from_slice(early.internal);
@@ -283,7 +287,7 @@ impl<T: Lanes, const D: usize> Follow<'_, T, D> {
                 *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
             }
             if !internal.is_empty() {
-                law.evolve(late, &start, F, internal);
+                law.evolve(BlockIncrement { time: late, start: &start, end: F, x }, internal);
             }
         }
     }

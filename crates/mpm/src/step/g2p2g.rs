@@ -150,8 +150,8 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             };
             weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
             if let Some(start) = start {
-                let Moving { F, internal, .. } = &mut particles;
-                law.evolve_to_stress(c, &start, whole(F), internal, contributions);
+                let Moving { x, F, internal, .. } = &mut particles;
+                law.evolve_to_stress(c, (&start, whole(F)), whole(x), internal, contributions);
                 has_stress = true;
             }
         }

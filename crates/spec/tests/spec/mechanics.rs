@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Expr, Program};
-use mmsmith_spec::{Domain, Fields, Law, Spec, Surface};
+use mmsmith_spec::{Around, Domain, Fields, Law, Spec, Surface};
 use mmsmith_vocabulary::{Derivation, Material};
 use std::path::{Path, PathBuf};
 
@@ -181,12 +181,31 @@ fn on_surface(spec: &Spec, fields: &mut Fields, surface: Surface, X: &[f64]) -> 
         let length = X.iter().map(|x| x * x).sum::<f64>().sqrt();
         [radius, sign].map(|factor| X.iter().map(|x| factor * x / length).collect())
     };
+    let about_axis = |radius: f64, sign: f64| {
+        let share = radius / X[0].hypot(X[1]);
+        let normal = [X[0], X[1], 0.0].map(|x| sign * share * x / radius);
+        [vec![share * X[0], share * X[1], X[2]], normal.to_vec()]
+    };
     match (surface, &spec.domain) {
         (Surface::Lower(axis), Domain::Box { lower, .. }) => plane(axis, value(lower[axis]), -1.0),
         (Surface::Upper(axis), Domain::Box { upper, .. }) => plane(axis, value(upper[axis]), 1.0),
         (Surface::Lower(axis), Domain::Annulus { .. }) => plane(axis, 0.0, -1.0),
         (Surface::Inner, Domain::Annulus { inner, .. }) => rim(value(*inner), -1.0),
         (Surface::Outer, Domain::Annulus { outer, .. }) => rim(value(*outer), 1.0),
+        (Surface::Inner, Domain::Tube { inner, .. }) => about_axis(value(*inner), -1.0),
+        (Surface::Outer, Domain::Tube { outer, .. }) => about_axis(value(*outer), 1.0),
+        (Surface::Lower(axis), Domain::Tube { lower, .. }) => plane(axis, value(*lower), -1.0),
+        (Surface::Upper(axis), Domain::Tube { upper, .. }) => plane(axis, value(*upper), 1.0),
+        (
+            Surface::FirstAngle | Surface::LastAngle,
+            Domain::Tube { around: Around::Sector { from, to }, .. },
+        ) => {
+            let last = surface == Surface::LastAngle;
+            let (sin, cos) = value(if last { *to } else { *from }).sin_cos();
+            let sign = if last { 1.0 } else { -1.0 };
+            let distance = X[0].hypot(X[1]);
+            [vec![distance * cos, distance * sin, X[2]], vec![-sin * sign, cos * sign, 0.0]]
+        }
         _ => panic!("{surface:?} of {:?}", spec.domain),
     }
 }
@@ -204,6 +223,19 @@ fn places(spec: &Spec, fields: &mut Fields) -> Vec<Vec<f64>> {
                 .iter()
                 .map(|f| {
                     (0..lower.len()).map(|i| lower[i] + f[i] * (upper[i] - lower[i])).collect()
+                })
+                .collect()
+        }
+        Domain::Tube { inner, outer, lower, upper, around } => {
+            let ends = values(&[*inner, *outer, *lower, *upper]);
+            let angles = around.angles().map_or(vec![0.0, 1.5], |angles| values(&angles));
+            let between = |ends: &[f64], share: f64| ends[0] + share * (ends[1] - ends[0]);
+            fractions
+                .iter()
+                .map(|f| {
+                    let (sin, cos) = between(&angles, f[1]).sin_cos();
+                    let radius = between(&ends[..2], f[0]);
+                    vec![radius * cos, radius * sin, between(&ends[2..], f[2])]
                 })
                 .collect()
         }

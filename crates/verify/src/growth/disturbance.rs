@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mmsmith_galerkin::{Coordinates, Grid};
+use mmsmith_galerkin::{Coordinates, End, Grid};
 use mmsmith_runtime::Solution;
 use mmsmith_runtime::nalgebra::SVector;
 
@@ -15,6 +15,13 @@ fn coordinates<const D: usize>(grid: &Grid<D>, X: &SVector<f64, D>) -> SVector<f
             let angle = X[1].atan2(X[0]);
             let angle = if full { angle.rem_euclid(TAU) } else { angle };
             SVector::from_fn(|k, _| if k == 0 { X.norm() } else { angle })
+        }
+        Coordinates::Cylindrical => {
+            let angle = X[1].atan2(X[0]);
+            let turned = angle.rem_euclid(TAU);
+            let [from, to] = [grid.axes[1].lower, grid.axes[1].upper];
+            let angle = if (from..=to).contains(&angle) { angle } else { turned };
+            SVector::from_fn(|k, _| [X[0].hypot(X[1]), angle, X[2]][k])
         }
         Coordinates::Spherical => {
             let (R, across) = (X.norm(), X[0].hypot(X[1]));
@@ -44,6 +51,9 @@ pub(super) fn disturbance<const D: usize>(
         let q = coordinates(grid, place);
         std::array::from_fn(|k| {
             let axis = &grid.axes[k];
+            if axis.ends == [End::Uniform; 2] {
+                return [1.0, 0.0];
+            }
             let length = axis.upper - axis.lower;
             let [value, slope] = wave((q[k] - axis.lower) / length, count);
             [value, slope / length]

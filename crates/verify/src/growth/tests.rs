@@ -23,7 +23,7 @@ where
     let (degree, cells) = (settings.degree.unwrap(), settings.cells.unwrap());
     let settings = GrowthSettings { cells: None, ..settings };
     let (grid, cells) = grid(exact, degree, cells, &settings).unwrap();
-    let law = law::<f64, D>(exact.law()).unwrap();
+    let law = law_of_body::<f64, D>(exact).unwrap();
     let mut places = f64::undisturbed(&grid, degree, law.clone(), exact.density()).unwrap();
     let disturbance = disturbance(exact, &grid, places.positions(), 1);
     let largest = disturbance.iter().map(SVector::norm).fold(0.0, f64::max);

@@ -564,6 +564,7 @@ pub(super) fn outside<const D: usize>(
     let size = match domain {
         Domain::Box { lower, upper } => (upper - lower).amax(),
         Domain::Annulus { outer, .. } => *outer,
+        Domain::Tube { outer, lower, upper, .. } => outer.max(upper - lower),
         _ => return (0, 0.0),
     };
     let shares =

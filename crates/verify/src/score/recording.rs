@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mmsmith_measure::norms::PerNorm;
-use mmsmith_runtime::{Domain, Solution};
+use mmsmith_runtime::{Around, Domain, Solution};
 use mmsmith_vtk::Provenance;
 use mmsmith_vtk::foreign::ArrayHead;
 use nalgebra::SVector;
@@ -314,6 +314,9 @@ fn shift<const D: usize>(exact: &dyn Solution<f64, D>, X: &[SVector<f64, D>]) ->
     let middle = match exact.domain() {
         Domain::Box { lower, upper } => 0.5 * (lower + upper),
         Domain::Annulus { .. } => SVector::zeros(),
+        Domain::Tube { lower, upper, around, .. } if !matches!(around, Around::Sector { .. }) => {
+            SVector::from_fn(|i, _| if i == 2 { 0.5 * (lower + upper) } else { 0.0 })
+        }
         _ => return None,
     };
     let first = X.first()?;

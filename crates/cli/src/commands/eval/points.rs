@@ -29,21 +29,45 @@ pub(super) fn place(file: Source, index: usize) -> String {
     format!("{file}, entry {index} (counted from 0)")
 }
 
-/// The points of a file: JSON where it begins as a list or an object does, else CSV.
-pub(super) fn read(file: Source, selection: &Selection) -> Result<Vec<Point>> {
+/// The columns of coordinates of a body of revolution.
+const OF_HALF_PLANE: [&str; 2] = ["R", "Z"];
+
+/// The points of a file: JSON where it begins as a list or an object does, else CSV. Those of a body of revolution have the coordinates R and
+/// Z, and lie at the angle zero.
+pub(super) fn read(
+    file: Source,
+    selection: &Selection,
+    is_axisymmetric: bool,
+) -> Result<Vec<Point>> {
     // Where nothing moves no time needs to be given.
-    read_with(file, selection.dimension(), selection.is_static().then_some(0.0))
+    let usual_time = selection.is_static().then_some(0.0);
+    if !is_axisymmetric {
+        return read_with(file, &AXES[..selection.dimension()], usual_time);
+    }
+    let mut points = read_with(file, &OF_HALF_PLANE, usual_time)?;
+    for (index, point) in points.iter_mut().enumerate() {
+        match point.X[..] {
+            [R, Z] => point.X = vec![R, 0.0, Z],
+            ref X => bail!(
+                "{}: X has {} numbers; a place of a body of revolution is R and Z, as [0.5, 0.1]",
+                place(file, index),
+                X.len()
+            ),
+        }
+    }
+    Ok(points)
 }
 
 /// Positions in `dimension` dimensions of a file of such points, whose times do not matter and may be left out.
 pub(crate) fn positions(file: Source, dimension: usize) -> Result<Vec<Vec<f64>>> {
-    Ok(read_with(file, dimension, Some(0.0))?.into_iter().map(|point| point.X).collect())
+    let points = read_with(file, &AXES[..dimension], Some(0.0))?;
+    Ok(points.into_iter().map(|point| point.X).collect())
 }
 
-fn read_with(file: Source, dimension: usize, usual_time: Option<f64>) -> Result<Vec<Point>> {
+fn read_with(file: Source, names: &[&str], usual_time: Option<f64>) -> Result<Vec<Point>> {
     let text = file.short_text(LONGEST)?;
     if !text.trim_start().starts_with(['[', '{']) {
-        return of_csv(&text, dimension, usual_time).with_context(|| file.to_string());
+        return of_csv(&text, names, usual_time).with_context(|| file.to_string());
     }
     let value: Value =
         serde_json::from_str(&text).with_context(|| format!("{file} is not valid JSON"))?;
@@ -56,10 +80,10 @@ fn read_with(file: Source, dimension: usize, usual_time: Option<f64>) -> Result<
 }
 
 /// The rows of a table with columns for the coordinates and the time; letter case does not matter.
-fn of_csv(text: &str, n: usize, usual_time: Option<f64>) -> Result<Vec<Point>> {
+fn of_csv(text: &str, names: &[&str], usual_time: Option<f64>) -> Result<Vec<Point>> {
     let mut reader = ReaderBuilder::new().trim(Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().context("it has no line of column names")?.clone();
-    let form = format!("{},t", AXES[..n].join(","));
+    let form = format!("{},t", names.join(","));
     let column = |name: &str| {
         header.iter().position(|own| own.eq_ignore_ascii_case(name)).with_context(|| {
             let names: Vec<&str> = header.iter().collect();
@@ -69,7 +93,7 @@ fn of_csv(text: &str, n: usize, usual_time: Option<f64>) -> Result<Vec<Point>> {
             )
         })
     };
-    let axes = AXES[..n].iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
+    let axes = names.iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
     let time = match (column("t"), usual_time) {
         (Err(_), Some(_)) => None,
         (found, _) => Some(found?),
