@@ -79,6 +79,42 @@ impl Code<'_> {
         self.staged.program().part(slots).evaluate(&inputs)
     }
 
+    /// The stretch across in words.
+    fn about_across(&self) -> &'static str {
+        match self.spec.dimension {
+            1 => {
+                "stretch across the line, the same in both directions: there is no stress along them"
+            }
+            _ => {
+                "stretch across the plane, by which the thickness changes: there is no stress along it"
+            }
+        }
+    }
+
+    /// The ratio of volumes, in the names of fields.
+    pub(crate) fn volume_ratio(&self) -> &'static str {
+        match (self.staged.across, self.spec.dimension) {
+            (None, _) => "J",
+            (Some(_), 1) => "(J F_zz^2)",
+            (Some(_), _) => "(J F_zz)",
+        }
+    }
+
+    /// A sentence on the directions left out.
+    fn assumption(&self) -> &'static str {
+        match (self.staged.across, self.spec.dimension) {
+            (None, _) => "In two dimensions the deformation is plane strain.",
+            (Some(_), 1) => {
+                "There is no stress across the line (uniaxial stress): P, b and tractions are per unit of area before the deformation, J is \
+                 the stretch along the line, and the stretch across is F_zz."
+            }
+            (Some(_), _) => {
+                "There is no stress across the plane (plane stress): P, b and tractions are per unit of thickness before the deformation, J \
+                 is the ratio of areas, and the thickness changes by F_zz."
+            }
+        }
+    }
+
     /// Fields, strain energy, tractions and constants, in the order of files.
     pub(crate) fn functions(&self) -> Vec<Item> {
         let staged = &self.staged;
@@ -104,6 +140,9 @@ impl Code<'_> {
             let about = "strain energy per reference volume";
             at_points("W".into(), about.into(), Shape::Scalar, vec![energy])
         });
+        let across = staged.across.map(|stretch| {
+            at_points("F_zz".into(), self.about_across().into(), Shape::Scalar, vec![stretch])
+        });
         let tractions = staged.tractions.iter().map(|traction| {
             let surface = surface_name(traction.surface);
             let about = format!("traction on the surface {surface}, force per reference area");
@@ -121,7 +160,7 @@ impl Code<'_> {
         };
         let corner =
             |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
-        let mut all: Vec<Item> = fields.chain(energy).chain(tractions).collect();
+        let mut all: Vec<Item> = fields.chain(energy).chain(across).chain(tractions).collect();
         all.extend(self.tabulated_items());
         all.extend([
             constant(
@@ -226,15 +265,17 @@ impl Code<'_> {
         };
         lines.extend(
             format!("
-force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/J. The balance \
+force: b is per unit MASS; rho0_b = density b is per unit REFERENCE volume; per unit current volume it is rho0_b/VOLUME. The balance \
 is rho0 a = Div P + rho0 b, so that it stands on the side of the stresses, with a plus sign.
 {coordinates}
 stress: P is the first Piola-Kirchhoff stress, P[i][J] with i spatial and J reference, and the traction P N is per reference area. The nominal \
-stress is P transposed; the Cauchy stress is P F^T/J.
+stress is P transposed; the Cauchy stress is P F^T/VOLUME.
 time: t is the time of the state whose accelerations the force causes: the old time of an explicit step with centred differences, the new \
 time of an implicit step, and for generalised-alpha schemes the time at which they balance momentum. A static problem has the deformation of a time t that stays, with the force -Div P = rho0 (b - a), static_force; a load \
 factor is that time.
-In two dimensions the deformation is plane strain. Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2.")
+ASSUMED Units are those of the parameters; with SI units: u, X in m, P in Pa, b in m/s^2.")
+                .replace("VOLUME", self.volume_ratio())
+                .replace("ASSUMED", self.assumption())
                 .lines()
                 .map(str::to_owned),
         );

@@ -320,6 +320,7 @@ fn laws_of_text_have_second_order() {
             ("soft".into(), "theta/(20 + Y)".into()),
         ],
         internal,
+        across: None,
     };
     let energy = "soft*(1 - q/3 - r)*mu/2*(I1 - 3 - 2*ln(J)) + lambda/2*ln(J)^2";
     let by_energy = stated(

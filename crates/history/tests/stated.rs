@@ -27,6 +27,7 @@ fn stated(response: Response, constants: &[&str], given: &[[&str; 2]]) -> Stated
         constants: constants.iter().map(|&name| (name.to_owned(), ())).collect(),
         given: given.iter().map(|[name, text]| (name.to_string(), text.to_string())).collect(),
         internal: Vec::new(),
+        across: None,
     }
 }
 

@@ -174,6 +174,7 @@ struct Interpreted<T: Interpretable, const D: usize> {
     first_piola_kirchhoff: Program,
     body_force: Program,
     strain_energy: Option<Program>,
+    stretch_across: Option<Program>,
     tractions: Vec<(Surface, Program)>,
     body_force_stages: PointStages<1>,
     /// The body force at the points of a lattice, where that has a form of its own.
@@ -258,6 +259,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             first_piola_kirchhoff: field(FieldName::FirstPiolaKirchhoff),
             body_force: field(FieldName::BodyForce),
             strain_energy: staged.energy.map(|energy| part(&[energy])),
+            stretch_across: staged.across.map(|stretch| part(&[stretch])),
             tractions: staged
                 .tractions
                 .iter()
@@ -460,6 +462,13 @@ impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {
     fn strain_energy(&self, X: &SVector<T, D>, t: T) -> Option<T> {
         let energy = self.strain_energy.as_ref()?;
         energy.evaluate_in(&inputs(X.as_slice(), t, &self.parameters)).first().copied()
+    }
+
+    fn stretch_across(&self, X: &SVector<T, D>, t: T) -> T {
+        let stretch = self.stretch_across.as_ref().map(|stretch| {
+            stretch.evaluate_in(&inputs(X.as_slice(), t, &self.parameters)).first().copied()
+        });
+        stretch.flatten().unwrap_or_else(T::one)
     }
 
     fn domain(&self) -> Domain<T, D> {

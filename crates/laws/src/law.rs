@@ -13,7 +13,8 @@ use super::{BLOCK, SIDE_BY_SIDE, Stressed, jacobian};
 /// The stress of a law that the caller brings, for particles in blocks.
 ///
 /// A law is a function of the deformation gradient alone, with P = 0 where F = I. To keep the digits of small strains, form
-/// stresses from `F - I`. In 2D the deformation is plane strain (`F_zz = 1`), in 1D uniaxial strain.
+/// stresses from `F - I`. In 2D the deformation is plane strain (`F_zz = 1`), in 1D uniaxial strain, unless the law tells another
+/// [stretch across](Self::stretch_across).
 /// [`Law::check`](Law::check) compares an implementation with itself: energy, objectivity, symmetry.
 pub trait ConstitutiveLaw<T, const D: usize>: fmt::Debug + Send + Sync {
     /// First Piola-Kirchhoff stresses of particles side by side: `F[i][J][n]` is `F_iJ` of particle `n`, and so it is with the
@@ -38,8 +39,13 @@ pub trait ConstitutiveLaw<T, const D: usize>: fmt::Debug + Send + Sync {
         None
     }
 
-    /// The normal Kirchhoff stress along the axes that F leaves out, where the stretch is one; `None` where it is not known.
+    /// The normal Kirchhoff stress along the axes that F leaves out; `None` where it is not known.
     fn kirchhoff_across(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
+        None
+    }
+
+    /// The stretch along the axes that F leaves out; `None` where nothing stretches along them.
+    fn stretch_across(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
         None
     }
 }
@@ -164,7 +170,7 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
     /// Von Mises stress of the symmetric part of the Cauchy stress, with the normal stresses that act out of the plane
     /// in 2D and across the axis in 1D; without these where the law does not tell them.
     pub fn von_mises(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        let sigma = self.kirchhoff_in_space(F)? / jacobian(F)?;
+        let sigma = self.cauchy_in_space(F)?;
         let mut sum = T::zero();
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let difference = sigma[(i, i)] - sigma[(j, j)];
@@ -191,7 +197,16 @@ impl<T: Stressed<D>, const D: usize> Law<T, D> {
 
     /// Cauchy stress in three dimensions, see [`kirchhoff_in_space`](Self::kirchhoff_in_space).
     pub fn cauchy_in_space(&self, F: &SMatrix<T, D, D>) -> Option<Matrix3<T>> {
-        Some(self.kirchhoff_in_space(F)? / jacobian(F)?)
+        let mut volume = jacobian(F)?;
+        for _ in D..3 {
+            volume *= self.stretch_across(F);
+        }
+        Some(self.kirchhoff_in_space(F)? / volume)
+    }
+
+    /// The stretch along the axes that F leaves out: one in plane and uniaxial strain.
+    pub fn stretch_across(&self, F: &SMatrix<T, D, D>) -> T {
+        self.of_caller(|law| law.stretch_across(F)).flatten().unwrap_or_else(T::one)
     }
 
     /// Strain energy per reference volume; zero where F is the identity, and `None` where it is no deformation or the law tells no

@@ -31,8 +31,8 @@ pub use libm;
 /// The functions that [`Real`] has beyond those of a field.
 pub use mmsmith_scalar_functions::ScalarFunctions;
 pub use mmsmith_vocabulary::{
-    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Smoothness,
-    Stated, Volumetric, WithMemory,
+    Across, Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response,
+    Smoothness, Stated, Volumetric, WithMemory,
 };
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;

@@ -80,6 +80,11 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn strain_energy(&self, _X: &SVector<T, D>, _t: T) -> Option<T> {
         None
     }
+    /// The stretch along the directions that the dimension leaves out: one, unless the specification assumes that there is no stress along
+    /// them, plane stress or uniaxial stress.
+    fn stretch_across(&self, _X: &SVector<T, D>, _t: T) -> T {
+        T::one()
+    }
     /// Traction `P N` at a point `X` of a surface, force per reference area, `N` the outward reference normal; `None`
     /// where the body has no such surface.
     ///

@@ -48,6 +48,8 @@ pub struct Fields {
     pub history: Option<HistoryFields>,
     /// Strain energy per reference volume, where the material is given by one.
     pub W: Option<Expr>,
+    /// The stretch along the directions left out, where there is no stress along them; elsewhere it is one.
+    pub across: Option<Expr>,
     /// Tractions and the claims of boundary conditions, for every surface of the body.
     pub surfaces: Vec<SurfaceFields>,
 }
@@ -117,6 +119,7 @@ impl Fields {
             return Self::derive_motion(spec, derivation, [u, v, a], H, deformation.J);
         }
         let stress = law::stress(&mut derivation, &deformation, spec)?;
+        let across = law::stretch_across(&mut derivation, &deformation, spec);
         let b = body_force(&mut derivation, &a, &stress, spec.density);
 
         if derivation.graph.is_overgrown() {
@@ -138,6 +141,7 @@ impl Fields {
             }
         }
         let W = stress.energy.map(|W| geometry.without_angles(&mut graph, W));
+        let across = across.map(|stretch| geometry.without_angles(&mut graph, stretch));
         let J = geometry.without_angles(&mut graph, deformation.J);
         let mut F = H.clone();
         for i in 0..n {
@@ -150,8 +154,23 @@ impl Fields {
         let inputs = inputs(spec, &mut graph, &geometry, time);
         let definitions = geometry.definitions;
         let history = None;
-        let mut fields =
-            Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, history, W, surfaces };
+        let mut fields = Fields {
+            graph,
+            inputs,
+            definitions,
+            u,
+            v,
+            a,
+            H,
+            F,
+            J,
+            P,
+            b,
+            history,
+            W,
+            across,
+            surfaces,
+        };
         if let Some(rotation) = &spec.rotation {
             rotation.apply(&mut fields, &geometry.cartesian, time);
         }
@@ -203,9 +222,24 @@ impl Fields {
         let definitions = geometry.definitions;
         let (P, b, surfaces) = (Matrix::new(), Vector::new(), Vec::new());
         let history = Some(history);
-        let W = None;
-        let fields =
-            Fields { graph, inputs, definitions, u, v, a, H, F, J, P, b, history, W, surfaces };
+        let (W, across) = (None, None);
+        let fields = Fields {
+            graph,
+            inputs,
+            definitions,
+            u,
+            v,
+            a,
+            H,
+            F,
+            J,
+            P,
+            b,
+            history,
+            W,
+            across,
+            surfaces,
+        };
         fields.check()?;
         Ok(fields)
     }

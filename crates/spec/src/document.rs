@@ -1,5 +1,7 @@
 //! The TOML document as it stands: tables, keys and strings with their places, no meaning yet.
 
+mod prestress;
+
 use crate::Diagnostic;
 use crate::source::Source;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -7,6 +9,8 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Range;
 use toml::Spanned;
+
+pub(crate) use prestress::PrestressEntry;
 
 #[derive(serde::Deserialize)]
 #[serde(
@@ -135,6 +139,8 @@ pub(crate) struct MaterialTable {
     /// Constants of laws of the library.
     pub(crate) constants: Entries<Text>,
     pub(crate) volumetric: Option<Spanned<String>>,
+    pub(crate) assumption: Option<Spanned<String>>,
+    pub(crate) prestress: Option<Spanned<PrestressEntry>>,
     pub(crate) W: Option<Text>,
     pub(crate) P: Option<Entries<Text>>,
     pub(crate) density: Option<Text>,
@@ -585,11 +591,14 @@ impl<'de> Deserialize<'de> for MaterialTable {
                 let mut law = None;
                 let mut constants = Entries::default();
                 let (mut volumetric, mut W, mut P, mut density) = (None, None, None, None);
+                let (mut assumption, mut prestress) = (None, None);
                 let (mut flow, mut maxwell) = (None, List::default());
                 while let Some(key) = map.next_key::<Spanned<String>>()? {
                     match key.get_ref().as_str() {
                         "law" => law = Some(map.next_value()?),
                         "volumetric" => volumetric = Some(map.next_value()?),
+                        "assumption" => assumption = Some(map.next_value()?),
+                        "prestress" => prestress = Some(map.next_value()?),
                         "W" => W = Some(map.next_value()?),
                         "P" => P = Some(map.next_value()?),
                         "density" => density = Some(map.next_value()?),
@@ -600,7 +609,18 @@ impl<'de> Deserialize<'de> for MaterialTable {
                 }
                 constants.0.sort_by_key(|(key, _)| key.span().start);
                 let law = law.ok_or_else(|| serde::de::Error::missing_field("law"))?;
-                Ok(MaterialTable { law, constants, volumetric, W, P, density, flow, maxwell })
+                Ok(MaterialTable {
+                    law,
+                    constants,
+                    volumetric,
+                    assumption,
+                    prestress,
+                    W,
+                    P,
+                    density,
+                    flow,
+                    maxwell,
+                })
             }
         }
         deserializer.deserialize_map(MaterialVisitor)

@@ -5,6 +5,7 @@ mod invariants;
 mod isochoric;
 mod kinematics;
 mod neo_hookean;
+pub(crate) mod prestress;
 mod principal_stretches;
 mod st_venant_kirchhoff;
 mod turn;
@@ -278,8 +279,33 @@ fn dilation(
     vec![graph.whole(product)]
 }
 
-/// The stress of a law at a deformation.
+/// The stress of a law at a deformation, with that of the undeformed body.
 pub(crate) fn stress(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    spec: &Spec,
+) -> Result<Stress, DeriveError> {
+    let stress = stress_of_law(derivation, deformation, spec)?;
+    let Some(S) = &spec.prestress else { return Ok(stress) };
+    let at_start = prestress::stress(derivation, deformation, S);
+    Ok(stress.plus(&mut derivation.graph, at_start))
+}
+
+/// The stretch along the directions left out, where there is no stress along them.
+pub(crate) fn stretch_across(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    spec: &Spec,
+) -> Option<Expr> {
+    let variation = spec.variation.as_ref()?;
+    let stretch = &variation.across.as_ref()?.stretch;
+    let graph = &mut derivation.graph;
+    let stretch = energy::named(graph, stretch, &variation.constants);
+    Some(energy::at_deformation(graph, deformation, stretch))
+}
+
+/// The stress of a law at a deformation.
+fn stress_of_law(
     derivation: &mut Derivation,
     deformation: &Deformation,
     spec: &Spec,
@@ -434,6 +460,20 @@ fn places_in(derivation: &mut Derivation, law: &Law) -> BTreeMap<Expr, Expr> {
 /// The energy of an isochoric law without its volumetric part, in `J` and `I1`.
 fn in_invariants(W: &str, others: &str) -> String {
     format!("{} + {others}", W.replace(energy::EXCESS, "(J^(-2/3)*I1 - 3)"))
+}
+
+/// The energy in space of a law that keeps its form without stress across, in components of a deformation that has no shear across
+/// the `dimension` directions.
+pub(crate) fn energy_in_space_without_shear_across(
+    material: &Material<Expr>,
+    dimension: usize,
+) -> String {
+    match material.derivation() {
+        Formulas::PrincipalStretches(parts) => {
+            principal_stretches::energy_across(dimension, &parts)
+        }
+        _ => energy_text(material, 3),
+    }
 }
 
 /// The energy of a law with directions in `J`, `I1`, components and its constants, as a specification would state it.

@@ -27,6 +27,7 @@ mod spec;
 mod surface;
 mod tensor;
 mod tube;
+mod variation;
 
 pub use coordinates::Coordinates;
 pub use cross_check::{CrossCheck, InlineText, ListingText};
@@ -41,3 +42,4 @@ pub use spec::{
     Surface,
 };
 pub use surface::{Claim, ClaimKind, SurfaceFields};
+pub use variation::Variation;

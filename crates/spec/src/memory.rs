@@ -2,6 +2,7 @@
 
 use crate::document::{Document, FlowTable, Text};
 use crate::law::energy::rate_names;
+use crate::law::prestress;
 use crate::spec::{Law, Reader};
 use crate::{Diagnostic, Spec};
 use mmsmith_expr::{Derivatives, Expr, Graph, Node, Rational};
@@ -298,11 +299,32 @@ fn hardening(graph: &mut Graph, expr: Expr, alpha: Expr) -> Option<[Expr; 3]> {
 }
 
 impl Spec {
+    /// The name of the law that specifications use.
+    #[must_use]
+    pub fn law_name(&self) -> &'static str {
+        self.variation.as_ref().map_or_else(|| self.material.name(), |variation| variation.law)
+    }
+
     /// The law, what it remembers, and the fields that it uses, in lines for people.
     #[must_use]
     pub fn law_formulas(&self) -> Vec<String> {
         let print = |expr: Expr| self.graph.print(expr);
-        let mut lines = self.material.formulas(&self.graph);
+        let mut lines = match &self.variation {
+            Some(variation) => variation.formulas(&self.graph),
+            None => self.material.formulas(&self.graph),
+        };
+        if let Some(S) = &self.prestress {
+            let constants = prestress::constants(S).into_iter();
+            let entries: Vec<String> = constants
+                .map(|(name, value)| {
+                    format!("{} = {}", name.replace("prestress_", "S"), print(value))
+                })
+                .collect();
+            lines.push(format!(
+                "stress at the start: P = F S + P of the law, W = S : E + W of the law; {}",
+                entries.join(", ")
+            ));
+        }
         match &self.memory {
             None => {}
             Some(Memory::Flow(flow)) => {

@@ -2,7 +2,9 @@
 
 use crate::law::energy::{INVARIANTS, component_names, rate_names};
 use crate::law::energy_text;
-use crate::{Around, Coordinates, Domain, Law, Spec};
+use crate::law::prestress;
+use crate::tensor::Matrix;
+use crate::{Around, Coordinates, Domain, Law, Spec, Variation};
 use mmsmith_expr::{Expr, Graph};
 use mmsmith_vocabulary::{Components, Internal, Law as ForSolver, Response, Stated, WithMemory};
 
@@ -11,10 +13,71 @@ impl Spec {
     /// Cartesian.
     #[must_use]
     pub fn law_for_solver(&self) -> ForSolver<Expr> {
-        match self.law_in_own_coordinates() {
+        let law = match &self.variation {
+            Some(variation) => self.varied(variation),
+            None => self.law_in_own_coordinates(),
+        };
+        let law = match &self.prestress {
+            Some(prestress) => self.with_prestress(law, prestress),
+            None => law,
+        };
+        match law {
             ForSolver::Stated(stated) => ForSolver::Stated(self.with_places_given(stated)),
             law => law,
         }
+    }
+
+    /// The law that a specification makes of one of the library.
+    fn varied(&self, variation: &Variation) -> ForSolver<Expr> {
+        let constants = variation.constants.iter();
+        let own = Stated {
+            response: Response::Energy(variation.energy.clone()),
+            components: Components::Cartesian,
+            constants: constants.map(|(row, value)| (row.name.to_owned(), *value)).collect(),
+            given: Vec::new(),
+            internal: Vec::new(),
+            across: variation.across.clone(),
+        };
+        if !self.has_fields_in(variation) {
+            return ForSolver::Stated(own);
+        }
+        self.law_in_own_coordinates()
+    }
+
+    fn has_fields_in(&self, variation: &Variation) -> bool {
+        variation.constants.iter().any(|(_, value)| self.is_field(*value))
+    }
+
+    /// A law with the energy `S : E` of a stress at the start.
+    fn with_prestress(&self, law: ForSolver<Expr>, S: &Matrix) -> ForSolver<Expr> {
+        let mut stated = match law {
+            ForSolver::Stated(stated) => stated,
+            ForSolver::Library(material) => Stated {
+                response: Response::Energy(energy_text(&material, self.dimension)),
+                components: Components::Cartesian,
+                constants: self
+                    .material
+                    .constants()
+                    .into_iter()
+                    .map(|(row, value)| (row.name.to_owned(), value))
+                    .collect(),
+                given: Vec::new(),
+                internal: Vec::new(),
+                across: None,
+            },
+            law @ ForSolver::WithMemory(_) => return law,
+        };
+        if let Response::Energy(text) = &mut stated.response {
+            *text += &prestress::energy(S);
+        }
+        if let Some(across) = &mut stated.across {
+            across.in_space += &prestress::energy(S);
+        }
+        stated.constants.extend(prestress::constants(S));
+        if self.coordinates != Coordinates::Cartesian {
+            stated.components = Components::Curvilinear;
+        }
+        ForSolver::Stated(stated)
     }
 
     /// A law whose text names positions and the time in given fields alone, in Cartesian coordinates.
@@ -105,6 +168,7 @@ impl Spec {
                             .collect(),
                         given,
                         internal: Vec::new(),
+                        across: None,
                     });
                 }
                 let constants: Vec<(String, Expr)> =
@@ -125,6 +189,7 @@ impl Spec {
                     constants: self.parameters_in(&of_constants, given_names),
                     given,
                     internal: Vec::new(),
+                    across: None,
                 });
             }
             Law::Energy { W } => (Response::Energy(print(*W)), vec![*W], false),
@@ -162,7 +227,7 @@ impl Spec {
         let own =
             own.chain(names.iter().map(String::as_str)).chain(rates.iter().map(String::as_str));
         let constants = self.parameters_in(&of_response, own.chain(INVARIANTS));
-        ForSolver::Stated(Stated { response, components, constants, given, internal })
+        ForSolver::Stated(Stated { response, components, constants, given, internal, across: None })
     }
 
     /// The parameters in expressions, which may also use coordinates, the time, and the names in `others`.
@@ -247,7 +312,7 @@ fn with_suffix(text: &str, names: &[String], suffix: &str) -> String {
 }
 
 /// A text with other words in the place of some.
-fn replaced(text: &str, mut by: impl FnMut(&str) -> Option<String>) -> String {
+pub(crate) fn replaced(text: &str, mut by: impl FnMut(&str) -> Option<String>) -> String {
     let mut changed = String::new();
     let mut word = String::new();
     for c in text.chars().chain([' ']) {

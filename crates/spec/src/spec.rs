@@ -15,7 +15,7 @@ use crate::scope::Scope;
 use crate::source::Source;
 use crate::{
     Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Given, InternalVariable, Rotation,
-    Solved,
+    Solved, Variation,
 };
 use mmsmith_expr::{Expr, Function, Graph, Node, Program, RangeOfInputs, Rational};
 use mmsmith_vocabulary::{Constant, Material, Memory, Moduli, Row, Term, UnknownLaw, Volumetric};
@@ -48,6 +48,10 @@ pub struct Spec {
     pub displacement: Vec<Expr>,
     /// The constitutive law; the elastic part of one with [`memory`](Self::memory).
     pub material: Law,
+    /// Changes of the specification to a law of the library; [`material`](Self::material) is what comes of them.
+    pub variation: Option<Variation>,
+    /// The second Piola-Kirchhoff stress of the undeformed body, along the coordinates' own unit vectors.
+    pub prestress: Option<Vec<Vec<Expr>>>,
     /// Fields of position and time that the law uses.
     pub given: Vec<Given>,
     /// The memory of a law of the library.
@@ -204,7 +208,8 @@ impl Kind {
     fn keys(self) -> Vec<&'static str> {
         match self {
             Kind::Library(row) => {
-                let volumetric = row.chooses_volumetric.then_some("volumetric");
+                let chooses = row.chooses_volumetric || row.name == "neo-hookean";
+                let volumetric = chooses.then_some("volumetric");
                 row.constants.iter().map(|constant| constant.name).chain(volumetric).collect()
             }
             Kind::Energy => vec!["W"],
@@ -634,7 +639,12 @@ impl<'a> Reader<'a> {
         let requirements = self.requirements(document, &parameters)?;
         let displacement = self.displacement(document)?;
         let given = self.given(document)?;
-        let material = self.material(document)?;
+        let in_space = self.material(document)?;
+        let (material, variation) = match self.variation(document, &in_space)? {
+            Some((law, variation)) => (law, Some(variation)),
+            None => (in_space.clone(), None),
+        };
+        let prestress = self.prestress(document, &material)?;
         let memory = self.memory(document, &material)?;
         let internal = self.internal(document, &material)?;
         let table = document.material.span();
@@ -670,7 +680,7 @@ impl<'a> Reader<'a> {
             .collect::<Result<Vec<_>, _>>()?;
         let wave_speed = match document.wave_speed() {
             Some(text) => self.scope.constant(text, "wave-speed")?,
-            None => self.bar_speed(&material, density, document.time_span())?,
+            None => self.bar_speed(&in_space, density, document.time_span())?,
         };
         let period = match document.period() {
             Some(text) => self.scope.constant(text, "period")?,
@@ -695,6 +705,8 @@ impl<'a> Reader<'a> {
             graph: std::mem::take(&mut self.scope.graph),
             displacement,
             material,
+            variation,
+            prestress,
             given,
             memory,
             internal,
@@ -891,11 +903,15 @@ impl<'a> Reader<'a> {
             if !keys.contains(&key) && !moduli.contains(&key) {
                 let message = format!("the law '{law}' has no '{key}'");
                 let mut help = format!("it takes {}", keys.join(", "));
-                if let Some(usual) = usual_modulus(key, &keys) {
+                let value = table.constants.get(key).map_or("", |text| text.value.as_str());
+                if let Some(line) = self.meant_assumption(key, value) {
+                    help = line;
+                } else if let Some(usual) = usual_modulus(key, &keys) {
                     help = format!("{usual}; {help}");
-                } else if let Some(near) =
-                    nearest(key, keys.iter().copied().chain(["law", "density"]))
-                {
+                } else if let Some(near) = nearest(
+                    key,
+                    keys.iter().copied().chain(["law", "density", "assumption", "prestress"]),
+                ) {
                     help = format!("did you mean '{near}'? {help}");
                 }
                 return Err(self.scope.source.error(message, span, Some(help)));

@@ -33,6 +33,8 @@ pub struct Staged {
     pub density_here: Option<Slot>,
     /// The strain energy, where the material is given by one.
     pub energy: Option<Slot>,
+    /// The stretch along the directions left out, where there is no stress along them.
+    pub across: Option<Slot>,
     /// The traction on each surface.
     pub tractions: Vec<Traction>,
     /// The two sides of each requirement of the specification.
@@ -237,6 +239,7 @@ impl Staged {
         let density_here = (density != spec.density).then(|| outputs.add_one(spec.density));
         let constants = ConstantOutputs::new(spec, density, &mut outputs);
         let energy = fields.W.map(|energy| outputs.add_one(energy));
+        let across = fields.across.map(|stretch| outputs.add_one(stretch));
         let requirements: Vec<(Single, Single)> = spec
             .requirements
             .iter()
@@ -283,6 +286,7 @@ impl Staged {
             constants: constants.slots(&program),
             density_here: density_here.map(|density| density.slot(&program)),
             energy: energy.map(|energy| energy.slot(&program)),
+            across: across.map(|stretch| stretch.slot(&program)),
             requirements: requirements
                 .into_iter()
                 .map(|(left, right)| Sides {

@@ -13,6 +13,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::across::Across;
 use crate::case::law_of_body;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
@@ -285,6 +286,7 @@ where
     let samples: Vec<_> =
         (0..count).filter_map(|n| points::interior(&domain, solution.period(), n)).collect();
     let mut findings = field_findings(solution, law.as_ref(), &samples, size);
+    findings.extend(across_findings(solution, &samples));
     let places = |surface: Surface| -> Vec<_> {
         let place = |n| {
             let (X, N) = points::surface(&domain, surface, n)?;
@@ -542,6 +544,33 @@ where
         .filter(|comparison| !comparison.points.is_empty())
         .map(Comparison::finding)
         .collect()
+}
+
+/// Where there is no stress across: the law in space, at the stretch that is told, has none there, and in the plane the stress of the
+/// solution. The formulas of the plane have no part in it.
+fn across_findings<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    samples: &[(SVector<f64, D>, f64)],
+) -> Vec<Finding> {
+    let Some(law) = Across::<D>::of(solution.law()) else { return Vec::new() };
+    let mut across = Comparison::new("F_zz", "P_zz = 0, law in space");
+    let mut along = Comparison::new("P", "law in space at F_zz");
+    let stiffness = law.stiffness();
+    for (X, t) in samples {
+        let at = (X, *t);
+        let (F, P) = (solution.deformation_gradient(X, *t), solution.first_piola_kirchhoff(X, *t));
+        let stretch = solution.stretch_across(X, *t);
+        let expected = law.stress(&F, stretch);
+        let difference = P - expected.fixed_view::<D, D>(0, 0);
+        let H = F - SMatrix::identity();
+        let scale = P.amax().max(stiffness * H.amax());
+        let inverse = (F.norm().powi(D as i32 - 1) / determinant(&F).abs()).max(1.0 / stretch);
+        let rounding = f64::EPSILON * stiffness * (F.norm() + inverse) * inverse.max(1.0);
+        across.add(at, expected[(2, 2)].abs(), rounding, scale);
+        along.add(at, difference.amax(), rounding, scale);
+    }
+    let findings = [Some(across), law.is_cartesian.then_some(along)];
+    findings.into_iter().flatten().map(Comparison::finding).collect()
 }
 
 /// The stress of the solver's law. That of linear elasticity takes no determinant, and a displacement that is no motion of a body

@@ -1,5 +1,6 @@
 //! The exact fields at one point, in a form that can be written.
 
+use crate::across::has_stretch_across;
 use crate::dimension::in_dimension;
 use crate::points::outside;
 use mmsmith_runtime::{AnySolution, Fields, Solution};
@@ -23,6 +24,10 @@ pub struct FieldRow {
     pub F: Vec<Vec<f64>>,
     /// `det F`.
     pub J: f64,
+    /// The stretch across the plane, or the line, in plane or uniaxial stress. Written where the solution assumes that there is no stress
+    /// across.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub F_zz: Option<f64>,
     /// First Piola-Kirchhoff stress `P[i][J]`.
     pub P: Vec<Vec<f64>>,
     /// Body force per unit mass.
@@ -65,6 +70,7 @@ impl FieldRow {
             named("P", matrix(&self.P)),
             named("b", vector(&self.b)),
         ];
+        all.extend(self.F_zz.map(|F_zz| named("F_zz", (Vec::new(), vec![F_zz]))));
         let internal = self.internal.iter();
         all.extend(internal.map(|(name, value)| (name.as_str(), Vec::new(), vec![*value])));
         all
@@ -100,6 +106,7 @@ fn evaluate_in<const D: usize>(
         X.try_into().map_err(|_| WrongLength { given: X.len(), dimension: D })?;
     let X = SVector::from(position);
     let Fields { u, v, a, H, F, J, P, b } = solution.fields(&X, t);
+    let F_zz = has_stretch_across(&solution.law()).then(|| solution.stretch_across(&X, t));
     let names = solution.internal_variables();
     let values = if names.is_empty() { Vec::new() } else { solution.internal(&X, t) };
     let mut row = FieldRow {
@@ -110,6 +117,7 @@ fn evaluate_in<const D: usize>(
         H: rows(&H),
         F: rows(&F),
         J,
+        F_zz,
         P: rows(&P),
         b: list(&b),
         outside: outside(&solution.domain(), &X).is_some_and(|share| share > OUTSIDE),

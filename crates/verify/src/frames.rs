@@ -213,7 +213,9 @@ fn frame<T: Precision<D>, const D: usize>(
         points.push(padded(&x));
         displacement.push(padded(&(x - X)));
         velocity.push(padded(&particles.v[p].map(Real::to_f64)));
-        let F_3D = in_space(&F);
+        let mut F_3D = in_space(&F);
+        let across = law.stretch_across(&particles.F[p]).to_f64();
+        (D..3).for_each(|axis| F_3D[(axis, axis)] = across);
         gradient.push(by_rows(&F_3D));
         stress.push(by_rows(&law.cauchy_in_space(&particles.F[p])?.map(Real::to_f64)));
         let mut P = law.kirchhoff_in_space(&particles.F[p])?.map(Real::to_f64)

@@ -18,6 +18,7 @@
 //! Everything here takes a solution as a value, never by its name, and knows nothing of terminals or arguments.
 //! Lengths, times and stresses are in the units of the solution; errors are not divided by anything.
 
+mod across;
 mod blind;
 mod case;
 mod check;

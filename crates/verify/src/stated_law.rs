@@ -2,7 +2,7 @@
 
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{BLOCK, ConstitutiveLaw, Increment, InternalVariable, Law, LawWithMemory};
-use mmsmith_runtime::{Components, Real, Stated};
+use mmsmith_runtime::{Components, Real, Response, Stated};
 use mmsmith_stated_law::{Compiled, StatedLaw, StatedMemory};
 use nalgebra::{SMatrix, SVector};
 
@@ -17,7 +17,7 @@ pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
     stated: Stated<T>,
 ) -> Result<Law<T, D>, SceneError> {
     let has_memory = stated.has_memory();
-    let Stated { response, components, constants, given, internal } = stated;
+    let Stated { response, components, constants, given, internal, across } = stated;
     if components == Components::Curvilinear {
         return Err(SceneError::CurvilinearComponents);
     }
@@ -28,12 +28,18 @@ pub(crate) fn read<T: Real + Compiled<D>, const D: usize>(
         return Ok(Law::with_memory(OfTextWithMemory { law, planted: Planted::here() }));
     }
     let law = StatedLaw::new(D, &response, &constants)?;
-    Ok(Law::from_constitutive(OfText { law, planted: Planted::here() }))
+    let stretch = match across {
+        Some(across) => Some(StatedLaw::new(D, &Response::Energy(across.stretch), &constants)?),
+        None => None,
+    };
+    Ok(Law::from_constitutive(OfText { law, stretch, planted: Planted::here() }))
 }
 
 #[derive(Debug)]
 struct OfText<T> {
     law: StatedLaw<T>,
+    /// The stretch across, where there is no stress there: a number in the place of an energy, above one as that is above rest.
+    stretch: Option<StatedLaw<T>>,
     planted: Planted,
 }
 
@@ -59,7 +65,14 @@ impl<T: Real + Compiled<D>, const D: usize> ConstitutiveLaw<T, D> for OfText<T> 
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
-        T::across(&self.law, F)
+        match self.stretch {
+            Some(_) => Some(T::zero()),
+            None => T::across(&self.law, F),
+        }
+    }
+
+    fn stretch_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
+        Some(T::one() + T::energy(self.stretch.as_ref()?, F)?)
     }
 }
 

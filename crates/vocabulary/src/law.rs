@@ -164,6 +164,18 @@ pub struct Stated<T> {
     pub given: Vec<(String, String)>,
     /// Internal variables that the text may use.
     pub internal: Vec<Internal>,
+    /// The stretch along the directions that the dimension leaves out; nothing stretches along them where this is none.
+    pub across: Option<Across>,
+}
+
+/// No stress along the directions that the dimension leaves out: plane stress in two dimensions, uniaxial stress in one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Across {
+    /// The stretch along these directions, as text in what the response may use.
+    pub stretch: String,
+    /// The strain energy per reference volume of the law in space, as text in the same constants and the measures of a deformation in
+    /// space without shear across.
+    pub in_space: String,
 }
 
 /// An internal variable of a law that a specification states.
@@ -233,10 +245,10 @@ impl<T> Law<T> {
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Law<U> {
         match self {
             Self::Library(material) => Law::Library(material.map(change)),
-            Self::Stated(Stated { response, components, constants, given, internal }) => {
+            Self::Stated(Stated { response, components, constants, given, internal, across }) => {
                 let constants =
                     constants.into_iter().map(|(name, value)| (name, change(value))).collect();
-                Law::Stated(Stated { response, components, constants, given, internal })
+                Law::Stated(Stated { response, components, constants, given, internal, across })
             }
             Self::WithMemory(law) => Law::WithMemory(law.map(change)),
         }

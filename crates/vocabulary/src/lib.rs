@@ -10,8 +10,8 @@ mod law;
 mod material;
 
 pub use law::{
-    Components, Element, Flow, Internal, Law, Memory, Overstress, Response, Smoothness, Stated,
-    WithMemory,
+    Across, Components, Element, Flow, Internal, Law, Memory, Overstress, Response, Smoothness,
+    Stated, WithMemory,
 };
 pub use material::{
     Constant, Derivation, InStretches, Material, Moduli, Row, Term, UnknownLaw, Volumetric,

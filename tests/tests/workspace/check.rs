@@ -17,6 +17,12 @@ fn every_material_passes() {
     all_pass("tests/data/specs/materials");
 }
 
+/// Without stress across, and with a stress at the start: laws of the plane against those in space.
+#[test]
+fn plates_and_bars_pass() {
+    all_pass("tests/data/specs/across");
+}
+
 fn all_pass(folder: &str) {
     let mut files: Vec<_> = std::fs::read_dir(workspace().join(folder))
         .unwrap()

@@ -28,6 +28,21 @@ fn axis_aligned_gimp_with_centred_differences_has_the_reference_errors_and_order
     assert!((fit - 2.0).abs() < 0.05, "{fit}");
 }
 
+/// A plate in plane stress with a stress at the start, in both formulations.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "simulates for long; runs in release mode")]
+fn a_stretched_plate_has_the_orders_of_blocks() {
+    for (formulation, shape, cells, cfl, order) in
+        [("total", "bspline3", "8,16", "0.2", 4.0), ("updated", "gimp", "16,32", "0.4", 2.0)]
+    {
+        let file = "tests/data/specs/across/plate-sliding.toml";
+        let scheme = ["--formulation", formulation, "--shape", shape, "--cfl", cfl];
+        let result = json(&[&["converge", file, "--cells", cells][..], &scheme].concat());
+        let orders = local_orders(&result, "u", "l2");
+        assert!(orders.iter().all(|found| (found - order).abs() < 0.15), "{shape}: {orders:?}");
+    }
+}
+
 /// The local orders in `dt` of the differences of `u` on one grid, in all norms.
 fn orders_in_time(integrator: &str, amplitude: &str, cells: &str, cfls: &str) -> Vec<f64> {
     let grid = ["--set", amplitude, "--cells", cells, "--cfls", cfls];

@@ -74,6 +74,7 @@ fn entry(name: &str) -> Result<Entry> {
     let mut boundaries: Vec<_> = spec.boundaries.iter().filter_map(|b| word(b.condition)).collect();
     boundaries.sort_unstable();
     boundaries.dedup();
+    let law = spec.law_name();
     let parameters = spec.parameters.into_iter().map(|parameter| Parameter {
         name: parameter.name,
         default: parameter.default,
@@ -88,7 +89,7 @@ fn entry(name: &str) -> Result<Entry> {
         reference: spec.reference,
         coordinates: spec.coordinates.name().to_owned(),
         dimension: spec.dimension,
-        law: spec.material.name(),
+        law,
         boundaries,
         parameters: parameters.collect(),
     })

@@ -5,8 +5,8 @@ use mmsmith_expr::Slot;
 use mmsmith_spec::{Around, Boundary, Condition, Surface};
 use mmsmith_stage::{Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::{
-    Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response, Stated,
-    WithMemory,
+    Across, Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response,
+    Stated, WithMemory,
 };
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
@@ -73,6 +73,16 @@ impl Generator<'_> {
                 fn strain_energy(&self, X: &#vector, t: T) -> Option<T> {
                     #statements
                     Some(#(#values)*)
+                }
+            });
+        }
+        if let Some(stretch) = self.staged.across {
+            let (statements, values) =
+                self.translator.statements(&self.staged.after_parameters(&[stretch]));
+            items.extend(quote! {
+                fn stretch_across(&self, X: &#vector, t: T) -> T {
+                    #statements
+                    #(#values)*
                 }
             });
         }
@@ -161,7 +171,7 @@ impl Generator<'_> {
                 let material = self.material(material);
                 quote!(#runtime::Law::Library(#material))
             }
-            Law::Stated(Stated { response, components, constants, given, internal }) => {
+            Law::Stated(Stated { response, components, constants, given, internal, across }) => {
                 let response = match response {
                     Response::Energy(W) => quote!(Energy(#W.to_owned())),
                     Response::Stress(P) => {
@@ -186,6 +196,13 @@ impl Generator<'_> {
                         initial: #initial.to_owned(),
                     })
                 });
+                let across = match across {
+                    None => quote!(None),
+                    Some(Across { stretch, in_space }) => quote!(Some(#runtime::Across {
+                        stretch: #stretch.to_owned(),
+                        in_space: #in_space.to_owned(),
+                    })),
+                };
                 quote! {
                     #runtime::Law::Stated(#runtime::Stated {
                         response: #runtime::Response::#response,
@@ -193,6 +210,7 @@ impl Generator<'_> {
                         constants: vec![#(#constants),*],
                         given: vec![#(#given),*],
                         internal: vec![#(#internal),*],
+                        across: #across,
                     })
                 }
             }

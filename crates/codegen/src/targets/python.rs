@@ -170,7 +170,14 @@ impl Python {
             "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
                  deformation of time t at rest\n        return {density} * (self.b(X, t) - self.a(X, t))\n"
         );
-        text += "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), self.J(X, t), self.P(X, t)\n";
+        let volume = match (code.staged.across, code.spec.dimension) {
+            (None, _) => "self.J(X, t)",
+            (Some(_), 1) => "self.J(X, t) * self.F_zz(X, t) ** 2",
+            (Some(_), _) => "self.J(X, t) * self.F_zz(X, t)",
+        };
+        text += &format!(
+            "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), {volume}, self.P(X, t)\n"
+        );
         text += self.cauchy;
         text += "\n    def S(self, X, t):\n        # second Piola-Kirchhoff stress\n        F, P = self.F(X, t), self.P(X, t)\n";
         text + self.second

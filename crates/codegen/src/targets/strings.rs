@@ -99,7 +99,7 @@ impl Strings {
             let of = |k: usize| self.joined(code, &outputs[k..=k], |of| of[0].clone());
             all.push(field(&item.name, &item.about, rank, outputs.len(), of)?);
         }
-        all.extend(self.stresses(code, [outputs("F"), outputs("J"), outputs("P")])?);
+        all.extend(self.stresses(code, ["F", "J", "P", "F_zz"].map(outputs))?);
         Ok(all)
     }
 
@@ -107,22 +107,27 @@ impl Strings {
     fn stresses(
         &self,
         code: &Code<'_>,
-        [F, J, P]: [Vec<Slot>; 3],
+        [F, J, P, across]: [Vec<Slot>; 4],
     ) -> Result<[Field; 2], Unwritable> {
         let d = code.spec.dimension;
-        let all: Vec<Slot> = [F, J, P].concat();
+        let all: Vec<Slot> = [F, J, P, across].concat();
         let entry = |of: &[String], tensor: usize, i: usize, j: usize| {
             of[tensor * (d * d + 1) + i * d + j].clone()
         };
         let (deformation, stress) = (0, 1);
-        let product = |of: &[String], factors: Vec<[String; 2]>| {
+        let sum = |factors: Vec<[String; 2]>| {
             let terms: Vec<String> = factors.iter().map(|[a, b]| format!("{a}*{b}")).collect();
-            format!("({})/{}", terms.join(" + "), of[d * d])
+            format!("({})", terms.join(" + "))
+        };
+        let area = |of: &[String]| of[d * d].clone();
+        let volume = |of: &[String]| match of.get(2 * d * d + 1) {
+            None => area(of),
+            Some(across) => format!("({}{})", area(of), format!("*{across}").repeat(3 - d)),
         };
         let sigma = |k: usize| {
             self.joined(code, &all, |of| {
                 let factors = |m| [entry(of, stress, k / d, m), entry(of, deformation, k % d, m)];
-                product(of, (0..d).map(factors).collect())
+                format!("{}/{}", sum((0..d).map(factors).collect()), volume(of))
             })
         };
         let S = |k: usize| {
@@ -142,7 +147,7 @@ impl Strings {
                     ),
                 };
                 let factors = |m| [adjugate(k / d, m), entry(of, stress, m, k % d)];
-                product(of, (0..d).map(factors).collect())
+                format!("{}/{}", sum((0..d).map(factors).collect()), area(of))
             })
         };
         Ok([

@@ -331,7 +331,7 @@ fn symbols(graph: &mut Graph, dimension: usize) -> Matrix {
 }
 
 /// The energy that `text` states, its constants in one piece.
-pub(super) fn named(
+pub(crate) fn named(
     graph: &mut Graph,
     text: &str,
     constants: &[(&'static Constant, Expr)],
@@ -346,6 +346,17 @@ pub(super) fn named(
         })
     });
     energy.unwrap_or(Graph::ZERO)
+}
+
+/// A number in the measures of a deformation, such as an energy, at this one.
+pub(super) fn at_deformation(graph: &mut Graph, deformation: &Deformation, number: Expr) -> Expr {
+    let h = symbols(graph, deformation.H.len());
+    let Components { replacement, known, simpler } = in_components(graph, &h, deformation);
+    let number = graph.replace(number, &replacement);
+    let number = graph.replace(number, &simpler);
+    let mut actual = known;
+    actual.extend(h.into_iter().flatten().zip(deformation.H.iter().flatten().copied()));
+    graph.replace(number, &actual)
 }
 
 /// Whether an energy is one of the invariants, and so isotropic.

@@ -57,6 +57,11 @@ pub(super) fn energy_of_all(dimension: usize, parts: &InStretches) -> Option<Str
     (dimension < 3).then(|| in_components(dimension, pair, parts))
 }
 
+/// The energy in space as text in the components of `F`, where there is no shear across the first `dimension` directions.
+pub(super) fn energy_across(dimension: usize, parts: &InStretches) -> String {
+    in_components(3, (dimension == 2).then_some((0, 1)), parts)
+}
+
 /// The energy as text in the components of `F`, of which at most two directions are coupled.
 fn in_components(n: usize, pair: Option<(usize, usize)>, parts: &InStretches) -> String {
     let mut text = parts.volume.to_owned();

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_expr::{Expr, Program};
-use mmsmith_spec::{Around, Domain, Fields, Law, Spec, Surface};
+use mmsmith_spec::{Around, Coordinates, Domain, Fields, Law, Spec, Surface};
 use mmsmith_vocabulary::{Derivation, Material};
 use std::path::{Path, PathBuf};
 
@@ -101,6 +101,54 @@ fn stress(law: &Law, constants: &[f64], F: &Tensor) -> Option<Tensor> {
     }
 }
 
+/// The deformation in space whose stretch across leaves no stress there, by Newton's method on the law in space, and the stress: of a law
+/// that the specification makes of one of the library.
+fn free_across(spec: &Spec, law: &str, constants: &[f64], F: &Tensor) -> [Tensor; 2] {
+    let n = spec.dimension;
+    let (lambda, mu) = (constants[0], constants[1]);
+    let in_space = |stretch: f64| {
+        let F = tensor(|i, j| if i.max(j) < n { F[i][j] } else { stretch * identity(i, j) });
+        let material = match law {
+            "linear-elastic" => Material::LinearElastic { lambda, mu },
+            "st-venant-kirchhoff" => Material::StVenantKirchhoff { lambda, mu },
+            "hencky" => Material::Hencky { lambda, mu },
+            _ => {
+                let J = determinant(&F);
+                let pressure = match spec.source.contains("'mixed'") {
+                    true => 0.5 * (J * J - 1.0),
+                    false => J * (J - 1.0),
+                };
+                let b = times(&F, &transposed(&F));
+                let tau = tensor(|i, j| {
+                    lambda * pressure * identity(i, j) + mu * (b[i][j] - identity(i, j))
+                });
+                return [F, times(&tau, &tensor(|i, j| cofactor(&F, i, j) / J))];
+            }
+        };
+        let law = Law::Library(material.map(|_| spec.density));
+        [F, stress(&law, &[lambda, mu], &F).unwrap()]
+    };
+    let is_free = spec.variation.as_ref().is_some_and(|variation| variation.assumption.is_some());
+    let mut stretch = 1.0;
+    for _ in 0..if is_free { 40 } else { 0 } {
+        let across = |stretch: f64| in_space(stretch)[1][2][2];
+        let slope = (across(stretch + 1e-6) - across(stretch - 1e-6)) / 2e-6;
+        stretch -= across(stretch) / slope;
+    }
+    in_space(stretch)
+}
+
+/// The coordinates' own unit vectors, a column each.
+fn unit_vectors(spec: &Spec, X: &[f64]) -> Tensor {
+    match spec.coordinates {
+        Coordinates::Polar => {
+            let (sin, cos) = X[1].atan2(X[0]).sin_cos();
+            [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
+        }
+        _ => tensor(identity),
+    }
+}
+
 /// The values of all fields at a place and time.
 struct Values {
     u: Vec<f64>,
@@ -114,6 +162,8 @@ struct Values {
     J: f64,
     density: f64,
     constants: Vec<f64>,
+    /// By rows; empty where the body has no stress at the start.
+    prestress: Vec<f64>,
 }
 
 struct Solution {
@@ -121,6 +171,7 @@ struct Solution {
     program: Program,
     parameters: Vec<f64>,
     constants: usize,
+    prestress: usize,
 }
 
 impl Solution {
@@ -129,13 +180,19 @@ impl Solution {
             [&fields.u, &fields.v, &fields.a, &fields.b].map(|x| &x[..]).concat();
         outputs.extend([&fields.H, &fields.F, &fields.P].iter().flat_map(|A| A.concat()));
         outputs.extend([fields.J, spec.density]);
-        let constants = spec.material.constants();
+        let constants = match &spec.variation {
+            Some(variation) => variation.constants.clone(),
+            None => spec.material.constants(),
+        };
         outputs.extend(constants.iter().map(|(_, value)| *value));
+        let prestress = spec.prestress.as_ref().map(|S| S.concat()).unwrap_or_default();
+        outputs.extend(&prestress);
         Solution {
             n: spec.dimension,
             program: fields.program(&outputs),
             parameters: spec.parameters.iter().map(|p| p.default).collect(),
             constants: constants.len(),
+            prestress: prestress.len(),
         }
     }
 
@@ -155,6 +212,7 @@ impl Solution {
             J: take(1)[0],
             density: take(1)[0],
             constants: take(self.constants),
+            prestress: take(self.prestress),
         }
     }
 }
@@ -260,6 +318,7 @@ fn specifications() -> Vec<PathBuf> {
         "mms-specs",
         "tests/data/specs",
         "tests/data/specs/materials",
+        "tests/data/specs/across",
         "crates/spec/tests/data/ok",
     ];
     let mut found: Vec<PathBuf> = folders
@@ -278,7 +337,7 @@ fn fields_obey_mechanics() {
         let file = path.file_name().unwrap().to_str().unwrap();
         let spec = Spec::parse(&std::fs::read_to_string(&path).unwrap(), file)
             .unwrap_or_else(|diagnostic| panic!("{diagnostic}"));
-        let law = format!("law = '{}'", spec.material.name());
+        let law = format!("law = '{}'", spec.law_name());
         assert!(spec.source.contains(&law), "{file}: {law}");
         // Where the stress is no function of the deformation alone.
         let has_memory = match spec.law_for_solver() {
@@ -342,8 +401,22 @@ fn fields_obey_mechanics() {
 
             // The law, and the balance of momentum: rho0 a = Div P + rho0 b.
             let modulus = largest(&here.constants).max(largest(&here.P));
-            if let Some(P) = stress(&spec.material, &here.constants, &F) {
-                let P: Vec<f64> = (0..n * n).map(|k| P[k / n][k % n]).collect();
+            let P = match &spec.variation {
+                Some(variation) => Some(free_across(&spec, variation.law, &here.constants, &F)[1]),
+                None => stress(&spec.material, &here.constants, &F),
+            };
+            if let Some(P) = P {
+                let mut start = tensor(|_, _| 0.0);
+                if !here.prestress.is_empty() {
+                    let own = tensor(|i, j| match i.max(j) < n {
+                        true => here.prestress[i * n + j],
+                        false => 0.0,
+                    });
+                    let frame = unit_vectors(&spec, &X);
+                    start = times(&F, &times(&frame, &times(&own, &transposed(&frame))));
+                }
+                let P: Vec<f64> =
+                    (0..n * n).map(|k| P[k / n][k % n] + start[k / n][k % n]).collect();
                 close(&here.P, &P, 1e-4 * modulus, "P");
             }
             let columns = by_axis(|values| values.P);

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use mmsmith_expr::{Ast, Function, Graph};
+use mmsmith_expr::{Ast, Expr, Function, Graph};
 use mmsmith_spec::{DeriveError, Diagnostic, LONGEST_FILE, ListingText, Spec, Surface};
 use mmsmith_vocabulary::Material;
 use std::path::{Path, PathBuf};
@@ -245,6 +245,26 @@ fn an_energy_in_invariants_has_the_fields_of_the_law_that_it_is() {
         fields.b.iter().map(|&b| fields.graph.print(b)).collect::<Vec<_>>()
     });
     assert!(stated == named, "{stated:?}\nis not\n{named:?}");
+}
+
+/// At rest a stress at the start is the whole stress, and in balance without a force.
+#[test]
+fn a_body_at_rest_has_its_stress_at_the_start_alone() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for name in ["plate-neo-hookean-prestressed", "block-prestressed"] {
+        let path = root.join("tests/data/specs/across").join(name).with_extension("toml");
+        let text = std::fs::read_to_string(path).unwrap();
+        let (start, end) = (text.find("[displacement]").unwrap(), text.find("[material]").unwrap());
+        let text = [&text[..start], "[displacement]\nX = '0'\n\n", &text[end..]].concat();
+        let spec = Spec::parse(&text, "sample.toml").unwrap();
+        let fields = spec.derive().unwrap();
+        let printed = |entries: &[Expr]| -> Vec<String> {
+            entries.iter().map(|&entry| fields.graph.print(entry)).collect()
+        };
+        assert_eq!(printed(&fields.P.concat()), printed(&spec.prestress.unwrap().concat()));
+        assert_eq!(printed(&fields.b), ["0", "0"]);
+        assert!(fields.across.is_none_or(|stretch| fields.graph.print(stretch) == "1"));
+    }
 }
 
 /// Where the volume is constant, no field depends on how stiff it is: next to incompressibility nothing grows with `lambda / mu`.

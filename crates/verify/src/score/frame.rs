@@ -8,6 +8,7 @@ use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::{SMatrix, SVector};
 
+use crate::across::Across;
 use crate::inverse::determinant;
 use crate::points;
 
@@ -90,6 +91,11 @@ impl<const D: usize> FrameData<D> {
     /// The error norms of the frame.
     pub(super) fn errors(&self, exact: &dyn Solution<f64, D>, time: f64) -> FrameErrors {
         let density = exact.density();
+        let law = Across::<D>::of(exact.law());
+        let across = |F: &SMatrix<f64, D, D>| {
+            let stretch = law.as_ref().map_or(Some(1.0), |law| law.stretch(F));
+            stretch.unwrap_or(f64::NAN).powi(3 - D as i32)
+        };
         let of_particle = |p: usize, exact: &State<f64, D>| {
             let v = self.v.as_ref().map_or(0.0, |(v, _)| (v[p] - exact.v).norm());
             let J = determinant(&exact.F);
@@ -105,10 +111,10 @@ impl<const D: usize> FrameData<D> {
                 v,
                 tensor(0, exact.F),
                 tensor(1, exact.P),
-                tensor(2, kirchhoff / J),
+                tensor(2, kirchhoff / (J * across(&exact.F))),
                 tensor(3, kirchhoff),
                 scalar(0, J),
-                scalar(1, density / J),
+                scalar(1, density / (J * across(&exact.F))),
                 tensor(0, exact.F.transpose()),
                 tensor(1, exact.P.transpose()),
                 scalar(1, density),

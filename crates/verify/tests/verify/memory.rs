@@ -150,6 +150,7 @@ fn stated(stress: &str, constants: &[(&str, f64)], given: &[(&str, &str)]) -> St
         constants: constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
         given: given.iter().map(owned).collect(),
         internal: Vec::new(),
+        across: None,
     }
 }
 

@@ -13,6 +13,7 @@ pub(super) struct At<const D: usize> {
     pub(super) quantity: Quantity,
     F: SMatrix<f64, D, D>,
     inverse: SMatrix<f64, D, D>,
+    /// The ratio of volumes.
     J: f64,
     P: SMatrix<f64, D, D>,
     density: f64,
@@ -30,16 +31,18 @@ where
         density: f64,
     ) -> Option<Self> {
         let P = known.law.first_piola_kirchhoff(F)?;
-        Self::with_stress(quantity, F, P, density)
+        Self::with_stress(known, quantity, F, P, density)
     }
 
     fn with_stress(
+        known: &Known<D>,
         quantity: Quantity,
         F: &SMatrix<f64, D, D>,
         P: SMatrix<f64, D, D>,
         density: f64,
     ) -> Option<Self> {
-        let (inverse, J) = (inverse(F)?, determinant(F));
+        let across = known.law.stretch_across(F).powi(3 - D as i32);
+        let (inverse, J) = (inverse(F)?, determinant(F) * across);
         Some(Self { quantity, F: *F, inverse, J, P, density })
     }
 
@@ -175,7 +178,7 @@ where
             _ => match self.variants.iter().find(|(known, _)| *known == kind) {
                 Some((_, variant)) => {
                     let P = self.known.stress(variant, F)?;
-                    Some(At::with_stress(self.quantity, F, P, self.density)?.right())
+                    Some(At::with_stress(self.known, self.quantity, F, P, self.density)?.right())
                 }
                 None => form(kind, &At::new(self.known, self.quantity, F, self.density)?),
             },

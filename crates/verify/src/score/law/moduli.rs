@@ -82,11 +82,11 @@ where
         };
         let changed = match self.declared.clone() {
             Declared::Library(material) => Declared::Library(material.map_named(&mut change)),
-            Declared::Stated(Stated { response, components, constants, given, internal }) => {
-                let constants = constants.into_iter();
+            Declared::Stated(stated) => {
+                let constants = stated.constants.into_iter();
                 let constants =
                     constants.map(|(name, value)| (name.clone(), change(&name, value))).collect();
-                Declared::Stated(Stated { response, components, constants, given, internal })
+                Declared::Stated(Stated { constants, ..stated })
             }
             Declared::WithMemory(_) => return None,
         };
