@@ -80,7 +80,7 @@ def run(
     return_map: Literal["exponential", "midpoint"] | None = None,
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
-    grid: Literal["cartesian", "polar", "spherical"] | None = None,
+    grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
@@ -158,6 +158,7 @@ def run(
             shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
+            `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
             itself, or a CFL number of less than 0.4.
@@ -247,7 +248,7 @@ def converge(
     return_map: Literal["exponential", "midpoint"] | None = None,
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
-    grid: Literal["cartesian", "polar", "spherical"] | None = None,
+    grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
@@ -328,6 +329,7 @@ def converge(
             shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
+            `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
             itself, or a CFL number of less than 0.4.
@@ -403,7 +405,7 @@ def stability(
     return_map: Literal["exponential", "midpoint"] | None = None,
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
-    grid: Literal["cartesian", "polar", "spherical"] | None = None,
+    grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
     cfl_speed: Literal["bar", "p-wave"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
@@ -495,6 +497,7 @@ def stability(
             shells.
             `cartesian`: Cartesian.
             `polar`: Radius and angle.
+            `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
         cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
             itself, or a CFL number of less than 0.4.
@@ -607,6 +610,7 @@ def score(
     solution: Named,
     /,
     *files: str | os.PathLike[str],
+    newton: str | os.PathLike[str] | None = None,
     each: bool = False,
     map: Mapping[str, str] | None = None,
     points: Literal["auto", "current", "reference"] | None = None,
@@ -638,6 +642,8 @@ def score(
     Args:
         solution: What `load` gave, a name, or the path of a specification.
         files: The recordings, one for each resolution: lists, folders, or files.
+        newton: Judge how the residuals of Newton's method fall, which tests the tangent: a CSV log with the columns step, iteration and
+            residual, of which the first two may be left out; the first residual of a step is that before any iteration. Needs no solution.
         each: Each file is a recording of its own.
         map: Role of an array that has no usual name. Roles: displacement, velocity, deformation_gradient, displacement_gradient,
             first_piola_kirchhoff, cauchy, kirchhoff, J, density, reference_position, id.

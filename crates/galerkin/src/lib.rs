@@ -68,7 +68,9 @@ pub use mmsmith_sparse::Factors;
 pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;
-pub use statics::{AtRest, Equilibrium, LoadStep, Loads, Obstacle, StaticsError};
+pub use statics::{
+    AtRest, Equilibrium, LoadStep, Loads, Obstacle, QUADRATIC, StaticsError, newton_exponent,
+};
 
 /// How many of so many numbers a thread takes at a time: four pieces for each thread, so that none waits long for the last, but not so few
 /// that handing them out takes longer than the work. No sum is cut, so that the bits do not depend on it.

@@ -61,6 +61,9 @@ pub struct Equilibrium {
     pub cut_backs: usize,
 }
 
+/// Newton's method converges quadratically where the exponent of the last residuals is at least this.
+pub const QUADRATIC: f64 = 1.8;
+
 /// A load step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadStep {
@@ -83,23 +86,29 @@ impl LoadStep {
     /// residual that has reached rounding would have fallen further: it counts where the exponent is that of Newton's method even so.
     #[must_use]
     pub fn exponent(&self) -> Option<f64> {
-        /// Residuals below this multiple of rounding say nothing of the method.
-        const CLEAR: f64 = 10.0;
-        /// The least exponent that a residual at rounding may tell.
-        const TOLD: f64 = 1.8;
-        let after = self.residuals.get(1..)?;
-        let clear = after.iter().take_while(|r| **r > CLEAR * self.rounding).count();
-        let ending_at = |last: usize| {
-            let [r1, r2, r3] = *after.get(last.checked_sub(2)?..=last)?.as_array()?;
-            let exponent = (r3 / r2).ln() / (r2 / r1).ln();
-            (r2 < r1 && r3 < r2).then_some(exponent)
-        };
-        let above = clear.checked_sub(1).and_then(ending_at);
-        let reached = ending_at(clear).filter(|exponent| *exponent >= TOLD);
-        match (above, reached) {
-            (Some(above), Some(reached)) => Some(above.max(reached)),
-            (above, reached) => above.or(reached),
-        }
+        newton_exponent(&self.residuals, self.rounding)
+    }
+}
+
+/// The exponent of [`LoadStep::exponent`] of a history of residuals of which rounding alone may leave this much.
+#[must_use]
+pub fn newton_exponent(residuals: &[f64], rounding: f64) -> Option<f64> {
+    /// Residuals below this multiple of rounding say nothing of the method.
+    const CLEAR: f64 = 10.0;
+    /// The least exponent that a residual at rounding may tell.
+    const TOLD: f64 = QUADRATIC;
+    let after = residuals.get(1..)?;
+    let clear = after.iter().take_while(|r| **r > CLEAR * rounding).count();
+    let ending_at = |last: usize| {
+        let [r1, r2, r3] = *after.get(last.checked_sub(2)?..=last)?.as_array()?;
+        let exponent = (r3 / r2).ln() / (r2 / r1).ln();
+        (r2 < r1 && r3 < r2).then_some(exponent)
+    };
+    let above = clear.checked_sub(1).and_then(ending_at);
+    let reached = ending_at(clear).filter(|exponent| *exponent >= TOLD);
+    match (above, reached) {
+        (Some(above), Some(reached)) => Some(above.max(reached)),
+        (above, reached) => above.or(reached),
     }
 }
 

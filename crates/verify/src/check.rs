@@ -584,7 +584,7 @@ where
 }
 
 /// The law at a place and a time, with the exact internal variables there; `None` where they are not known.
-fn at_point<const D: usize>(
+pub(crate) fn at_point<const D: usize>(
     law: &Law<f64, D>,
     solution: &dyn Solution<f64, D>,
     X: &SVector<f64, D>,

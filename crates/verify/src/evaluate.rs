@@ -1,8 +1,13 @@
 //! The exact fields at one point, in a form that can be written.
 
 use crate::across::has_stretch_across;
+use crate::case::law_of_body;
+use crate::check::at_point;
 use crate::dimension::in_dimension;
+use crate::error::SceneError;
 use crate::points::outside;
+use crate::precision::Precision;
+use mmsmith_laws::{Differentiated, Tangent};
 use mmsmith_runtime::{AnySolution, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -32,6 +37,9 @@ pub struct FieldRow {
     pub P: Vec<Vec<f64>>,
     /// Body force per unit mass.
     pub b: Vec<f64>,
+    /// The tangent of the solver's law, `dPdF[i][J][k][L] = dP_iJ/dF_kL`. Written where it is asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dPdF: Vec<Vec<Vec<Vec<f64>>>>,
     /// Internal variables of the law by their names, in Cartesian components. Written where there are any.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub internal: BTreeMap<String, f64>,
@@ -70,6 +78,10 @@ impl FieldRow {
             named("P", matrix(&self.P)),
             named("b", vector(&self.b)),
         ];
+        if !self.dPdF.is_empty() {
+            let entries = self.dPdF.iter().flatten().flatten().flatten().copied().collect();
+            all.push(named("dPdF", (vec![self.dPdF.len(); 4], entries)));
+        }
         all.extend(self.F_zz.map(|F_zz| named("F_zz", (Vec::new(), vec![F_zz]))));
         let internal = self.internal.iter();
         all.extend(internal.map(|(name, value)| (name.as_str(), Vec::new(), vec![*value])));
@@ -85,6 +97,62 @@ pub struct WrongLength {
     pub given: usize,
     /// The number needed.
     pub dimension: usize,
+}
+
+/// Why a law has no tangent at a point.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum TangentError {
+    /// A position with the wrong number of coordinates.
+    #[error(transparent)]
+    Length(#[from] WrongLength),
+    /// The solver does not have the law.
+    #[error(transparent)]
+    Law(#[from] SceneError),
+    /// The stress is no function of the deformation.
+    #[error(
+        "the stress depends on the history of the deformation, so that its tangent is that of the step by which a solver follows it"
+    )]
+    History,
+}
+
+/// [`evaluate`] with the tangent of the solver's law at the exact deformation.
+///
+/// # Errors
+///
+/// [`TangentError`] where the law has none, or the position does not fit.
+pub fn evaluate_with_tangent(
+    solution: &AnySolution<f64>,
+    X: &[f64],
+    t: f64,
+) -> Result<FieldRow, TangentError> {
+    let mut row = evaluate(solution, X, t)?;
+    row.dPdF = in_dimension!(solution, |s| tangent(s, X, t)?, else Vec::new());
+    if row.dPdF.iter().flatten().flatten().flatten().any(|entry| !entry.is_finite()) {
+        row.not_finite.push("dPdF".to_owned());
+    }
+    Ok(row)
+}
+
+fn tangent<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &[f64],
+    t: f64,
+) -> Result<Vec<Vec<Vec<Vec<f64>>>>, TangentError>
+where
+    f64: Precision<D> + Differentiated<D>,
+{
+    let X = SVector::<f64, D>::from_fn(|i, _| X.get(i).copied().unwrap_or(f64::NAN));
+    if !solution.internal_variables().is_empty() {
+        return Err(TangentError::History);
+    }
+    let law = law_of_body::<f64, D>(solution)?;
+    let law = at_point(&law, solution, &X, t).ok_or(TangentError::History)?;
+    let mut A: [Tangent<D>; 1] = [[[SMatrix::zeros(); D]; D]];
+    f64::tangents(&law, &[solution.deformation_gradient(&X, t)], &[], &mut A);
+    let of = |i: usize, J: usize| -> Vec<Vec<f64>> {
+        A[0].iter().map(|row| row.iter().map(|along| along[(i, J)]).collect()).collect()
+    };
+    Ok((0..D).map(|i| (0..D).map(|J| of(i, J)).collect()).collect())
 }
 
 /// Every field of `solution` at the reference position `X` and time `t`.
@@ -120,6 +188,7 @@ fn evaluate_in<const D: usize>(
         F_zz,
         P: rows(&P),
         b: list(&b),
+        dPdF: Vec::new(),
         outside: outside(&solution.domain(), &X).is_some_and(|share| share > OUTSIDE),
         not_finite: Vec::new(),
         why: None,

@@ -80,7 +80,7 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
-pub use evaluate::{FieldRow, WrongLength, evaluate};
+pub use evaluate::{FieldRow, TangentError, WrongLength, evaluate, evaluate_with_tangent};
 pub use flow::{has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
 pub use growth::{
@@ -91,7 +91,9 @@ pub use half_plane::is_axisymmetric;
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};
-pub use mmsmith_galerkin::{Composition, Coordinates, Layout, MassMatrix};
+pub use mmsmith_galerkin::{
+    Composition, Coordinates, Layout, MassMatrix, QUADRATIC, newton_exponent,
+};
 pub use mmsmith_laws::{ReturnMap, Volume};
 pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::StepError;

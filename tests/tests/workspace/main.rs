@@ -22,4 +22,5 @@ mod reference;
 mod staged;
 mod statics;
 mod structure;
+mod tangents;
 mod updated_frame;

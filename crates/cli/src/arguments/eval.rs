@@ -15,6 +15,10 @@ pub(crate) struct EvalOptions {
     /// "par": { "A": 0.05 } }, ... ], where "par" may be left out. Other columns and keys are ignored. - is standard input
     #[arg(long, value_name = "POINTS")]
     pub(crate) points: PathBuf,
+    /// With the tangent dP/dF of the solver's law: in JSON dPdF[i][J][k][L] = dP_iJ/dF_kL, in CSV columns such as dP11dF12. For tests of
+    /// the tangent of another solver
+    #[arg(long)]
+    pub(crate) tangent: bool,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
     /// Write the fields to this JSON file; - is standard output, as when neither this nor --csv nor --npy is given

@@ -14,12 +14,16 @@ use super::values::{
 #[derive(Args)]
 pub(crate) struct ScoreOptions {
     /// Name of a solution (mms list), or a specification file
-    #[arg(value_name = "NAME|SPEC.toml")]
-    pub(crate) name: String,
+    #[arg(value_name = "NAME|SPEC.toml", required_unless_present = "newton")]
+    pub(crate) name: Option<String>,
     /// Recordings, one for each resolution: a .pvd list, a folder (with one .pvd list, or of frames), or .vtu, .vtp, .vtk
     /// or .csv files; those of one folder are the frames of one recording, unless --cells or --h has a value for each
-    #[arg(value_name = "FILES", required = true)]
+    #[arg(value_name = "FILES", required_unless_present = "newton")]
     pub(crate) files: Vec<PathBuf>,
+    /// Judge how the residuals of Newton's method fall, which tests the tangent: a CSV log with the columns step, iteration and residual,
+    /// of which the first two may be left out; the first residual of a step is that before any iteration. Needs no solution
+    #[arg(long, value_name = "LOG", conflicts_with = "files")]
+    pub(crate) newton: Option<PathBuf>,
     /// Each file is a recording of its own
     #[arg(long)]
     pub(crate) each: bool,

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use mmsmith_solutions::AnySolution;
-use mmsmith_verify::{FieldRow, evaluate};
+use mmsmith_verify::{FieldRow, evaluate, evaluate_with_tangent};
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -43,8 +43,10 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let mut rows = Vec::with_capacity(points.len());
     for portion in points.chunks(PORTION) {
         let first = rows.len();
-        let evaluated: Vec<Result<FieldRow>> =
-            portion.par_iter().map(|point| fields_at(&selection, &solution, point)).collect();
+        let evaluated: Vec<Result<FieldRow>> = portion
+            .par_iter()
+            .map(|point| fields_at(&selection, &solution, point, options.tangent))
+            .collect();
         for (index, row) in evaluated.into_iter().enumerate() {
             rows.push(row.with_context(|| points::place(file, first + index))?);
         }
@@ -129,6 +131,10 @@ fn csv(axes: &[&str; 3], points: &[Point], rows: &[FieldRow]) -> String {
                 (0..values.len()).map(move |entry| match shape[..] {
                     [] => (*name).to_owned(),
                     [_] => format!("{name}{}", entry + 1),
+                    [d, _, _, _] => {
+                        let index = |place: u32| entry / d.pow(place) % d + 1;
+                        format!("dP{}{}dF{}{}", index(3), index(2), index(1), index(0))
+                    }
                     _ => format!("{name}{}{}", entry / shape[0] + 1, entry % shape[0] + 1),
                 })
             });
@@ -161,10 +167,17 @@ fn fields_at(
     selection: &Selection,
     solution: &AnySolution<f64>,
     point: &Point,
+    with_tangent: bool,
 ) -> Result<FieldRow> {
     let Point { X, t, parameters } = point;
+    let at = |solution: &AnySolution<f64>| -> Result<FieldRow> {
+        match with_tangent {
+            true => Ok(evaluate_with_tangent(solution, X, *t)?),
+            false => Ok(evaluate(solution, X, *t)?),
+        }
+    };
     if parameters.is_empty() {
-        return Ok(evaluate(solution, X, *t)?);
+        return at(solution);
     }
-    Ok(evaluate(&selection.with(parameters)?.build()?, X, *t)?)
+    at(&selection.with(parameters)?.build()?)
 }

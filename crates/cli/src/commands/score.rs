@@ -3,6 +3,7 @@
 mod advice;
 mod document;
 mod inputs;
+mod newton;
 mod text;
 
 use std::collections::BTreeMap;
@@ -26,7 +27,11 @@ use crate::processes::with_threads;
 use crate::report::{Asked, Files, Form, Report, Section};
 
 pub(crate) fn score(options: &ScoreOptions) -> Result<bool> {
-    let selection = Selection::new(&options.name, &options.parameters.set)?;
+    if let Some(log) = &options.newton {
+        return newton::judge(log, options.json.as_ref());
+    }
+    let Some(name) = &options.name else { bail!("the name of a solution is missing") };
+    let selection = Selection::new(name, &options.parameters.set)?;
     let inputs = inputs::inputs(options)?;
     let how = reading(&selection, options)?;
     let output = Asked(vec![(Form::Json, &options.json)]).prepare()?;

@@ -1,6 +1,8 @@
 //! Reports on equilibria.
 
-use mmsmith_verify::{Behaviour, Norm, OrderVerdict, StaticRow, StaticStep, StaticStudy};
+use mmsmith_verify::{
+    Behaviour, Norm, OrderVerdict, QUADRATIC, StaticRow, StaticStep, StaticStudy,
+};
 use serde_json::{Map, json};
 
 use super::Problem;
@@ -9,9 +11,6 @@ use crate::report::{Report, Section, Sheet, number as digits};
 use crate::svg::{Curve, Plot};
 use crate::table::{self, Table};
 use crate::units::{Units, with_unit};
-
-/// Newton's method converges quadratically where the exponent of the last residuals is at least this.
-const QUADRATIC: f64 = 1.8;
 
 /// A line on the way.
 pub(super) fn under_way(what: &str, factor: f64, residuals: &[f64]) -> String {
