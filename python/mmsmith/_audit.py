@@ -133,7 +133,7 @@ def _outcome(
 def _differ(solution: Solution, faulty: Solution) -> bool:
     """Whether a fault shows at the values that the parameters have; that of a force per volume does not where the density is one."""
     X = solution.sample(50)
-    surfaces = [surface for surface, condition in solution.boundaries.items() if condition == "prescribed-traction"]
+    surfaces = [surface for surface, condition in solution.boundaries.items() if "prescribed-traction" in condition]
     for share in (0.13, 0.37, 0.81):
         t = share * solution.period
         one, other = (

@@ -180,7 +180,7 @@ class Search:
         dt = self.dt.get(self.cells[0], numpy.nan)
         hand = counter(row, self.right, dt, self.h(self.cells[0]))
         X = self.right.sample(40)
-        surfaces = [surface for surface, condition in self.right.boundaries.items() if condition == "prescribed-traction"]
+        surfaces = [surface for surface, condition in self.right.boundaries.items() if "prescribed-traction" in condition]
         letters = [*"uvb", *(f"traction:{surface}" for surface in surfaces)]
         right, handed = (Handed(self.right, one) for one in (self.right, changed))
         for t in (0.0, 0.13 * self.right.period, 0.37 * self.right.period):
@@ -283,8 +283,8 @@ class Search:
         start = 0.5 * dt if dt > 0 else 0.0
         X = right.sample(200)
         end = 0.4 * right.period
-        loaded = [surface for surface, condition in right.boundaries.items() if condition == "prescribed-traction"]
-        moved = [surface for surface, condition in right.boundaries.items() if condition == "prescribed-motion"]
+        loaded = [surface for surface, condition in right.boundaries.items() if "prescribed-traction" in condition]
+        moved = [surface for surface, condition in right.boundaries.items() if "prescribed-motion" in condition]
         is_late = {"u": False, "v": False, "b": False, "traction": False}
         for letter, t in self.calls:
             kind = letter.partition(":")[0]

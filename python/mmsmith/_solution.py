@@ -195,7 +195,10 @@ class Solution:
 
     @property
     def boundaries(self) -> dict[str, str]:
-        """The condition on each surface: `sliding`, `symmetry`, `traction-free`, `prescribed-traction`, `prescribed-motion`."""
+        """The condition on each surface: `sliding`, `symmetry`, `traction-free`, `prescribed-traction`, `prescribed-motion`.
+
+        By component it is the like of `normal prescribed-motion, tangential traction-free`.
+        """
         return dict(self._fields.boundaries)
 
     @property

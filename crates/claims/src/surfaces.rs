@@ -93,7 +93,10 @@ pub fn surfaces(spec: &Spec, fields: &Fields) -> Result<Vec<SurfaceFinding>, Sur
                 Outcome::Proved
             } else {
                 let field = match claim.what {
-                    ClaimKind::Traction | ClaimKind::Shear => fields.P.concat(),
+                    ClaimKind::Traction
+                    | ClaimKind::Shear
+                    | ClaimKind::NormalTraction
+                    | ClaimKind::TractionComponent(_) => fields.P.concat(),
                     ClaimKind::NormalDisplacement => fields.u.clone(),
                 };
                 numerical(spec, fields, surface, &open, &field)?

@@ -6,7 +6,7 @@ use crate::table::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};
-use mmsmith_spec::{Boundary, Condition, Parameter, Surface};
+use mmsmith_spec::Parameter;
 use mmsmith_stage::{Block, FieldName, Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeSet;
@@ -144,7 +144,7 @@ impl Code<'_> {
             at_points("F_zz".into(), self.about_across().into(), Shape::Scalar, vec![stretch])
         });
         let tractions = staged.tractions.iter().map(|traction| {
-            let surface = surface_name(traction.surface);
+            let surface = traction.surface.to_string();
             let about = format!("traction on the surface {surface}, force per reference area");
             let name = format!("{}_traction", surface.replace('-', "_"));
             at_points(name, about, Shape::Vector, traction.outputs.clone())
@@ -240,11 +240,8 @@ impl Code<'_> {
         lines.push(String::new());
         lines.extend(self.formulas());
         for boundary in &spec.boundaries {
-            lines.push(format!(
-                "surface {}: {}",
-                surface_name(boundary.surface),
-                condition(boundary)
-            ));
+            let condition = boundary.condition.to_string().replace("prescribed-", "prescribed ");
+            lines.push(format!("surface {}: {condition}", boundary.surface));
         }
         if !spec.reference.is_empty() {
             lines.push(format!("Source: {}.", spec.reference));
@@ -352,28 +349,6 @@ pub(crate) struct Refusal {
     pub(crate) lines: &'static str,
     /// A literal of text.
     pub(crate) string: fn(&str) -> String,
-}
-
-pub(crate) fn surface_name(surface: Surface) -> String {
-    let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
-    match surface {
-        Surface::Lower(i) => format!("{}-lower", axis(i)),
-        Surface::Upper(i) => format!("{}-upper", axis(i)),
-        Surface::Inner => "inner".into(),
-        Surface::Outer => "outer".into(),
-        Surface::FirstAngle => "theta-lower".into(),
-        Surface::LastAngle => "theta-upper".into(),
-    }
-}
-
-fn condition(boundary: &Boundary) -> &'static str {
-    match boundary.condition {
-        Condition::Sliding => "sliding",
-        Condition::Symmetry => "symmetry",
-        Condition::TractionFree => "traction-free",
-        Condition::PrescribedTraction => "prescribed traction",
-        Condition::PrescribedMotion => "prescribed motion",
-    }
 }
 
 /// Lines broken between words, each with a sign before it.

@@ -1,7 +1,7 @@
 //! Fields that a file takes from the table beside it, because they follow from the history of each particle.
 
 use crate::code::Code;
-use crate::listing::{Item, surface_name};
+use crate::listing::Item;
 use crate::names::Names;
 use crate::table::{OfTable, Tabulated};
 use crate::text::digits;
@@ -60,7 +60,7 @@ impl Code<'_> {
             items.push(Item::of_table(name, about, Shape::Scalar, place));
         }
         items.extend(self.surfaces().into_iter().map(|surface| {
-            let name = surface_name(surface);
+            let name = surface.to_string();
             let about = format!("traction on the surface {name}, force per reference area");
             let name = format!("{}_traction", name.replace('-', "_"));
             Item::of_table(name, about, Shape::Vector, OfTable::Traction(surface))

@@ -2,19 +2,18 @@
 
 use std::f64::consts::PI;
 
+use mmsmith_vocabulary::ComponentCondition;
+
 /// The boundary condition at an end of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// A free surface: a clamped knot vector, nothing prescribed.
-    Free,
+    /// A surface with a condition on each component of the grid's coordinates, of which there may be fewer than three: a clamped knot
+    /// vector, where nothing is prescribed, or the component's motion or traction is [given](super::BoundaryData).
+    Open([ComponentCondition; 3]),
     /// A frictionless sliding wall or a plane of symmetry: splines are continued by their mirror image, the component
     /// along this axis with the opposite sign. It so vanishes on the wall exactly, and the other components have no
     /// slope there, as the absence of shear traction asks of an isotropic solid.
     Wall,
-    /// A surface whose traction is [given](super::BoundaryData): free but for that.
-    Loaded,
-    /// A surface whose motion is [given](super::BoundaryData), all components of it.
-    Moved,
     /// No end: the other end of the axis follows, where this is `Periodic` too.
     Periodic,
     /// No end, and the same all along the axis, where the other end is `Uniform` too: one cell, one particle at its lower end, and one
@@ -23,9 +22,21 @@ pub enum End {
 }
 
 impl End {
+    /// A free surface.
+    pub const FREE: Self = Self::Open([ComponentCondition::TractionFree; 3]);
+    /// A surface whose traction is given, all components of it.
+    pub const LOADED: Self = Self::Open([ComponentCondition::PrescribedTraction; 3]);
+    /// A surface whose motion is given, all components of it.
+    pub const MOVED: Self = Self::Open([ComponentCondition::PrescribedMotion; 3]);
+
     /// Whether knots are repeated here, so that the last function alone has a value at the end.
     pub(crate) fn is_clamped(self) -> bool {
-        matches!(self, Self::Free | Self::Loaded | Self::Moved)
+        matches!(self, Self::Open(_))
+    }
+
+    /// Whether a component has this condition here.
+    pub(crate) fn has(self, component: usize, condition: ComponentCondition) -> bool {
+        matches!(self, Self::Open(of) if of[component] == condition)
     }
 }
 
@@ -69,9 +80,9 @@ impl Axis {
         if self.is_uniform() { 1 } else { self.cells * per_cell }
     }
 
-    /// Which ends have a given motion.
-    pub(crate) fn moved(&self) -> [bool; 2] {
-        self.ends.map(|end| end == End::Moved)
+    /// At which ends the motion of a component is given.
+    pub(crate) fn moved(&self, component: usize) -> [bool; 2] {
+        self.ends.map(|end| end.has(component, ComponentCondition::PrescribedMotion))
     }
 
     /// Coordinates and weights of the particles along this axis, `per_cell` in each cell, cell after cell.

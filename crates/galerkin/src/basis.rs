@@ -363,11 +363,11 @@ mod tests {
     use crate::Layout;
 
     const ENDS: [[End; 2]; 6] = [
-        [End::Free, End::Free],
+        [End::FREE, End::FREE],
         [End::Wall, End::Wall],
-        [End::Free, End::Wall],
-        [End::Wall, End::Free],
-        [End::Moved, End::Loaded],
+        [End::FREE, End::Wall],
+        [End::Wall, End::FREE],
+        [End::MOVED, End::LOADED],
         [End::Periodic, End::Periodic],
     ];
 
@@ -438,7 +438,7 @@ mod tests {
     #[test]
     fn between_free_ends_linear_fields_are_reproduced() {
         for p in 2..=MOST_DEGREE {
-            let axis = axis([End::Free; 2]);
+            let axis = axis([End::FREE; 2]);
             let (points, _) = axis.points(2, Layout::Lattice);
             let basis = Basis::new(&axis, p, false, &points).unwrap();
             let knots = knots(&axis, p);
@@ -504,7 +504,7 @@ mod tests {
     #[test]
     fn integration_is_the_transpose_of_evaluation_along_any_axis() {
         for p in 2..=MOST_DEGREE {
-            let axis = axis([End::Free, End::Wall]);
+            let axis = axis([End::FREE, End::Wall]);
             let (points, _) = axis.points(2, Layout::Lattice);
             let basis = Basis::new(&axis, p, true, &points).unwrap();
             for (outer, inner) in [(1, 1), (3, 1), (1, 5), (2, 3)] {

@@ -1,5 +1,7 @@
 //! Boundary data on the sides of a body: prescribed motion or traction.
 //!
+//! What is given may differ from component to component of the grid's coordinates: all of what follows holds for each component by itself.
+//!
 //! # Sides whose motion is given
 //!
 //! Splines are clamped there, so that the functions of one side alone do not vanish on it, and their coefficients are the
@@ -63,8 +65,8 @@ pub enum Quantity {
     Traction,
 }
 
-/// Boundary data of a body: the motion of sides that are [`End::Moved`](super::End::Moved), the traction on sides that are
-/// [`End::Loaded`](super::End::Loaded).
+/// Boundary data of a body: the motion of sides where that of a component is given, and the traction where one of that is (see
+/// [`End::Open`](super::End::Open)).
 pub trait BoundaryData<const D: usize> {
     /// Writes a quantity at the reference positions `X` on a side at time `t`, in Cartesian components; both slices have
     /// the same length. The contents of `values` on entry are unspecified.
@@ -111,12 +113,14 @@ impl<const D: usize> BoundaryData<D> for HeldBoundary {
     }
 }
 
-/// The places on a side where something is given.
+/// The places on a side where something is given, the same of some components.
 #[derive(Clone, Debug)]
 pub(crate) struct Face<const D: usize> {
     pub(crate) side: Side,
-    /// Whether its motion is given, not the traction.
+    /// Whether their motion is given, not the traction.
     pub(crate) moved: bool,
+    /// The components that it is given of.
+    pub(crate) given: [bool; D],
     /// Reference positions, Cartesian, at the products of the other axes' points, the lowest axis fastest. Where the motion
     /// is given, ends of other axes whose motion is given belong to their points.
     pub(crate) X: Vec<SVector<f64, D>>,
@@ -129,6 +133,16 @@ pub(crate) struct Face<const D: usize> {
 }
 
 impl<const D: usize> Face<D> {
+    /// Whether the motion of a component is given.
+    pub(crate) fn moves(&self, component: usize) -> bool {
+        self.moved && self.given[component]
+    }
+
+    /// Whether the traction along a component is given.
+    pub(crate) fn loads(&self, component: usize) -> bool {
+        !self.moved && self.given[component]
+    }
+
     /// Asks for a quantity in the components that the unknowns stand for.
     pub(crate) fn ask(&mut self, data: &dyn BoundaryData<D>, quantity: Quantity, t: f64) {
         data.evaluate(quantity, self.side, &self.X, t, &mut self.values);

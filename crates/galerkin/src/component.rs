@@ -14,14 +14,14 @@ use super::fit::Fit;
 use super::mass::{Band, Mass};
 use super::piece;
 
-/// The linear operators along the axes: for each axis those of the components across it, and those of the one along it.
+/// The linear operators along the axes: splines of the components across each axis and of the one along it, matrices of each component.
 #[derive(Clone, Debug)]
 pub(super) struct Operators<const D: usize> {
     pub(super) bases: [[Basis; 2]; D],
     /// Solves for accelerations.
-    pub(super) mass: [[Mass; 2]; D],
+    pub(super) mass: [[Mass; D]; D],
     /// Fits coefficients to values; or why the particles do not determine them.
-    pub(super) fits: Result<[[Fit; 2]; D], SetupError>,
+    pub(super) fits: Result<[[Fit; D]; D], SetupError>,
 }
 
 /// The entry of `pairs` for a component along axis `k`: the second where it is the component along this axis, else the first.
@@ -187,18 +187,18 @@ impl<const D: usize> Component<D> {
         let (index, functions) = (self.index, self.functions(bases));
         let mut a = mem::take(&mut self.a);
         self.integrate(bases, of, &mut a);
-        for face in faces.iter().filter(|face| !face.moved) {
+        for face in faces.iter().filter(|face| face.loads(index)) {
             let forces = face.load(index, |k| along(bases, k, index));
             face.add(&functions, &forces, &mut a);
         }
         if let (Some(density), Ok(fits)) = (coupling, fits) {
             let given = mem::take(&mut self.given);
-            let matrix = |k: usize| &along(fits, k, index).matrix;
+            let matrix = |k: usize| &fits[k][index].matrix;
             self.subtract_product(&functions, matrix, density, &given, &mut a);
             self.given = given;
         }
-        solve(&functions, |k| along(mass, k, index), &mut a);
-        for face in faces.iter().filter(|face| face.moved) {
+        solve(&functions, |k| &mass[k][index], &mut a);
+        for face in faces.iter().filter(|face| face.moves(index)) {
             face.copy(&functions, &self.given, &mut a);
         }
         self.a = a;

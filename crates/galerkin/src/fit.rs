@@ -41,11 +41,16 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// `None` where the particles do not determine all coefficients.
-    pub(crate) fn new(axis: &Axis, basis: &Basis, weights: &[f64]) -> Option<Self> {
+    /// That of a component; `None` where the particles do not determine all coefficients.
+    pub(crate) fn new(
+        axis: &Axis,
+        component: usize,
+        basis: &Basis,
+        weights: &[f64],
+    ) -> Option<Self> {
         let matrix = Band::consistent(basis, weights);
-        let mass = Mass::consistent(axis, &matrix)?;
-        Some(Self { moved: axis.moved(), weights: weights.to_vec(), matrix, mass })
+        let mass = Mass::consistent(axis, component, &matrix)?;
+        Some(Self { moved: axis.moved(component), weights: weights.to_vec(), matrix, mass })
     }
 
     /// Takes values along one axis of an array, at the particles and before and after them at the ends whose motion is given,
@@ -93,9 +98,9 @@ mod tests {
     #[test]
     fn coefficients_come_back_from_their_own_values() {
         for ends in [
-            [End::Free, End::Moved],
-            [End::Moved, End::Moved],
-            [End::Moved, End::Wall],
+            [End::FREE, End::MOVED],
+            [End::MOVED, End::MOVED],
+            [End::MOVED, End::Wall],
             [End::Periodic, End::Periodic],
         ] {
             for p in 2..=5 {
@@ -110,13 +115,13 @@ mod tests {
                 let mut at_particles = vec![0.0; line.points.len()];
                 basis.evaluate(ValueOrSlope::Value, 1, &coefficients, &mut at_particles);
                 let mut values = at_particles;
-                if ends[0] == End::Moved {
+                if ends[0] == End::MOVED {
                     values.insert(0, coefficients[0]);
                 }
-                if ends[1] == End::Moved {
+                if ends[1] == End::MOVED {
                     values.push(coefficients[basis.functions - 1]);
                 }
-                let fit = Fit::new(&axis, &basis, &line.weights).unwrap();
+                let fit = Fit::new(&axis, 0, &basis, &line.weights).unwrap();
                 // Two blocks with two lines each, one of them twice the other.
                 let both = values.iter().flat_map(|value| [*value, 2.0 * value]);
                 let both: Vec<f64> = both.clone().chain(both).collect();

@@ -65,6 +65,7 @@ pub use composition::Composition;
 pub use coordinates::Coordinates;
 pub use linearised::{Disturbed, Magnitude};
 pub use mmsmith_sparse::Factors;
+pub use mmsmith_vocabulary::ComponentCondition;
 pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;

@@ -22,7 +22,7 @@ use mmsmith_mpm::SetupError;
 use nalgebra::{SMatrix, SVector};
 
 use super::boundary::Face;
-use super::component::{Component, Factors, Field, Operators, along, each_component, solve};
+use super::component::{Component, Factors, Field, Operators, each_component, solve};
 use super::composition::Composition;
 use super::fit::Line;
 use super::quadrature::Quadrature;
@@ -206,8 +206,8 @@ where
             let functions = component.functions(bases);
             let mut v = vec![0.0; component.v.len()];
             component.integrate(bases, Factors::Values, &mut v);
-            solve(&functions, |k| &along(fits, k, index).mass, &mut v);
-            for face in held.iter() {
+            solve(&functions, |k| &fits[k][index].mass, &mut v);
+            for face in held.iter().filter(|face| face.moves(index)) {
                 face.copy(&functions, &component.given, &mut v);
             }
             component.v = v;

@@ -125,15 +125,15 @@ impl Band {
 }
 
 impl Mass {
-    /// Factors a consistent matrix, the coefficients of ends with a given motion left out; `None` where the particles do not
+    /// Factors a consistent matrix, the coefficients of ends where the component's motion is given left out; `None` where the particles do not
     /// determine all coefficients.
-    pub(crate) fn consistent(axis: &Axis, matrix: &Band) -> Option<Self> {
+    pub(crate) fn consistent(axis: &Axis, component: usize, matrix: &Band) -> Option<Self> {
         if axis.ends[0] == End::Periodic {
             let copies = matrix.band;
             let bordered = Bordered::new(matrix, copies)?;
             return Some(Self { inverse: Inverse::Bordered(bordered), copies });
         }
-        let factors = Ldl::new(&matrix.clone().without(axis.moved()))?;
+        let factors = Ldl::new(&matrix.clone().without(axis.moved(component)))?;
         Some(Self { inverse: Inverse::Banded(factors), copies: 0 })
     }
 
@@ -411,11 +411,11 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     const ENDS: [[End; 2]; 6] = [
-        [End::Free; 2],
+        [End::FREE; 2],
         [End::Wall; 2],
-        [End::Wall, End::Free],
-        [End::Moved; 2],
-        [End::Moved, End::Wall],
+        [End::Wall, End::FREE],
+        [End::MOVED; 2],
+        [End::MOVED, End::Wall],
         [End::Periodic; 2],
     ];
 
@@ -429,7 +429,7 @@ mod tests {
             assert_eq!((basis.functions, basis.width), (1, 1));
             let of_point = |q: usize| weights[q] * basis.row(q, ValueOrSlope::Value).1[0].powi(2);
             let expected: f64 = (0..3).map(of_point).sum();
-            let mass = Mass::consistent(&axis, &Band::consistent(&basis, &weights)).unwrap();
+            let mass = Mass::consistent(&axis, 0, &Band::consistent(&basis, &weights)).unwrap();
             for inner in [1, 3] {
                 let mut values: Vec<f64> = (1..=21).map(f64::from).collect();
                 mass.solve(inner, &mut values);
@@ -445,7 +445,7 @@ mod tests {
 
     /// The matrix between the coefficients that are not given and not copies, and where these lie.
     fn dense(axis: &Axis, basis: &Basis, weights: &[f64]) -> (DMatrix<f64>, Vec<usize>) {
-        let [lower, upper] = axis.moved().map(usize::from);
+        let [lower, upper] = axis.moved(0).map(usize::from);
         let periodic = axis.ends[0] == End::Periodic;
         let own = if periodic { axis.cells } else { basis.functions };
         let mut dense = DMatrix::<f64>::zeros(own, own);
@@ -477,7 +477,7 @@ mod tests {
                     let m = basis.functions;
                     let (dense, kept) = dense(&axis, &basis, &weights);
                     let mass =
-                        Mass::consistent(&axis, &Band::consistent(&basis, &weights)).unwrap();
+                        Mass::consistent(&axis, 0, &Band::consistent(&basis, &weights)).unwrap();
                     for (outer, inner) in [(2, 3), (LINES + 2, 1)] {
                         let wave = |i: usize| (i as f64 * 0.37).sin();
                         let given: Vec<f64> = (0..outer * m * inner).map(wave).collect();
@@ -505,7 +505,7 @@ mod tests {
 
     #[test]
     fn the_product_is_that_of_the_dense_matrix() {
-        let axis = Axis { lower: 0.0, upper: 1.0, cells: 5, ends: [End::Free; 2] };
+        let axis = Axis { lower: 0.0, upper: 1.0, cells: 5, ends: [End::FREE; 2] };
         let (points, weights) = axis.points(4, Layout::Gauss);
         let basis = Basis::new(&axis, 3, false, &points).unwrap();
         let (dense, _) = dense(&axis, &basis, &weights);
@@ -524,15 +524,15 @@ mod tests {
 
     #[test]
     fn too_few_points_are_seen() {
-        for ends in [End::Free, End::Moved, End::Periodic] {
+        for ends in [End::FREE, End::MOVED, End::Periodic] {
             let axis = Axis { lower: 0.0, upper: 1.0, cells: 6, ends: [ends; 2] };
             let (points, mut weights) = axis.points(1, Layout::Lattice);
-            if ends != End::Free {
+            if ends != End::FREE {
                 // One a cell is enough for these.
                 weights[2..].fill(0.0);
             }
             let basis = Basis::new(&axis, 3, false, &points).unwrap();
-            assert!(Mass::consistent(&axis, &Band::consistent(&basis, &weights)).is_none());
+            assert!(Mass::consistent(&axis, 0, &Band::consistent(&basis, &weights)).is_none());
         }
     }
 

@@ -34,11 +34,11 @@ impl<const D: usize> Projection<D> {
         let mut along = Vec::with_capacity(D);
         for (k, line) in lines.iter().enumerate() {
             // Nothing is prescribed for a change of volume: at walls it is continued by its mirror image, elsewhere it is free.
-            let free = |end| if end == End::Moved { End::Free } else { end };
+            let free = |end: End| if end.is_clamped() { End::FREE } else { end };
             let axis = Axis { ends: grid.axes[k].ends.map(free), ..grid.axes[k] };
             let too_few = SetupError::TooFewCells { axis: k, cells: axis.cells, least: 2 };
             let basis = Basis::new(&axis, degree - 1, false, &line.points).ok_or(too_few)?;
-            let mass = Mass::consistent(&axis, &Band::consistent(&basis, &line.weights));
+            let mass = Mass::consistent(&axis, 0, &Band::consistent(&basis, &line.weights));
             let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
             along.push((basis, mass.ok_or(singular)?));
         }

@@ -3,11 +3,13 @@
 use std::array;
 
 use mmsmith_mpm::{Particles, SetupError};
+use mmsmith_vocabulary::ComponentCondition;
 use nalgebra::{SMatrix, SVector};
 
 use super::axis::{Axis, End, Layout};
 use super::basis::{Basis, MOST_DEGREE};
 use super::boundary::{Face, Side};
+use super::component::along;
 use super::composition::Composition;
 use super::coordinates::{Coordinates, RowGeometry};
 use super::fit::{Fit, Line};
@@ -80,61 +82,94 @@ pub(super) fn bases<const D: usize>(
     Ok(array::from_fn(|k| bases[k].clone()))
 }
 
-/// Their mass matrices, for a density of the body.
+/// Their mass matrices, by axis and component, for a density of the body.
 pub(super) fn masses<const D: usize>(
     grid: &Grid<D>,
     scheme: &Scheme,
     bases: &[[Basis; 2]; D],
     lines: &[Line; D],
     density: f64,
-) -> Result<[[Mass; 2]; D], SetupError> {
+) -> Result<[[Mass; D]; D], SetupError> {
     let mut masses = Vec::with_capacity(D);
     for (k, (axis, pair)) in grid.axes.iter().zip(bases).enumerate() {
         // The density belongs to the product over the axes, so to one of them.
         let factor = if k == 0 { density } else { 1.0 };
         let weights: Vec<f64> = lines[k].weights.iter().map(|w| w * factor).collect();
-        let mass = |normal: usize| match scheme.mass {
-            MassMatrix::Consistent => {
-                Mass::consistent(axis, &Band::consistent(&pair[normal], &weights))
-            }
-            MassMatrix::Lumped => {
-                let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
-                let skipped = usize::from(on_wall && normal == 1);
-                let count = pair[normal].functions;
-                Some(Mass::lumped(axis, &pair[0], &weights, skipped, count))
+        let mass = |component: usize| {
+            let basis = &pair[usize::from(component == k)];
+            match scheme.mass {
+                MassMatrix::Consistent => {
+                    Mass::consistent(axis, component, &Band::consistent(basis, &weights))
+                }
+                MassMatrix::Lumped => {
+                    let on_wall = scheme.degree % 2 == 1 && axis.ends[0] == End::Wall;
+                    let skipped = usize::from(on_wall && component == k);
+                    Some(Mass::lumped(axis, &pair[0], &weights, skipped, basis.functions))
+                }
             }
         };
-        let both = mass(0).zip(mass(1));
         let singular = SetupError::SingularMass { axis: k, per_cell: grid.per_cell };
-        masses.push(<[Mass; 2]>::from(both.ok_or(singular)?));
+        let of_components: Option<Vec<Mass>> = (0..D).map(mass).collect();
+        masses.push(of_components.ok_or(singular)?);
     }
-    Ok(array::from_fn(|k| masses[k].clone()))
+    Ok(array::from_fn(|k| array::from_fn(|c| masses[k][c].clone())))
 }
 
-/// Fits of coefficients to values, by axis and kind of component; or the axis whose particles do not determine them.
+/// Fits of coefficients to values, by axis and component; or the axis whose particles do not determine them.
 pub(super) fn fits<const D: usize>(
     grid: &Grid<D>,
     bases: &[[Basis; 2]; D],
     lines: &[Line; D],
-) -> Result<[[Fit; 2]; D], usize> {
+) -> Result<[[Fit; D]; D], usize> {
     let mut fits = Vec::with_capacity(D);
     for k in 0..D {
-        let fit = |normal: usize| Fit::new(&grid.axes[k], &bases[k][normal], &lines[k].weights);
-        fits.push(<[Fit; 2]>::from(fit(0).zip(fit(1)).ok_or(k)?));
+        let fit = |c: usize| Fit::new(&grid.axes[k], c, along(bases, k, c), &lines[k].weights);
+        let of_components: Option<Vec<Fit>> = (0..D).map(fit).collect();
+        fits.push(of_components.ok_or(k)?);
     }
-    Ok(array::from_fn(|k| fits[k].clone()))
+    Ok(array::from_fn(|k| array::from_fn(|c| fits[k][c].clone())))
+}
+
+/// Components that are given the same on a side, at the same places.
+struct Given<const D: usize> {
+    moved: bool,
+    components: [bool; D],
+    /// Ends of each axis that belong to the places: where the motion of these components is given as well.
+    ends: [[bool; 2]; D],
+}
+
+/// The components of a side of which something is given, those together that have the same places.
+fn given<const D: usize>(axes: &[Axis; D], side: Side) -> Vec<Given<D>> {
+    let end = axes[side.axis].ends[usize::from(side.upper)];
+    let mut all: Vec<Given<D>> = Vec::new();
+    for c in 0..D {
+        let moved = end.has(c, ComponentCondition::PrescribedMotion);
+        if !moved && !end.has(c, ComponentCondition::PrescribedTraction) {
+            continue;
+        }
+        let ends = array::from_fn(|k| match k == side.axis || !moved {
+            true => [false; 2],
+            false => axes[k].moved(c),
+        });
+        match all.iter_mut().find(|other| other.moved == moved && other.ends == ends) {
+            Some(other) => other.components[c] = true,
+            None => all.push(Given { moved, components: array::from_fn(|k| k == c), ends }),
+        }
+    }
+    all
+}
+
+/// Both sides of each axis.
+fn sides<const D: usize>() -> impl Iterator<Item = Side> {
+    (0..D).flat_map(|axis| [false, true].map(|upper| Side { axis, upper }))
 }
 
 /// The sides where something is given.
 pub(super) fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Face<D>> {
     let mut faces = Vec::new();
-    for axis in 0..D {
-        for upper in [false, true] {
-            let end = grid.axes[axis].ends[usize::from(upper)];
-            if !matches!(end, End::Moved | End::Loaded) {
-                continue;
-            }
-            let moved = end == End::Moved;
+    for side in sides::<D>() {
+        for Given { moved, components, ends } in given(&grid.axes, side) {
+            let Side { axis, upper } = side;
             let own = if upper { grid.axes[axis].upper } else { grid.axes[axis].lower };
             // Coordinates and lengths; the lengths matter for tractions only.
             let places: [Vec<[f64; 2]>; D] = array::from_fn(|k| {
@@ -142,7 +177,7 @@ pub(super) fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Fa
                     return vec![[own, 1.0]];
                 }
                 let (axis, line) = (&grid.axes[k], &lines[k]);
-                let ends = axis.moved().map(|other| moved && other);
+                let ends = ends[k];
                 let particles = line.points.iter().zip(&line.lengths).map(|(x, w)| [*x, *w]);
                 let lower = ends[0].then_some([axis.lower, 0.0]);
                 lower
@@ -153,8 +188,9 @@ pub(super) fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Fa
             });
             let count = places.iter().map(Vec::len).product();
             let mut face = Face {
-                side: Side { axis, upper },
+                side,
                 moved,
+                given: components,
                 X: Vec::with_capacity(count),
                 frames: Vec::new(),
                 areas: Vec::new(),
@@ -306,13 +342,16 @@ pub(super) fn doubles<const D: usize>(grid: &Grid<D>, degree: usize) -> f64 {
             let partial = count(&|k| if k <= axis { points[k] } else { functions[k] });
             doubles += partial * in_vector * (axis as f64 + 2.0);
         }
-        // Of both kinds of components: values, slopes, the first function and the weight; three matrices.
-        doubles += 2.0 * points[axis] * (2.0 * width + 2.0) + 2.0 * functions[axis] * 3.0 * width;
+        // Of both kinds of components: values, slopes and the first function; of each component a weight and three matrices.
+        doubles += 2.0 * points[axis] * (2.0 * width + 1.0);
+        doubles += in_vector * (points[axis] + functions[axis] * 3.0 * width);
         // On sides: positions, values, an area, and the frame.
-        let given =
-            grid.axes[axis].ends.iter().filter(|end| matches!(end, End::Moved | End::Loaded));
+        let given = sides::<D>()
+            .filter(|side| side.axis == axis)
+            .map(|side| given(&grid.axes, side).len())
+            .sum::<usize>();
         let places = count(&|k| if k == axis { 1.0 } else { points[k] });
-        doubles += given.count() as f64 * places * (2.0 * in_vector + 1.0 + in_frame);
+        doubles += given as f64 * places * (2.0 * in_vector + 1.0 + in_frame);
     }
     if curvilinear {
         doubles += points[0] + count(&|k| if k == 0 { 1.0 } else { points[k] }) * (in_frame + 2.0);

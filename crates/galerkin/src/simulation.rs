@@ -228,10 +228,10 @@ impl<const D: usize> TotalLagrangian<D> {
             let given = mem::take(of(component));
             let mut sums = vec![0.0; given.len()];
             component.integrate(bases, Factors::Values, &mut sums);
-            let matrix = |k: usize| &along(fits, k, index).matrix;
+            let matrix = |k: usize| &fits[k][index].matrix;
             component.subtract_product(&functions, matrix, 1.0, &given, &mut sums);
-            solve(&functions, |k| &along(fits, k, index).mass, &mut sums);
-            for face in faces.iter().filter(|face| face.moved) {
+            solve(&functions, |k| &fits[k][index].mass, &mut sums);
+            for face in faces.iter().filter(|face| face.moves(index)) {
                 face.copy(&functions, &given, &mut sums);
             }
             *of(component) = sums;
@@ -318,9 +318,9 @@ impl<const D: usize> TotalLagrangian<D> {
         let Ok(fits) = fits else { return };
         for face in faces.iter_mut().filter(|face| face.moved) {
             face.ask(boundary, quantity, time);
-            for component in components.iter_mut() {
+            for component in components.iter_mut().filter(|own| face.moves(own.index)) {
                 let index = component.index;
-                let axis = |k: usize| (along(fits, k, index), along(bases, k, index));
+                let axis = |k: usize| (&fits[k][index], along(bases, k, index));
                 let of_side = face.fit(index, axis);
                 face.set(&component.functions(bases), &of_side, of(component));
             }
@@ -679,6 +679,7 @@ mod tests {
     use crate::composition::Composition;
     use crate::coordinates::Coordinates;
     use crate::set_up::doubles;
+    use mmsmith_vocabulary::ComponentCondition;
 
     /// The numbers that a simulation holds, counted.
     fn held<const D: usize>(body: &TotalLagrangian<D>) -> usize {
@@ -699,17 +700,17 @@ mod tests {
         let rows = body.rows.len() * (D * D + 2) + body.reciprocal_radius.len();
         // A basis has values and slopes and the first function of each particle, a fit its weight and the matrix, and both the
         // fit and the mass the matrix's factors.
-        let along = |basis: &Basis| {
-            basis.points * (2 * basis.width + 2) + 3 * basis.functions * basis.width
-        };
-        let along: usize = body.operators.bases.iter().flatten().map(along).sum();
+        let along = |basis: &Basis| 2 * basis.points * (2 * basis.width + 1);
+        let of_component = |basis: &Basis| D * (basis.points + 3 * basis.functions * basis.width);
+        let along = |[basis, _]: &[Basis; 2]| along(basis) + of_component(basis);
+        let along: usize = body.operators.bases.iter().map(along).sum();
         let of_sides: usize = faces.iter().map(of_sides).sum();
         of_particles + of_components + of_sides + rows + along
     }
 
     #[test]
     fn a_grid_beyond_memory_is_refused_with_the_bytes_it_needs() {
-        let axis = Axis { lower: 0.0, upper: 1.0, cells: 1 << 22, ends: [End::Free; 2] };
+        let axis = Axis { lower: 0.0, upper: 1.0, cells: 1 << 22, ends: [End::FREE; 2] };
         let mut grid = Grid {
             axes: [axis; 2],
             coordinates: Coordinates::Cartesian,
@@ -751,9 +752,14 @@ mod tests {
             body.start(&still, &still).unwrap();
             assert_eq!(expected, held(&body) as f64, "{coordinates:?} {cells:?}");
         }
-        const FREE: [End; 2] = [End::Free; 2];
-        const MOVED: [End; 2] = [End::Moved; 2];
-        const LOADED: [End; 2] = [End::Loaded; 2];
+        const FREE: [End; 2] = [End::FREE; 2];
+        const MOVED: [End; 2] = [End::MOVED; 2];
+        const LOADED: [End; 2] = [End::LOADED; 2];
+        let mixed = End::Open([
+            ComponentCondition::PrescribedMotion,
+            ComponentCondition::PrescribedTraction,
+            ComponentCondition::TractionFree,
+        ]);
         let cartesian = Coordinates::Cartesian;
         for degree in [2, 5] {
             check(cartesian, [400], [FREE], degree + 1, degree);
@@ -762,9 +768,10 @@ mod tests {
             // Many coefficients between few particles, and long sides.
             check(cartesian, [1, 300], [LOADED, FREE], degree + 1, degree);
             check(cartesian, [300, 1], [FREE, MOVED], degree + 1, degree);
-            check(cartesian, [7], [[End::Moved, End::Loaded]], degree + 1, degree);
+            check(cartesian, [7], [[End::MOVED, End::LOADED]], degree + 1, degree);
             check(cartesian, [1, 1, 200], [FREE, LOADED, FREE], degree + 1, degree);
             check(cartesian, [200, 1, 1], [FREE, FREE, LOADED], degree + 1, degree);
+            check(cartesian, [1, 300], [FREE, [mixed; 2]], degree + 1, degree);
             check(Coordinates::Polar, [1, 300], [LOADED, FREE], degree + 1, degree);
             check(Coordinates::Polar, [300, 1], [FREE, LOADED], degree + 1, degree);
             check(Coordinates::Spherical, [1, 20, 20], [LOADED, FREE, FREE], degree + 1, degree);

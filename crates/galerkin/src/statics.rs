@@ -261,7 +261,7 @@ at_rest! { 1 2 3 }
 struct Statics<const D: usize> {
     bases: [[Basis; 2]; D],
     /// Fits of what is given on sides; none where nothing is.
-    fits: Option<[[Fit; 2]; D]>,
+    fits: Option<[[Fit; D]; D]>,
     faces: Vec<Face<D>>,
     components: [Component<D>; D],
     at: Quadrature<D>,
@@ -347,14 +347,15 @@ impl<const D: usize> Statics<D> {
             for (c, component) in components.iter().enumerate() {
                 let functions = component.functions(bases);
                 match fits {
-                    Some(fits) if face.moved => {
-                        let axis = |k: usize| (along(fits, k, c), along(bases, k, c));
+                    Some(fits) if face.moves(c) => {
+                        let axis = |k: usize| (&fits[k][c], along(bases, k, c));
                         face.set(&functions, &face.fit(c, axis), &mut given[c]);
                     }
-                    _ => {
+                    _ if face.loads(c) => {
                         let of_side = face.load(c, |k| along(bases, k, c));
                         face.add(&functions, &of_side, &mut forces[c]);
                     }
+                    _ => {}
                 }
             }
         }

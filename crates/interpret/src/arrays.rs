@@ -1,7 +1,7 @@
 //! Fields at many points, in flat arrays as hosts hold them.
 
 use crate::staged::{PerPoint, Stage, coordinate};
-use crate::{InterpretError, resolve, surface};
+use crate::{InterpretError, resolve};
 use mmsmith_expr::{Program, Slot};
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{AnySolution, BLOCK, Solution, Surface};
@@ -52,7 +52,7 @@ impl Remembering {
             AnySolution::Three(solution) => solution.internal_variables(),
             _ => Vec::new(),
         };
-        let surfaces = spec.domain.surfaces(spec.dimension).into_iter().map(surface).collect();
+        let surfaces = spec.domain.surfaces(spec.dimension);
         Ok(Self { solution, surfaces, variables })
     }
 
@@ -181,7 +181,7 @@ impl Arrays {
         let tractions = staged
             .tractions
             .iter()
-            .map(|traction| (Quantity::Traction(surface(traction.surface)), &traction.outputs[..]));
+            .map(|traction| (Quantity::Traction(traction.surface), &traction.outputs[..]));
         let (u, rest) = staged.state.outputs().split_at(n);
         let (F, P) = rest.split_at(n * n);
         let state = [

@@ -20,9 +20,9 @@ use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_history::HistoryError;
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{
-    AnySolution, Around, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields,
-    HistoryReport, InternalAtPoints, Lattice, Law, ParameterError, PlainPoints, Real, Solution,
-    StateAtPoints, StateRun, Surface,
+    AnySolution, Around, BLOCK, BodyForceAtPoints, Boundary, Domain, Fields, HistoryReport,
+    InternalAtPoints, Lattice, Law, ParameterError, PlainPoints, Real, Solution, StateAtPoints,
+    StateRun, Surface,
 };
 use mmsmith_spec::{self as spec, Coordinates, DeriveError, Spec};
 use mmsmith_stage::{FieldName, Measures, Sides, Staged, TubeMeasures};
@@ -263,7 +263,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
             tractions: staged
                 .tractions
                 .iter()
-                .map(|traction| (surface(traction.surface), part(&traction.outputs)))
+                .map(|traction| (traction.surface, part(&traction.outputs)))
                 .collect(),
             body_force_stages: PointStages::new::<D>(program, [&staged.body_force]),
             lattice_stages: staged
@@ -272,7 +272,7 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
                 .map(|lattice| LatticeStages::new(program, lattice)),
             state_stages: PointStages::new::<D>(program, [&staged.state, &staged.velocity]),
             domain,
-            boundaries: spec.boundaries.iter().map(boundary).collect(),
+            boundaries: spec.boundaries.clone(),
             cell_length: constant(staged.constants.cell_length),
             law,
             density,
@@ -295,28 +295,6 @@ impl<T: Interpretable, const D: usize> Interpreted<T, D> {
 /// Coordinates, time and parameters, in the order of the programs' inputs.
 fn inputs<T: Interpretable>(X: &[T], t: T, parameters: &[T]) -> Vec<T> {
     X.iter().copied().chain([t]).chain(parameters.iter().copied()).collect()
-}
-
-fn boundary(boundary: &spec::Boundary) -> Boundary {
-    let condition = match boundary.condition {
-        spec::Condition::Sliding => Condition::Sliding,
-        spec::Condition::Symmetry => Condition::Symmetry,
-        spec::Condition::TractionFree => Condition::TractionFree,
-        spec::Condition::PrescribedTraction => Condition::PrescribedTraction,
-        spec::Condition::PrescribedMotion => Condition::PrescribedMotion,
-    };
-    Boundary { surface: surface(boundary.surface), condition }
-}
-
-fn surface(surface: spec::Surface) -> Surface {
-    match surface {
-        spec::Surface::Lower(axis) => Surface::Lower(axis),
-        spec::Surface::Upper(axis) => Surface::Upper(axis),
-        spec::Surface::Inner => Surface::Inner,
-        spec::Surface::Outer => Surface::Outer,
-        spec::Surface::FirstAngle => Surface::FirstAngle,
-        spec::Surface::LastAngle => Surface::LastAngle,
-    }
 }
 
 impl<T: Interpretable, const D: usize> Solution<T, D> for Interpreted<T, D> {

@@ -1,8 +1,7 @@
-//! The body in its reference configuration: shape and boundary conditions.
-
-use std::fmt;
+//! The body in its reference configuration: shape, and normals on its boundary.
 
 use crate::Real;
+use mmsmith_vocabulary::Surface;
 use nalgebra::SVector;
 
 /// The shape of the body, in its reference configuration, with lengths in the solution's unit.
@@ -128,81 +127,4 @@ fn across<T: Real, const D: usize>(angle: T, sign: T) -> SVector<T, D> {
         1 => cos * sign,
         _ => T::zero(),
     })
-}
-
-/// A part of the body's boundary, or a plane that cuts the body in halves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Surface {
-    /// The face of smallest coordinate along an axis; for an annulus, the plane through the origin normal to it.
-    Lower(usize),
-    /// The face of largest coordinate along an axis.
-    Upper(usize),
-    /// The inner rim.
-    Inner,
-    /// The outer rim.
-    Outer,
-    /// The plane through the axis at the smallest angle of a sector.
-    FirstAngle,
-    /// The plane through the axis at the largest angle of a sector.
-    LastAngle,
-}
-
-impl Surface {
-    /// Every surface that a body in so many dimensions may have: rims and planes of angles first, then the ends of each axis.
-    pub fn all(dimension: usize) -> impl Iterator<Item = Self> + Clone {
-        let ends = (0..dimension).flat_map(|axis| [Self::Lower(axis), Self::Upper(axis)]);
-        [Self::Inner, Self::Outer, Self::FirstAngle, Self::LastAngle].into_iter().chain(ends)
-    }
-}
-
-/// The name that specifications have for it, such as `X-lower`.
-impl fmt::Display for Surface {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let axis = |axis: usize| ["X", "Y", "Z"].get(axis).copied().unwrap_or("?");
-        match self {
-            Self::Lower(index) => f.pad(&format!("{}-lower", axis(*index))),
-            Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
-            Self::Inner => f.pad("inner"),
-            Self::Outer => f.pad("outer"),
-            Self::FirstAngle => f.pad("theta-lower"),
-            Self::LastAngle => f.pad("theta-upper"),
-        }
-    }
-}
-
-/// Condition on a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Condition {
-    /// No displacement along the normal, no shear traction.
-    Sliding,
-    /// The body is cut along a plane of symmetry: half of it is modelled, and the cut behaves as a sliding wall.
-    Symmetry,
-    /// No traction.
-    TractionFree,
-    /// The traction `P N` of the solution.
-    PrescribedTraction,
-    /// The displacement of the solution.
-    PrescribedMotion,
-}
-
-/// The name that specifications have for it, such as `sliding`.
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Sliding => "sliding",
-            Self::Symmetry => "symmetry",
-            Self::TractionFree => "traction-free",
-            Self::PrescribedTraction => "prescribed-traction",
-            Self::PrescribedMotion => "prescribed-motion",
-        })
-    }
-}
-
-/// A boundary condition.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Boundary {
-    /// The surface.
-    pub surface: Surface,
-    /// The condition.
-    pub condition: Condition,
 }

@@ -22,7 +22,7 @@ mod real;
 mod solution;
 mod staged;
 
-pub use domain::{Around, Boundary, Condition, Domain, Surface};
+pub use domain::{Around, Domain};
 pub use history::HistoryReport;
 pub use history_table::{HistoryTable, PointSeries, TableError, TabulatedPoints};
 pub use lattice::{BodyForceOnLattice, Lattice, LatticePoints};
@@ -31,8 +31,9 @@ pub use libm;
 /// The functions that [`Real`] has beyond those of a field.
 pub use mmsmith_scalar_functions::ScalarFunctions;
 pub use mmsmith_vocabulary::{
-    Across, Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response,
-    Smoothness, Stated, Volumetric, WithMemory,
+    Across, Boundary, ComponentCondition, Components, Condition, Element, Flow, Form, Internal,
+    Law, Material, Memory, Mixed, Overstress, Response, Smoothness, Stated, Surface, Volumetric,
+    WithMemory,
 };
 /// The vectors and matrices of this crate's interface.
 pub use nalgebra;

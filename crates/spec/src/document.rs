@@ -220,7 +220,46 @@ pub(crate) struct DomainTable {
 )]
 pub(crate) struct BoundaryTable {
     pub(crate) surface: Spanned<String>,
-    pub(crate) condition: Spanned<String>,
+    pub(crate) condition: Option<ConditionWord>,
+    pub(crate) normal: Option<Spanned<String>>,
+    pub(crate) tangential: Option<Spanned<String>>,
+    pub(crate) X: Option<Spanned<String>>,
+    pub(crate) Y: Option<Spanned<String>>,
+    pub(crate) Z: Option<Spanned<String>>,
+    /// No way to state a condition, but one that is tried.
+    pub(crate) component: Option<Spanned<String>>,
+}
+
+/// A condition on all components.
+pub(crate) struct ConditionWord(pub(crate) Spanned<String>);
+
+impl<'de> Deserialize<'de> for ConditionWord {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Word(String);
+        struct WordVisitor;
+        impl Visitor<'_> for WordVisitor {
+            type Value = Word;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(
+                    "a word, as in condition = 'sliding'; by component write in its place normal = 'prescribed-motion', \
+                     tangential = 'traction-free'",
+                )
+            }
+
+            fn visit_str<E>(self, value: &str) -> Result<Word, E> {
+                Ok(Word(value.to_owned()))
+            }
+        }
+        impl<'de> Deserialize<'de> for Word {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                deserializer.deserialize_any(WordVisitor)
+            }
+        }
+        let spanned = Spanned::<Word>::deserialize(deserializer)?;
+        let span = spanned.span();
+        Ok(ConditionWord(Spanned::new(span, spanned.into_inner().0)))
+    }
 }
 
 #[derive(serde::Deserialize)]

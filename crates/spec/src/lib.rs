@@ -7,6 +7,7 @@
 //! The derivation works in the specification's own coordinates, on physical components, and turns to Cartesian
 //! components last: see [`Fields`].
 
+mod boundary;
 mod coordinates;
 mod cross_check;
 mod derivation;
@@ -34,12 +35,10 @@ pub use cross_check::{CrossCheck, InlineText, ListingText};
 pub use derive::{DeriveError, Fields, HistoryFields};
 pub use diagnostic::{Diagnostic, Looks, nearest};
 pub use memory::{Given, InternalVariable};
+pub use mmsmith_vocabulary::{Boundary, ComponentCondition, Condition, Form, Mixed, Surface};
 pub use read::{LONGEST_FILE, ReadError, read_text};
 pub use rotation::Rotation;
 pub use solve::{Solved, SolvedCondition};
-pub use spec::{
-    Around, Bound, Boundary, Condition, Domain, Law, Parameter, Relation, Requirement, Spec,
-    Surface,
-};
+pub use spec::{Around, Bound, Domain, Law, Parameter, Relation, Requirement, Spec};
 pub use surface::{Claim, ClaimKind, SurfaceFields};
 pub use variation::Variation;

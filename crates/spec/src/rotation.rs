@@ -10,7 +10,7 @@ use crate::document::{BoundaryTable, RotationTable};
 use crate::law::energy::component_names;
 use crate::scope::Scope;
 use crate::tensor::Matrix;
-use crate::{Boundary, Condition, Diagnostic, Law};
+use crate::{Boundary, ComponentCondition, Condition, Diagnostic, Law};
 use mmsmith_expr::{Derivatives, Expr, Function, Graph};
 use std::collections::BTreeSet;
 use toml::Spanned;
@@ -71,15 +71,24 @@ impl Rotation {
             let what = match boundary.condition {
                 Condition::Sliding => "a sliding wall",
                 Condition::Symmetry => "a plane of symmetry",
+                Condition::Mixed(_)
+                    if boundary.condition.gives(ComponentCondition::TractionFree) =>
+                {
+                    let message = "the free component of a traction turns with the body";
+                    let help = "with [with-rotation] write 'prescribed-traction' in place of 'traction-free' by component";
+                    let span = keys.condition_span();
+                    return Err(scope.source.error(message, span, Some(help.into())));
+                }
                 Condition::TractionFree
                 | Condition::PrescribedTraction
-                | Condition::PrescribedMotion => continue,
+                | Condition::PrescribedMotion
+                | Condition::Mixed(_) => continue,
             };
             let message =
                 format!("{what} stands still, and a rotated body does not slide along it");
             let help = "with [with-rotation] a surface has condition = 'traction-free', 'prescribed-traction' or \
                         'prescribed-motion'";
-            return Err(scope.source.error(message, keys.condition.span(), Some(help.into())));
+            return Err(scope.source.error(message, keys.condition_span(), Some(help.into())));
         }
         let indifferent = match material {
             Law::Library(material) => material.row().is_objective,

@@ -1,21 +1,18 @@
 //! Reading a specification: from the document to checked names, numbers and expressions.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 
-use crate::coordinates::{CARTESIAN, Geometry};
+use crate::coordinates::Geometry;
 use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
-use crate::document::{
-    BoundaryTable, Document, DomainTable, Entries, List, Measure, ParameterEntry, Text,
-};
+use crate::document::{Document, DomainTable, Entries, List, Measure, ParameterEntry, Text};
 use crate::law::energy::{INVARIANTS, component_names};
 use crate::read::LONGEST_FILE;
 use crate::scope::Scope;
 use crate::source::Source;
 use crate::{
-    Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Given, InternalVariable, Rotation,
-    Solved, Variation,
+    Boundary, Coordinates, CrossCheck, DeriveError, Diagnostic, Fields, Given, InternalVariable,
+    Rotation, Solved, Variation,
 };
 use mmsmith_expr::{Expr, Function, Graph, Node, Program, RangeOfInputs, Rational};
 use mmsmith_vocabulary::{Constant, Material, Memory, Moduli, Row, Term, UnknownLaw, Volumetric};
@@ -343,77 +340,6 @@ impl<E> Around<E> {
             Self::Sector { from, to } => Some([from, to]),
         }
     }
-}
-
-/// A part of the boundary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Surface {
-    /// The face of smallest Cartesian coordinate along an axis, or the plane of symmetry normal to it.
-    Lower(usize),
-    /// The face of largest Cartesian coordinate along an axis.
-    Upper(usize),
-    /// The inner rim.
-    Inner,
-    /// The outer rim.
-    Outer,
-    /// The plane through the axis at the smallest angle of a sector.
-    FirstAngle,
-    /// The plane through the axis at the largest angle of a sector.
-    LastAngle,
-}
-
-impl fmt::Display for Surface {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let axis = |axis: usize| CARTESIAN.get(axis).copied().unwrap_or("?");
-        match self {
-            Self::Lower(index) => f.pad(&format!("{}-lower", axis(*index))),
-            Self::Upper(index) => f.pad(&format!("{}-upper", axis(*index))),
-            Self::Inner => f.pad("inner"),
-            Self::Outer => f.pad("outer"),
-            Self::FirstAngle => f.pad("theta-lower"),
-            Self::LastAngle => f.pad("theta-upper"),
-        }
-    }
-}
-
-/// Condition on a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Condition {
-    /// No normal displacement, no shear traction.
-    Sliding,
-    /// A plane of symmetry that cuts the body.
-    Symmetry,
-    /// No traction.
-    TractionFree,
-    /// The traction of the solution.
-    PrescribedTraction,
-    /// The displacement of the solution.
-    PrescribedMotion,
-}
-
-impl Condition {
-    const NAMES: [(&'static str, Condition); 5] = [
-        ("sliding", Condition::Sliding),
-        ("symmetry", Condition::Symmetry),
-        ("traction-free", Condition::TractionFree),
-        ("prescribed-traction", Condition::PrescribedTraction),
-        ("prescribed-motion", Condition::PrescribedMotion),
-    ];
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(Self::NAMES.iter().find(|(_, known)| known == self).map_or("", |(name, _)| name))
-    }
-}
-
-/// A boundary condition.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Boundary {
-    /// Where.
-    pub surface: Surface,
-    /// The condition on the surface.
-    pub condition: Condition,
 }
 
 /// Words that cannot be the name of a Rust module or type.
@@ -1155,70 +1081,6 @@ impl<'a> Reader<'a> {
             return Err(self.scope.source.error(message, texts.span(), None));
         }
         List::texts(texts).iter().map(|text| self.scope.constant(text, "a corner")).collect()
-    }
-
-    fn boundary(&mut self, table: &BoundaryTable, domain: &Domain) -> Result<Boundary, Diagnostic> {
-        let mut surfaces: Vec<(String, Surface)> = Vec::new();
-        for (axis, name) in CARTESIAN[..self.dimension].iter().enumerate() {
-            surfaces.push((format!("{name}-lower"), Surface::Lower(axis)));
-            if matches!(domain, Domain::Box { .. }) {
-                surfaces.push((format!("{name}-upper"), Surface::Upper(axis)));
-            }
-        }
-        if matches!(domain, Domain::Annulus { .. }) {
-            surfaces.push(("inner".into(), Surface::Inner));
-            surfaces.push(("outer".into(), Surface::Outer));
-        }
-        if let Domain::Tube { inner, around, .. } = domain {
-            let of_tube = crate::tube::surfaces(*inner, *around);
-            surfaces = of_tube.into_iter().map(|(name, surface)| (name.into(), surface)).collect();
-        }
-        let known = surfaces.iter().map(|(name, surface)| (name.as_str(), *surface));
-        self.refuse_radial_planes(&table.surface, domain)?;
-        let surface = self.choice(&table.surface, "surface", known)?;
-        let condition = self.choice(&table.condition, "condition", Condition::NAMES)?;
-        let cut = matches!(domain, Domain::Annulus { .. }) && matches!(surface, Surface::Lower(_));
-        if cut && condition != Condition::Symmetry {
-            let message = "a plane through the middle of an annulus can only be one of symmetry";
-            let help = "condition = 'symmetry'";
-            return Err(self.scope.source.error(
-                message,
-                table.condition.span(),
-                Some(help.into()),
-            ));
-        }
-        Ok(Boundary { surface, condition })
-    }
-
-    /// Refuses `R-lower` and the like, for which the nearest name would be another surface.
-    fn refuse_radial_planes(
-        &self,
-        surface: &Spanned<String>,
-        domain: &Domain,
-    ) -> Result<(), Diagnostic> {
-        let of_coordinate =
-            surface.get_ref().strip_suffix("-lower").or(surface.get_ref().strip_suffix("-upper"));
-        let Some(coordinate @ ("R" | "theta" | "phi")) = of_coordinate else { return Ok(()) };
-        if matches!(domain, Domain::Tube { .. }) {
-            return Ok(());
-        }
-        let message =
-            format!("there is no surface of constant {coordinate} called '{}'", surface.get_ref());
-        let help = match (domain, coordinate) {
-            (Domain::Annulus { .. }, "R") => {
-                "the surfaces between the radii are 'inner' and 'outer'"
-            }
-            (Domain::Annulus { .. }, _) => {
-                "planes of symmetry are X-lower, Y-lower and, in space, Z-lower"
-            }
-            (Domain::Box { .. }, _) => {
-                "the surfaces of a box are planes, X-lower, X-upper, ...; for a body between two radii write shape = 'annulus' \
-                 (dimension = 2), 'tube' (dimension = 3, cylindrical coordinates) or 'shell' (dimension = 3, spherical ones) with inner \
-                 and outer"
-            }
-            (Domain::Tube { .. }, _) => "",
-        };
-        Err(self.scope.source.error(message, surface.span(), Some(help.into())))
     }
 
     pub(crate) fn choice<'b, T>(

@@ -5,7 +5,10 @@
 //! simplifies to zero, in symbols.
 
 use crate::coordinates::{Geometry, turn_vector};
-use crate::{Around, Boundary, Condition, Coordinates, Domain, Spec, Surface};
+use crate::{
+    Around, Boundary, ComponentCondition, Condition, Coordinates, Domain, Form, Mixed, Spec,
+    Surface,
+};
 use mmsmith_expr::{Expr, Graph, Replacement};
 
 /// Fields on one surface of the body.
@@ -36,6 +39,10 @@ pub enum ClaimKind {
     Traction,
     /// No traction along the surface.
     Shear,
+    /// No traction along the normal.
+    NormalTraction,
+    /// No traction along a Cartesian axis.
+    TractionComponent(usize),
     /// No displacement along the normal.
     NormalDisplacement,
 }
@@ -196,6 +203,9 @@ impl OnSurface<'_, '_> {
                     let what = ClaimKind::NormalDisplacement;
                     claims.push(Claim { what, quantities: vec![along] });
                 }
+                Condition::Mixed(mixed) => {
+                    self.claim_free(mixed, normal, &mut traction, &mut claims)
+                }
                 Condition::PrescribedTraction | Condition::PrescribedMotion => {}
             }
         }
@@ -204,6 +214,61 @@ impl OnSurface<'_, '_> {
             traction = traction.into_iter().map(|t| self.placed(t)).collect();
         }
         SurfaceFields { surface: self.surface, traction, claims }
+    }
+
+    /// Claims that the components of the traction vanish which are stated to be free. `normal` is the component along the normal, where
+    /// there is one.
+    fn claim_free(
+        &mut self,
+        mixed: Mixed,
+        normal: Option<usize>,
+        traction: &mut [Expr],
+        claims: &mut Vec<Claim>,
+    ) {
+        let free = ComponentCondition::TractionFree;
+        let all = 0..traction.len();
+        let mut claim = |what, of: Vec<usize>| {
+            of.iter().for_each(|&i| traction[i] = self.zero_if_vanishing(traction[i]));
+            claims.push(Claim { what, quantities: of.into_iter().map(|i| traction[i]).collect() });
+        };
+        match (mixed.form(), normal) {
+            (Form::ByComponent(of), _) => {
+                let is_free = |i: &usize| of.get(*i) == Some(&free);
+                all.filter(is_free).for_each(|i| claim(ClaimKind::TractionComponent(i), vec![i]));
+            }
+            (Form::ByDirection { normal: across, .. }, Some(normal)) if across == free => {
+                claim(ClaimKind::NormalTraction, vec![normal]);
+            }
+            (Form::ByDirection { tangential, .. }, Some(normal)) if tangential == free => {
+                claim(ClaimKind::Shear, all.filter(|&i| i != normal).collect());
+            }
+            (Form::ByDirection { normal: across, tangential }, None) => {
+                let [along, shear] = self.split(own_value(self.spec, self.surface), traction);
+                if across == free {
+                    claims.push(Claim { what: ClaimKind::NormalTraction, quantities: along });
+                }
+                if tangential == free {
+                    claims.push(Claim { what: ClaimKind::Shear, quantities: shear });
+                }
+            }
+            (Form::ByDirection { .. }, Some(_)) => {}
+        }
+    }
+
+    /// The component of a traction along `X/R` on a rim, and what is left of the traction.
+    fn split(&mut self, radius: Expr, traction: &[Expr]) -> [Vec<Expr>; 2] {
+        let X = self.round();
+        let terms: Vec<Expr> =
+            traction.iter().zip(&X).map(|(&t, &x)| self.graph.mul(t, x)).collect();
+        let sum = self.graph.sum_of(terms);
+        let along = self.graph.div(sum, radius);
+        let share = self.graph.div(along, radius);
+        let mut shear = traction.to_vec();
+        for (t, &x) in shear.iter_mut().zip(&X) {
+            let part = self.graph.mul(share, x);
+            *t = self.graph.sub(*t, part);
+        }
+        [vec![along], shear]
     }
 
     fn conditions(&self) -> Vec<Condition> {
@@ -221,20 +286,24 @@ impl OnSurface<'_, '_> {
         P.iter().map(|row| if outward { row[j] } else { self.graph.neg(row[j]) }).collect()
     }
 
+    /// The Cartesian coordinates that a rim is round in: about an axis the normal has no component along it.
+    fn round(&self) -> Vec<Expr> {
+        let count = match &self.spec.domain {
+            Domain::Tube { .. } => 2,
+            Domain::Box { .. } | Domain::Annulus { .. } => self.geometry.cartesian.len(),
+        };
+        self.geometry.cartesian[..count].to_vec()
+    }
+
     /// `P N` on a rim with `N = X/R` or `-X/R`, in Cartesian components.
     fn across(&mut self, radius: Expr) -> Vec<Expr> {
         let outward = self.outward();
         let P = self.fields.P;
-        // About an axis the normal has no component along it.
-        let round = match &self.spec.domain {
-            Domain::Tube { .. } => 2,
-            Domain::Box { .. } | Domain::Annulus { .. } => self.geometry.cartesian.len(),
-        };
-        let X = &self.geometry.cartesian[..round];
+        let X = self.round();
         P.iter()
             .map(|row| {
                 let terms: Vec<Expr> =
-                    row.iter().zip(X).map(|(&entry, &x)| self.graph.mul(entry, x)).collect();
+                    row.iter().zip(&X).map(|(&entry, &x)| self.graph.mul(entry, x)).collect();
                 let sum = self.graph.sum_of(terms);
                 let quotient = self.graph.div(sum, radius);
                 if outward { quotient } else { self.graph.neg(quotient) }

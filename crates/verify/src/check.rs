@@ -7,7 +7,8 @@
 
 use mmsmith_mpm::{Law, Material};
 use mmsmith_runtime::{
-    AnySolution, Around, Boundary, Condition, Domain, Fields, Solution, Surface,
+    AnySolution, Around, Boundary, ComponentCondition, Condition, Domain, Fields, Form, Solution,
+    Surface,
 };
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -713,6 +714,33 @@ fn boundary_findings<const D: usize>(
                 free.add((X, *t), traction(X, N, *t).amax(), own_error, stress);
             }
             vec![free.finding()]
+        }
+        Condition::Mixed(mixed) => {
+            let free = ComponentCondition::TractionFree;
+            let finding = |what: &str, of: &dyn Fn(SVector<f64, D>, &SVector<f64, D>) -> f64| {
+                let mut found = Comparison::new(name(what), "0");
+                for (X, N, t) in places {
+                    let own_error = 16.0 * f64::EPSILON * stress;
+                    found.add((X, *t), of(traction(X, N, *t), N), own_error, stress);
+                }
+                found.finding()
+            };
+            match mixed.form() {
+                Form::ByDirection { normal, .. } if normal == free => {
+                    vec![finding("N.P N", &|traction, N| traction.dot(N).abs())]
+                }
+                Form::ByDirection { tangential, .. } if tangential == free => {
+                    vec![finding("shear", &|traction, N| (traction - N * traction.dot(N)).amax())]
+                }
+                Form::ByDirection { .. } => Vec::new(),
+                Form::ByComponent(of) => (0..D)
+                    .filter(|&i| of[i % 3] == free)
+                    .map(|i| {
+                        let what = format!("P N along {}", ["X", "Y", "Z"][i % 3]);
+                        finding(&what, &|traction, _| traction[i].abs())
+                    })
+                    .collect(),
+            }
         }
         // The solution's own motion or traction is imposed: there is nothing to prove.
         Condition::PrescribedTraction | Condition::PrescribedMotion => Vec::new(),

@@ -4,7 +4,7 @@
 //! points and times: root mean squares, relative to those of what the part is a part of.
 
 use mmsmith_runtime::Law;
-use mmsmith_runtime::{AnySolution, Condition, Solution};
+use mmsmith_runtime::{AnySolution, ComponentCondition, Condition, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use std::fmt;
@@ -183,9 +183,8 @@ where
     let whole = squares.inertia + squares.body_force + (0..3).map(balance).sum::<f64>();
     // In a rigid motion there is no stress, but linear elasticity has some.
     let stress = squares.P.max(squares.linear);
-    let has = |conditions: &[Condition]| {
-        let there = solution.boundaries().iter().any(|b| conditions.contains(&b.condition));
-        f64::from(u8::from(there))
+    let has = |is_meant: &dyn Fn(Condition) -> bool| {
+        f64::from(u8::from(solution.boundaries().iter().any(|b| is_meant(b.condition))))
     };
     let shares = Part::all().into_iter().map(|part| {
         let share = match part {
@@ -199,8 +198,10 @@ where
             Part::Rotation => share(squares.skew_strain, squares.strain),
             Part::SkewStress => share(squares.skew_P, squares.P),
             Part::LoadedSurface => share(loads(solution, count), squares.P),
-            Part::FreeSurface => has(&[Condition::TractionFree]),
-            Part::Wall => has(&[Condition::Sliding, Condition::Symmetry]),
+            Part::FreeSurface => {
+                has(&|condition| condition.gives(ComponentCondition::TractionFree))
+            }
+            Part::Wall => has(&Condition::is_wall),
         };
         // Round-off is no share: where something vanishes but for it, nothing is exercised.
         Share { part, share: if share < ROUND_OFF { 0.0 } else { share } }
@@ -232,7 +233,8 @@ fn without_pressure(law: Law<f64>) -> Law<f64> {
 fn loads<const D: usize>(solution: &dyn Solution<f64, D>, count: usize) -> f64 {
     let domain = solution.domain();
     let loaded = solution.boundaries().iter().filter(|b| {
-        matches!(b.condition, Condition::PrescribedTraction | Condition::PrescribedMotion)
+        let given = [ComponentCondition::PrescribedTraction, ComponentCondition::PrescribedMotion];
+        given.into_iter().any(|one| b.condition.gives(one))
     });
     loaded
         .map(|boundary| {

@@ -54,6 +54,7 @@ mod run;
 mod scene;
 mod scheme;
 mod score;
+mod side_on_grid;
 mod stability;
 mod state_of_stress;
 mod stated_law;

@@ -2,7 +2,9 @@
 
 use mmsmith_clip::Side;
 use mmsmith_mpm::Grid;
-use mmsmith_runtime::{AnySolution, Boundary, Condition, Domain, Real, Solution, Surface};
+use mmsmith_runtime::{
+    AnySolution, Boundary, ComponentCondition, Condition, Domain, Real, Solution, Surface,
+};
 use nalgebra::SVector;
 
 use crate::case::{Case, Extent};
@@ -10,6 +12,7 @@ use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points;
 use crate::scheme::Placement;
+use crate::side_on_grid::SideOnGrid;
 
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
@@ -19,8 +22,11 @@ const OVERSHOOT: f64 = 0.05;
 /// A condition of `exact` that the total frame models and the updated one does not, if it has one.
 #[must_use]
 pub fn needs_total_frame(exact: &AnySolution<f64>) -> Option<Boundary> {
-    let needs = |boundary: &&Boundary| is_given(boundary.condition);
-    in_dimension!(exact, |s| s.boundaries().iter().find(needs).copied(), else None)
+    in_dimension!(
+        exact,
+        |s| s.boundaries().iter().find(|boundary| SideOnGrid::of(s, boundary).is_loaded()).copied(),
+        else None
+    )
 }
 
 /// The conditions of `exact` in whose place clipped particles have the traction of its motion: sides that move as it says, and with a grid
@@ -41,16 +47,16 @@ fn loaded_of<const D: usize>(
     placement: Placement,
     case: &Case,
 ) -> Vec<Boundary> {
-    let is_loaded = |boundary: &&Boundary| match boundary.condition {
-        Condition::PrescribedMotion => true,
-        Condition::Sliding | Condition::Symmetry => match exact.domain() {
+    let is_loaded = |boundary: &&Boundary| match SideOnGrid::of(exact, boundary) {
+        SideOnGrid::Loaded => boundary.condition.gives(ComponentCondition::PrescribedMotion),
+        SideOnGrid::Wall { .. } => match exact.domain() {
             Domain::Box { lower, upper } => {
                 let spacing = exact.cell_length() / case.cells as f64;
                 !(placement.pose().is_usual() && are_multiples(&(upper - lower), spacing))
             }
             _ => false,
         },
-        Condition::TractionFree | Condition::PrescribedTraction => false,
+        SideOnGrid::Free => false,
     };
     exact.boundaries().iter().filter(is_loaded).copied().collect()
 }
@@ -140,11 +146,6 @@ fn moments(period: f64, end: f64) -> impl Iterator<Item = f64> {
     raster(end.min(period)).chain((end > period).then(|| raster(end)).into_iter().flatten())
 }
 
-/// Whether the values of motion or traction come from the solution.
-fn is_given(condition: Condition) -> bool {
-    matches!(condition, Condition::PrescribedMotion | Condition::PrescribedTraction)
-}
-
 /// A body on a background grid, in double precision.
 pub(crate) struct Scene<const D: usize> {
     pub(crate) lower: SVector<f64, D>,
@@ -203,24 +204,26 @@ impl<const D: usize> Scene<D> {
         }
         let mut walls = [[false; 2]; D];
         let mut sides = [[Condition::TractionFree; 2]; D];
-        for &Boundary { surface, condition } in solution.boundaries() {
-            let is_wall = matches!(condition, Condition::Sliding | Condition::Symmetry);
-            if is_given(condition) && case.scheme.updated().is_some() && clipped.is_none() {
+        let mut on_grid = [[SideOnGrid::Free; 2]; D];
+        for boundary @ &Boundary { surface, condition } in solution.boundaries() {
+            let modelled = SideOnGrid::of(solution, boundary);
+            let is_wall = modelled.is_wall();
+            if modelled.is_loaded() && case.scheme.updated().is_some() && clipped.is_none() {
                 let instead = instead(&domain);
                 return Err(SceneError::Unmodelled { surface, condition, instead });
             }
             match surface {
                 Surface::Lower(axis) if axis < D => {
                     walls[axis][0] |= is_wall && quarter;
-                    sides[axis][0] = condition;
+                    (sides[axis][0], on_grid[axis][0]) = (condition, modelled);
                 }
                 Surface::Upper(axis) if axis < D => {
                     walls[axis][1] |= is_wall;
-                    sides[axis][1] = condition;
+                    (sides[axis][1], on_grid[axis][1]) = (condition, modelled);
                 }
                 Surface::FirstAngle => sides[1 % D][0] = condition,
                 Surface::LastAngle => sides[1 % D][1] = condition,
-                surface if is_wall => {
+                surface if is_wall && case.scheme.updated().is_some() => {
                     return Err(SceneError::Unmodelled { surface, condition, instead: "" });
                 }
                 _ => {}
@@ -229,11 +232,15 @@ impl<const D: usize> Scene<D> {
         if matches!(domain, Domain::Annulus { .. } | Domain::Tube { .. }) {
             // The first axis is the radius.
             let on = |rim: Surface| solution.boundaries().iter().find(|b| b.surface == rim);
-            let rim = |rim| on(rim).map_or(Condition::TractionFree, |b| b.condition);
-            sides[0] = [rim(Surface::Inner), rim(Surface::Outer)];
+            for (end, rim) in [Surface::Inner, Surface::Outer].into_iter().enumerate() {
+                if let Some(boundary) = on(rim) {
+                    sides[0][end] = boundary.condition;
+                    on_grid[0][end] = SideOnGrid::of(solution, boundary);
+                }
+            }
         }
         if let Some(clipped) = clipped {
-            return Self::clipped(solution, case, end, (clipped, quarter), sides);
+            return Self::clipped(solution, case, end, (clipped, quarter), (sides, on_grid));
         }
         let (lower, cells) = match &domain {
             Domain::Box { lower, upper } => {
@@ -274,7 +281,7 @@ impl<const D: usize> Scene<D> {
         case: &Case,
         end: f64,
         (placement, quarter): (Placement, bool),
-        sides: [[Condition; 2]; D],
+        (sides, on_grid): ([[Condition; 2]; D], [[SideOnGrid; 2]; D]),
     ) -> Result<Self, SceneError> {
         let domain = solution.domain();
         let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
@@ -294,12 +301,11 @@ impl<const D: usize> Scene<D> {
             let normal = std::array::from_fn(|a| if a == axis { sign } else { 0.0 });
             Side::Straight { normal, distance }
         };
-        let is_wall = |c: Condition| matches!(c, Condition::Sliding | Condition::Symmetry);
         let (lower, cells): (SVector<f64, D>, [usize; D]) = match &domain {
             Domain::Annulus { inner, outer } => {
                 let (inner, outer) = (*inner, *outer);
-                add(Side::Inner { radius: inner }, is_given(sides[0][0]));
-                add(Side::Outer { radius: outer }, is_given(sides[0][1]));
+                add(Side::Inner { radius: inner }, on_grid[0][0].is_loaded());
+                add(Side::Outer { radius: outer }, on_grid[0][1].is_loaded());
                 let half = (outer / spacing).ceil() + reach;
                 if quarter {
                     for axis in 0..D {
@@ -315,9 +321,10 @@ impl<const D: usize> Scene<D> {
             Domain::Box { lower, upper } => {
                 let fits = pose.is_usual() && are_multiples(&(upper - lower), spacing);
                 for axis in 0..D {
-                    walls[axis] = sides[axis].map(|side| fits && is_wall(side));
-                    let is_loaded = |end: usize| {
-                        !walls[axis][end] && sides[axis][end] != Condition::TractionFree
+                    walls[axis] = on_grid[axis].map(|side| fits && side.is_wall());
+                    let is_loaded = |end: usize| match walls[axis][end] {
+                        true => on_grid[axis][end].is_loaded(),
+                        false => on_grid[axis][end] != SideOnGrid::Free,
                     };
                     let (low, high) =
                         (straight(axis, -1.0, -lower[axis]), straight(axis, 1.0, upper[axis]));

@@ -104,7 +104,7 @@ impl Total {
                     lower: lower[k],
                     upper: upper[k],
                     cells: scene.cells[k],
-                    ends: scene.sides[k].map(end),
+                    ends: scene.sides[k].map(|side| end(k, side)),
                 })
             }
             (Domain::Annulus { inner, outer }, Coordinates::Polar) if D == 2 => {
@@ -140,7 +140,7 @@ impl Total {
                     upper,
                     // The mirror images at the equator have to be splines that the cone does not cut.
                     cells: count((upper - lower) * radius).max(self.degree),
-                    ends: [End::Moved, End::Wall],
+                    ends: [End::MOVED, End::Wall],
                 };
                 let around = Axis {
                     lower: 0.0,
@@ -174,8 +174,8 @@ impl Total {
                     cells: scene.cells[0],
                     // The axis of a solid cylinder is no surface.
                     ends: [
-                        if *inner == 0.0 { End::Free } else { end(scene.sides[0][0]) },
-                        end(scene.sides[0][1]),
+                        if *inner == 0.0 { End::FREE } else { open(0, scene.sides[0][0]) },
+                        open(0, scene.sides[0][1]),
                     ],
                 };
                 let mean = 0.5 * (inner + outer);
@@ -184,7 +184,7 @@ impl Total {
                         lower: *from,
                         upper: *to,
                         cells: count((to - from) * mean).max(self.degree),
-                        ends: scene.sides[1].map(end),
+                        ends: scene.sides[1].map(|side| end(1, side)),
                     },
                     Around::Whole => Axis {
                         lower: 0.0,
@@ -199,7 +199,7 @@ impl Total {
                     lower,
                     upper,
                     cells: scene.cells[2 % D],
-                    ends: scene.sides[2 % D].map(end),
+                    ends: scene.sides[2 % D].map(|side| end(2 % D, side)),
                 };
                 std::array::from_fn(|k| [across, around, along][k])
             }
@@ -227,7 +227,7 @@ fn narrowest<const D: usize>(exact: &dyn Solution<f64, D>) -> f64 {
 
 /// The axis from the inner to the outer surface.
 fn radial<const D: usize>(scene: &Scene<D>, inner: f64, outer: f64, cells: usize) -> Axis {
-    Axis { lower: inner, upper: outer, cells, ends: scene.sides[0].map(end) }
+    Axis { lower: inner, upper: outer, cells, ends: scene.sides[0].map(|side| open(0, side)) }
 }
 
 fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
@@ -239,19 +239,21 @@ fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
     if is_graded {
         return false;
     }
-    let is_wall = |condition| matches!(condition, Condition::Sliding | Condition::Symmetry);
     matches!(exact.domain(), Domain::Box { .. })
-        && exact.boundaries().iter().all(|boundary| is_wall(boundary.condition))
+        && exact.boundaries().iter().all(|boundary| boundary.condition.is_wall())
 }
 
 /// The kind of end that a condition gives an axis.
-fn end(condition: Condition) -> End {
-    match condition {
-        Condition::Sliding | Condition::Symmetry => End::Wall,
-        Condition::TractionFree => End::Free,
-        Condition::PrescribedTraction => End::Loaded,
-        Condition::PrescribedMotion => End::Moved,
+fn end(axis: usize, condition: Condition) -> End {
+    match condition.is_wall() {
+        true => End::Wall,
+        false => open(axis, condition),
     }
+}
+
+/// The end at which each component of the grid's coordinates has its own condition: on a rim, which mirrors nothing, of walls too.
+fn open(axis: usize, condition: Condition) -> End {
+    End::Open(std::array::from_fn(|component| condition.of(axis, component)))
 }
 
 /// The exact solution on the sides of the body.

@@ -199,6 +199,22 @@ mod inverting {
     mmsmith_macros::manufactured_solution!("../../data/specs/inverting.toml");
 }
 
+mod three_on_a_face {
+    mmsmith_macros::manufactured_solution!("../../data/specs/conditions/three-on-a-face.toml");
+}
+
+/// Generated code and the interpreter have the conditions of the file, by component.
+#[test]
+fn conditions_by_component_are_those_of_the_file() {
+    let text = include_str!("../../data/specs/conditions/three-on-a-face.toml");
+    let spec = Spec::parse(text, "three-on-a-face.toml").unwrap();
+    let generated = three_on_a_face::ThreeOnAFace::<f64>::new(Default::default()).unwrap();
+    for solution in [interpret(&spec, []).unwrap(), generated.into()] {
+        let AnySolution::Three(solution) = solution else { panic!("in space") };
+        assert_eq!(solution.boundaries(), spec.boundaries);
+    }
+}
+
 /// Two stretches may be negative together: then `J` has a logarithm though they have none.
 #[test]
 fn bodies_turned_over_twice() {

@@ -225,6 +225,10 @@ fn claim(kind: ClaimKind) -> &'static str {
     match kind {
         ClaimKind::Traction => "P N",
         ClaimKind::Shear => "shear",
+        ClaimKind::NormalTraction => "N.P N",
+        ClaimKind::TractionComponent(axis) => {
+            ["P N along X", "P N along Y", "P N along Z"][axis % 3]
+        }
         ClaimKind::NormalDisplacement => "u.N",
     }
 }

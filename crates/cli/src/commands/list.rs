@@ -103,6 +103,7 @@ fn word(condition: Condition) -> Option<&'static str> {
         Condition::TractionFree => Some("free"),
         Condition::PrescribedTraction => Some("loaded"),
         Condition::PrescribedMotion => Some("moved"),
+        Condition::Mixed(_) => Some("mixed"),
     }
 }
 
@@ -122,7 +123,7 @@ fn short(entries: &[Entry]) -> String {
 }
 
 const LEGEND: &str = "\
-sides: moved = given displacement, loaded = given traction, free, sliding
+sides: moved = given displacement, loaded = given traction, free, sliding, mixed = by component
 mms list --long: parameters and references; mms explain NAME: formulas
 ";
 

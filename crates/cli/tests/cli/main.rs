@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod command;
+mod conditions;
 mod conventions;
 mod diagnose;
 mod fields;

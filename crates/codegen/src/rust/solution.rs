@@ -2,7 +2,7 @@
 
 use super::Generator;
 use mmsmith_expr::Slot;
-use mmsmith_spec::{Around, Boundary, Condition, Surface};
+use mmsmith_spec::{Around, Boundary, ComponentCondition, Condition, Form, Surface};
 use mmsmith_stage::{Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::{
     Across, Components, Element, Flow, Internal, Law, Material, Memory, Overstress, Response,
@@ -322,17 +322,37 @@ impl Generator<'_> {
 
 fn boundary(runtime: &TokenStream, boundary: &Boundary) -> TokenStream {
     let surface = surface_value(runtime, boundary.surface);
+    let one = |condition: ComponentCondition| {
+        let name = match condition {
+            ComponentCondition::PrescribedMotion => quote!(PrescribedMotion),
+            ComponentCondition::PrescribedTraction => quote!(PrescribedTraction),
+            ComponentCondition::TractionFree => quote!(TractionFree),
+        };
+        quote!(#runtime::ComponentCondition::#name)
+    };
+    // A constant, so that the list of conditions is one.
     let condition = match boundary.condition {
-        Condition::Sliding => quote!(Sliding),
-        Condition::Symmetry => quote!(Symmetry),
-        Condition::TractionFree => quote!(TractionFree),
-        Condition::PrescribedTraction => quote!(PrescribedTraction),
-        Condition::PrescribedMotion => quote!(PrescribedMotion),
+        Condition::Sliding => quote!(#runtime::Condition::Sliding),
+        Condition::Symmetry => quote!(#runtime::Condition::Symmetry),
+        Condition::TractionFree => quote!(#runtime::Condition::TractionFree),
+        Condition::PrescribedTraction => quote!(#runtime::Condition::PrescribedTraction),
+        Condition::PrescribedMotion => quote!(#runtime::Condition::PrescribedMotion),
+        Condition::Mixed(mixed) => match mixed.form() {
+            Form::ByDirection { normal, tangential } => {
+                let (normal, tangential) = (one(normal), one(tangential));
+                quote!(const { #runtime::Condition::by_direction(#normal, #tangential) })
+            }
+            Form::ByComponent(of) => {
+                let axis = Literal::usize_unsuffixed(boundary.surface.axis().unwrap_or(0));
+                let of = of.map(one);
+                quote!(const { #runtime::Condition::by_component(#axis, 3, [#(#of),*]) })
+            }
+        },
     };
     quote! {
         #runtime::Boundary {
             surface: #surface,
-            condition: #runtime::Condition::#condition,
+            condition: #condition,
         }
     }
 }

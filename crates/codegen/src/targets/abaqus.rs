@@ -2,7 +2,6 @@
 
 use super::fortran::{module, user_subroutines, with_head};
 use crate::code::Code;
-use crate::listing::surface_name;
 use crate::target::Unwritable;
 use mmsmith_stage::Measures;
 
@@ -22,7 +21,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         .surfaces()
         .into_iter()
         .map(|surface| {
-            let surface = surface_name(surface).replace('-', "_");
+            let surface = surface.to_string().replace('-', "_");
             let capital = surface.to_ascii_uppercase();
             format!("    if (index(surface, \"{capital}\") > 0) traction = {surface}_traction(s, X, t)\n")
         })

@@ -70,7 +70,7 @@ impl<const D: usize> Numbering<D> {
             let functions = functions[c];
             let own: [usize; D] = array::from_fn(|k| along(&windows, k, c).own);
             let is_given = |index: &[usize; D]| {
-                faces.iter().filter(|face| face.moved).any(|face| {
+                faces.iter().filter(|face| face.moves(c)).any(|face| {
                     let axis = face.side.axis;
                     let end = if face.side.upper { functions[axis] - 1 } else { 0 };
                     index[axis] == end

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_galerkin::{
-    Axis, BoundaryData, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme,
-    Side, TotalLagrangian,
+    Axis, BoundaryData, ComponentCondition, Composition, Coordinates, End, Grid, Layout,
+    MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
 use mmsmith_mpm::Material;
 use nalgebra::{SMatrix, SVector};
@@ -104,20 +104,43 @@ fn affine_motion_is_exact<const D: usize>(ends: [[End; 2]; D], degree: usize, ma
 
 #[test]
 fn affine_motion_of_sides_and_affine_tractions_are_followed_without_error() {
-    let moved = [End::Moved; 2];
-    let mixed = [End::Loaded, End::Moved];
+    let moved = [End::MOVED; 2];
+    let mixed = [End::LOADED, End::MOVED];
     for degree in 2..=5 {
         let mass = MassMatrix::Consistent;
         affine_motion_is_exact([moved], degree, mass);
         affine_motion_is_exact([mixed], degree, mass);
         affine_motion_is_exact([moved; 2], degree, mass);
         affine_motion_is_exact([mixed, moved], degree, mass);
-        affine_motion_is_exact([moved, [End::Loaded; 2]], degree, mass);
-        affine_motion_is_exact([[End::Loaded; 2]; 2], degree, mass);
+        affine_motion_is_exact([moved, [End::LOADED; 2]], degree, mass);
+        affine_motion_is_exact([[End::LOADED; 2]; 2], degree, mass);
     }
     for degree in [2, 3] {
         affine_motion_is_exact([moved, mixed, moved], degree, MassMatrix::Consistent);
-        affine_motion_is_exact([[End::Loaded; 2], moved, mixed], degree, MassMatrix::Consistent);
+        affine_motion_is_exact([[End::LOADED; 2], moved, mixed], degree, MassMatrix::Consistent);
+    }
+}
+
+#[test]
+fn components_are_given_by_themselves() {
+    let [moved, loaded] =
+        [ComponentCondition::PrescribedMotion, ComponentCondition::PrescribedTraction];
+    // The component along the axis, and others.
+    let roller = [End::Open([loaded, moved, loaded]), End::Open([moved, loaded, moved])];
+    let each = [End::Open([moved, loaded, loaded]), End::Open([loaded, loaded, moved])];
+    for degree in 2..=5 {
+        for ends in [
+            [roller; 2],
+            [each; 2],
+            [roller, each],
+            [each, [End::MOVED; 2]],
+            [[End::LOADED; 2], roller],
+        ] {
+            affine_motion_is_exact(ends, degree, MassMatrix::Consistent);
+        }
+    }
+    for ends in [[roller; 3], [each, roller, [End::MOVED; 2]], [roller, [End::LOADED; 2], each]] {
+        affine_motion_is_exact(ends, 2, MassMatrix::Consistent);
     }
 }
 
@@ -139,7 +162,7 @@ fn moved_sides_are_where_they_are_given_after_each_step() {
         };
     for composition in [Composition::Order2, Composition::Order4] {
         let grid = Grid {
-            axes: axes([[End::Moved; 2]]),
+            axes: axes([[End::MOVED; 2]]),
             coordinates: Coordinates::Cartesian,
             per_cell: 4,
             layout: Layout::Gauss,

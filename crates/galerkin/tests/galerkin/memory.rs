@@ -139,7 +139,7 @@ fn laws() -> [Law<f64, 2>; 2] {
 
 /// A body that is set in motion by waves, in a part of a ring or a square.
 fn moving(coordinates: Coordinates, law: Law<f64, 2>) -> TotalLagrangian<2> {
-    let ends = [End::Free; 2];
+    let ends = [End::FREE; 2];
     let (lower, upper) = match coordinates {
         Coordinates::Polar => ([0.5, 0.2], [1.0, 1.4]),
         _ => ([0.0; 2], [1.0; 2]),

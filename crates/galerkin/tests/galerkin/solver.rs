@@ -21,7 +21,7 @@ fn scheme(degree: usize, composition: Composition) -> Scheme {
 
 fn open_box<const D: usize>(cells: usize) -> Grid<D> {
     Grid {
-        axes: [Axis { lower: 0.0, upper: 1.0, cells, ends: [End::Free; 2] }; D],
+        axes: [Axis { lower: 0.0, upper: 1.0, cells, ends: [End::FREE; 2] }; D],
         coordinates: Coordinates::Cartesian,
         per_cell: 4,
         layout: Layout::Gauss,
@@ -30,7 +30,7 @@ fn open_box<const D: usize>(cells: usize) -> Grid<D> {
 
 /// A sector of a ring, free on all sides, in polar coordinates.
 fn sector() -> Grid<2> {
-    let ends = [End::Free; 2];
+    let ends = [End::FREE; 2];
     Grid {
         axes: [
             Axis { lower: 0.5, upper: 1.0, cells: 3, ends },
@@ -52,7 +52,7 @@ fn ring() -> Grid<2> {
 
 /// A part of a spherical shell between two cones and two half planes, free on all sides.
 fn shell() -> Grid<3> {
-    let ends = [End::Free; 2];
+    let ends = [End::FREE; 2];
     Grid {
         axes: [
             Axis { lower: 0.5, upper: 1.0, cells: 2, ends },
@@ -255,7 +255,7 @@ fn a_homogeneous_deformation_is_in_equilibrium_with_its_tractions() {
         let moved = |factor: usize| {
             let mut grid = grid.clone();
             for axis in &mut grid.axes {
-                (axis.cells, axis.ends) = (axis.cells * factor, [End::Loaded; 2]);
+                (axis.cells, axis.ends) = (axis.cells * factor, [End::LOADED; 2]);
             }
             let coordinates = grid.coordinates;
             let scheme = scheme(3, Composition::Order4);
@@ -295,7 +295,7 @@ fn lumped_mass_carries_a_uniform_acceleration_between_walls_along_them() {
     for degree in 2..=5 {
         for mass in [MassMatrix::Consistent, MassMatrix::Lumped] {
             let grid = Grid {
-                axes: [wall, Axis { ends: [End::Free; 2], ..wall }],
+                axes: [wall, Axis { ends: [End::FREE; 2], ..wall }],
                 coordinates: Coordinates::Cartesian,
                 per_cell: 3,
                 layout: Layout::Gauss,
@@ -352,7 +352,7 @@ fn set_ups_that_make_no_sense_are_refused() {
     has(message(&|(grid, _, _)| grid.axes[0].upper = 0.0), "the length of axis 0");
     has(message(&|(grid, _, _)| grid.coordinates = Coordinates::Polar), "the inner radius");
     let mixed = |grid: &mut Grid<2>| {
-        grid.axes[0].ends = [End::Wall, End::Free];
+        grid.axes[0].ends = [End::Wall, End::FREE];
         grid.axes[0].cells = 2;
     };
     has(message(&|(grid, _, _)| mixed(grid)), "at least 3");

@@ -160,7 +160,7 @@ fn total_scenes() -> impl Iterator<Item = (Coordinates, [End; 2], Scheme)> {
     ];
     schemes.into_iter().flat_map(|(degree, mass, composition)| {
         [Coordinates::Cartesian, Coordinates::Polar].into_iter().flat_map(move |coordinates| {
-            [End::Free, End::Wall, End::Moved, End::Periodic]
+            [End::FREE, End::Wall, End::MOVED, End::Periodic]
                 .into_iter()
                 .map(move |end| (coordinates, [end; 2], Scheme { degree, mass, composition }))
         })
@@ -175,7 +175,7 @@ fn total_scene(
     // The second coordinate of polar grids is an angle.
     let across = if coordinates == Coordinates::Polar { 1.0 } else { length };
     let axes = [
-        Axis { lower: 0.5 * length, upper: length, cells: 4, ends: [End::Free, End::Loaded] },
+        Axis { lower: 0.5 * length, upper: length, cells: 4, ends: [End::FREE, End::LOADED] },
         Axis { lower: 0.25 * across, upper: 1.25 * across, cells: 4, ends },
     ];
     let grid = total::Grid { axes, coordinates, per_cell: 4, layout: Layout::Gauss };

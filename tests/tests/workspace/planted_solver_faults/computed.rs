@@ -162,7 +162,7 @@ pub(super) fn momentum_and_free_flight(fault: Option<Fault>) -> Vec<String> {
 
 /// Splines in the reference configuration keep the energy of a free body to their order in time.
 pub(super) fn energy_of_a_free_body(fault: Option<Fault>) -> Vec<String> {
-    let ends = [End::Free; 2];
+    let ends = [End::FREE; 2];
     let body = SplineGrid {
         axes: [Axis { lower: 0.0, upper: 1.0, cells: 3, ends }; 2],
         coordinates: Coordinates::Cartesian,

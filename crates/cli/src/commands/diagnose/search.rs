@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use anyhow::Result;
 use mmsmith_codegen::{CAUSES, Cause, Counter, Timed, Unused};
-use mmsmith_spec::Condition;
+use mmsmith_spec::ComponentCondition;
 use mmsmith_verify::Quantity;
 use rayon::prelude::*;
 
@@ -101,13 +101,14 @@ impl Search<'_> {
         !self.solver.dt.is_empty()
     }
 
-    fn surfaces(&self, condition: Condition) -> bool {
-        self.solver.spec.boundaries.iter().any(|boundary| boundary.condition == condition)
+    /// Whether some component on some surface has this condition.
+    fn surfaces(&self, condition: ComponentCondition) -> bool {
+        self.solver.spec.boundaries.iter().any(|boundary| boundary.condition.gives(condition))
     }
 
     /// Trials that need no fit.
     fn trials(&self) -> Vec<Trial> {
-        let loaded = self.surfaces(Condition::PrescribedTraction);
+        let loaded = self.surfaces(ComponentCondition::PrescribedTraction);
         let admit = |cause: &&'static Cause| {
             if matches!(cause.counter, Counter::Unused(_)) {
                 return false;
@@ -261,7 +262,7 @@ impl Search<'_> {
             Timed::Traction,
             Timed::Everything,
         ];
-        let loaded = self.surfaces(Condition::PrescribedTraction);
+        let loaded = self.surfaces(ComponentCondition::PrescribedTraction);
         let of = |kind: Timed, steps: f64| {
             CAUSES.iter().find(|cause| {
                 matches!(cause.counter, Counter::Time { of, steps: own } if of == kind && own == steps)
@@ -313,8 +314,9 @@ impl Search<'_> {
         right: &Run,
         asked: impl Fn(Unused) -> bool,
     ) -> Result<Vec<&'static Cause>> {
-        let [loaded, moved] = [Condition::PrescribedTraction, Condition::PrescribedMotion]
-            .map(|condition| self.surfaces(condition));
+        let [loaded, moved] =
+            [ComponentCondition::PrescribedTraction, ComponentCondition::PrescribedMotion]
+                .map(|condition| self.surfaces(condition));
         let can_be = |cause: &&'static Cause| match cause.counter {
             Counter::Unused(unused) => {
                 asked(unused)
