@@ -143,6 +143,13 @@ impl Code<'_> {
         let across = staged.across.map(|stretch| {
             at_points("F_zz".into(), self.about_across().into(), Shape::Scalar, vec![stretch])
         });
+        let tangent = staged.tangent.iter().map(|slope| {
+            let [k, L] = slope.component.map(|index| index + 1);
+            let about = format!(
+                "dP/dF{k}{L}, the derivative of P with respect to F{k}{L}: a column of the tangent"
+            );
+            at_points(format!("dPdF{k}{L}"), about, Shape::Matrix, slope.outputs.clone())
+        });
         let tractions = staged.tractions.iter().map(|traction| {
             let surface = traction.surface.to_string();
             let about = format!("traction on the surface {surface}, force per reference area");
@@ -160,7 +167,8 @@ impl Code<'_> {
         };
         let corner =
             |name, about, slots| Item { shape: Shape::Vector, ..constant(name, about, slots) };
-        let mut all: Vec<Item> = fields.chain(energy).chain(across).chain(tractions).collect();
+        let mut all: Vec<Item> =
+            fields.chain(energy).chain(across).chain(tangent).chain(tractions).collect();
         all.extend(self.tabulated_items());
         all.extend([
             constant(

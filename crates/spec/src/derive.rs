@@ -50,6 +50,8 @@ pub struct Fields {
     pub W: Option<Expr>,
     /// The stretch along the directions left out, where there is no stress along them; elsewhere it is one.
     pub across: Option<Expr>,
+    /// The derivatives of the stress, where they were asked for: `[k][L]` is that of `P` with respect to `F_kL`.
+    pub tangent: Vec<Vec<Matrix>>,
     /// Tractions and the claims of boundary conditions, for every surface of the body.
     pub surfaces: Vec<SurfaceFields>,
 }
@@ -106,7 +108,20 @@ impl Fields {
     }
 
     /// In the coordinates of a derivation.
-    pub(crate) fn derive_in(spec: &Spec, mut derivation: Derivation) -> Result<Self, DeriveError> {
+    pub(crate) fn derive_in(spec: &Spec, derivation: Derivation) -> Result<Self, DeriveError> {
+        Self::derive_all(spec, derivation, false)
+    }
+
+    /// With the derivatives of the stress.
+    pub(crate) fn derive_with_tangent(spec: &Spec) -> Result<Self, DeriveError> {
+        Self::derive_all(spec, Derivation::new(spec), true)
+    }
+
+    fn derive_all(
+        spec: &Spec,
+        mut derivation: Derivation,
+        has_tangent: bool,
+    ) -> Result<Self, DeriveError> {
         let time = derivation.time;
         let n = spec.dimension;
 
@@ -115,11 +130,15 @@ impl Fields {
         let a: Vector = v.iter().map(|&v| derivation.derivative(v, time)).collect();
         let H = derivation.gradient(&u);
         let deformation = Deformation::new(&mut derivation, &u, H.clone());
-        if spec.has_history() {
+        if spec.has_history() && !has_tangent {
             return Self::derive_motion(spec, derivation, [u, v, a], H, deformation.J);
         }
         let stress = law::stress(&mut derivation, &deformation, spec)?;
         let across = law::stretch_across(&mut derivation, &deformation, spec);
+        let tangent = match has_tangent {
+            true => law::tangent(&mut derivation, &deformation, spec)?,
+            false => Vec::new(),
+        };
         let b = body_force(&mut derivation, &a, &stress, spec.density);
 
         if derivation.graph.is_overgrown() {
@@ -169,6 +188,7 @@ impl Fields {
             history,
             W,
             across,
+            tangent,
             surfaces,
         };
         if let Some(rotation) = &spec.rotation {
@@ -238,6 +258,7 @@ impl Fields {
             history,
             W,
             across,
+            tangent: Vec::new(),
             surfaces,
         };
         fields.check()?;

@@ -291,6 +291,58 @@ pub(crate) fn stress(
     Ok(stress.plus(&mut derivation.graph, at_start))
 }
 
+/// The derivatives of the stress of a law that is a function of the deformation alone, in Cartesian components: `[k][L]` is that of `P` with
+/// respect to `F_kL`.
+pub(crate) fn tangent(
+    derivation: &mut Derivation,
+    deformation: &Deformation,
+    spec: &Spec,
+) -> Result<Vec<Vec<Matrix>>, DeriveError> {
+    let n = deformation.H.len();
+    let has_other_frame = !derivation.geometry.is_cartesian() || spec.rotation.is_some();
+    if has_other_frame || spec.has_memory_or_fields() {
+        return Err(DeriveError::NoClosedForm(
+            "the tangent is written for Cartesian coordinates without [with-rotation], and for laws whose stress is a function of F and \
+             parameters alone; mms eval --tangent has it at points of other solutions",
+        ));
+    }
+    let of_law = match (&spec.variation, &spec.material) {
+        (_, Law::Stress { P }) => ComponentLaw::of_stress(derivation, deformation, P, Vec::new()),
+        (None, Law::Energy { W }) => {
+            ComponentLaw::of_energy(&mut derivation.graph, deformation, *W, false)
+        }
+        (variation, material) => {
+            let (text, constants) = match (variation, material) {
+                (Some(variation), _) => (variation.energy.clone(), variation.constants.clone()),
+                (None, Law::Library(own)) if n < 3 || !has_principal_stretches(own) => {
+                    (energy_text(own, n), material.constants())
+                }
+                _ => {
+                    return Err(DeriveError::NoClosedForm(
+                        "the tangent of a law in principal stretches has no closed form in space",
+                    ));
+                }
+            };
+            let W = energy::named(&mut derivation.graph, &text, &constants);
+            ComponentLaw::of_energy(&mut derivation.graph, deformation, W, false)
+        }
+    };
+    let mut A = of_law.tangent(&mut derivation.graph, deformation);
+    if let Some(S) = &spec.prestress {
+        let graph = &mut derivation.graph;
+        for (k, L) in (0..n * n).map(|m| (m / n, m % n)) {
+            for (J, &S) in S[L].iter().enumerate() {
+                A[k][L][k][J] = graph.add(A[k][L][k][J], S);
+            }
+        }
+    }
+    Ok(A)
+}
+
+fn has_principal_stretches(material: &Material<Expr>) -> bool {
+    matches!(material.derivation(), Formulas::PrincipalStretches(_))
+}
+
 /// The stretch along the directions left out, where there is no stress along them.
 pub(crate) fn stretch_across(
     derivation: &mut Derivation,

@@ -284,6 +284,17 @@ impl Spec {
         self.material.constants().iter().any(|(_, value)| self.is_field(*value))
     }
 
+    /// Whether the stress depends on more than the deformation and parameters.
+    #[must_use]
+    pub fn has_memory_or_fields(&self) -> bool {
+        self.memory.is_some()
+            || match self.law_for_solver() {
+                ForSolver::Library(_) => false,
+                ForSolver::Stated(stated) => stated.has_memory(),
+                ForSolver::WithMemory(_) => true,
+            }
+    }
+
     /// Whether the density depends on the place.
     #[must_use]
     pub fn has_graded_density(&self) -> bool {

@@ -492,6 +492,15 @@ impl Spec {
         Fields::derive(self)
     }
 
+    /// As [`derive`](Self::derive), with the derivatives of the stress.
+    ///
+    /// # Errors
+    ///
+    /// [`DeriveError`] where a field is nowhere defined, or the law has no such derivatives.
+    pub fn derive_with_tangent(&self) -> Result<Fields, DeriveError> {
+        Fields::derive_with_tangent(self)
+    }
+
     /// As [`derive`](Self::derive), in the components in which solvers in other languages compute: those along `R`, the angle and `Z` at
     /// places `R`, any angle, `Z` for an axisymmetric body, and Cartesian ones for others.
     ///

@@ -23,6 +23,6 @@ mod staged;
 pub use block::{Block, Operand, Stage};
 pub use field::{Field, FieldName, Shape};
 pub use staged::{
-    BodyForceOperations, Constants, History, Lattice, Measures, Sides, Staged, Stages, Traction,
-    TubeMeasures,
+    BodyForceOperations, Constants, History, Lattice, Measures, Sides, Slope, Staged, Stages,
+    Traction, TubeMeasures,
 };

@@ -35,6 +35,8 @@ pub struct Staged {
     pub energy: Option<Slot>,
     /// The stretch along the directions left out, where there is no stress along them.
     pub across: Option<Slot>,
+    /// The derivatives of the stress with respect to each component of the deformation gradient, where they were asked for.
+    pub tangent: Vec<Slope>,
     /// The traction on each surface.
     pub tractions: Vec<Traction>,
     /// The two sides of each requirement of the specification.
@@ -178,6 +180,15 @@ pub struct Traction {
     pub outputs: Vec<Slot>,
 }
 
+/// The derivative of the stress with respect to a component of the deformation gradient.
+#[derive(Clone, Debug)]
+pub struct Slope {
+    /// Row and column of the component.
+    pub component: [usize; 2],
+    /// Entries of the derivative, row by row.
+    pub outputs: Vec<Slot>,
+}
+
 /// The sides of a relation between parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
@@ -240,6 +251,13 @@ impl Staged {
         let constants = ConstantOutputs::new(spec, density, &mut outputs);
         let energy = fields.W.map(|energy| outputs.add_one(energy));
         let across = fields.across.map(|stretch| outputs.add_one(stretch));
+        let tangent: Vec<([usize; 2], Group)> = fields
+            .tangent
+            .iter()
+            .enumerate()
+            .flat_map(|(k, row)| row.iter().enumerate().map(move |(L, A)| ([k, L], A)))
+            .map(|(component, A)| (component, outputs.add(A.concat())))
+            .collect();
         let requirements: Vec<(Single, Single)> = spec
             .requirements
             .iter()
@@ -287,6 +305,10 @@ impl Staged {
             density_here: density_here.map(|density| density.slot(&program)),
             energy: energy.map(|energy| energy.slot(&program)),
             across: across.map(|stretch| stretch.slot(&program)),
+            tangent: tangent
+                .into_iter()
+                .map(|(component, group)| Slope { component, outputs: group.slots(&program) })
+                .collect(),
             requirements: requirements
                 .into_iter()
                 .map(|(left, right)| Sides {

@@ -29,6 +29,10 @@ pub(crate) struct GenerateOptions {
     /// over the body. Needed where particles begin or stop to flow on the way
     #[arg(long, value_name = "FILE")]
     pub(crate) points: Option<PathBuf>,
+    /// With functions dPdF11, dPdF12, ... of place and time, the derivatives of P with respect to each component of F: for tests of the
+    /// tangent of a material routine
+    #[arg(long, conflicts_with_all = ["fault", "periods", "points"])]
+    pub(crate) tangent: bool,
     /// Plant this mistake in the fields, to see whether your tests find it
     #[arg(long, value_name = "NAME", value_parser = faults())]
     pub(crate) fault: Option<Fault>,

@@ -33,7 +33,7 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let origin = Origin { command: "mms gen".into(), file: found.shown_file() };
     let mut table = None;
     let code = match options.fault {
-        None if spec.has_history() && options.target.reads_tables => {
+        None if spec.has_history() && !options.tangent && options.target.reads_tables => {
             let fields = spec.derive().with_context(|| found.file())?;
             let staged = Staged::of(&spec, fields.clone());
             let file = tabulate(options, &spec, &staged).with_context(|| found.file())?;
@@ -47,6 +47,10 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             let (code, text) = tabulated::beside(Code::of(&spec, fields, origin), &file);
             table = Some(text);
             code
+        }
+        None if options.tangent => {
+            let fields = spec.derive_with_tangent().with_context(|| found.file())?;
+            Code::of(&spec, fields, origin)
         }
         None => Code::for_host(&spec, origin, options.target).with_context(|| found.file())?,
         Some(fault) => {

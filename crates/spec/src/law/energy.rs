@@ -114,6 +114,27 @@ impl ComponentLaw {
         ComponentLaw { h, P, isotropic: false, energy: None, known, rates, fields, simpler }
     }
 
+    /// The derivatives of the stress: `[k][L]` is that of `P` with respect to `F_kL`.
+    pub(super) fn tangent(&self, graph: &mut Graph, deformation: &Deformation) -> Vec<Vec<Matrix>> {
+        let small: BTreeSet<Expr> = self.h.iter().flatten().copied().collect();
+        let mut actual = self.known.clone();
+        actual.extend(self.h.concat().into_iter().zip(deformation.H.concat()));
+        let mut derivatives = Derivatives::limited();
+        let mut slope = |P: Expr, h: Expr| {
+            let slope = derivatives.of(graph, P, h);
+            let slope = graph.replace(slope, &self.simpler);
+            let (value, rest) = graph.split_at_zero(slope, &small);
+            let value = modulus_at_rest(graph, value);
+            let sum = graph.add(value, rest);
+            let slope = graph.replace(sum, &actual);
+            zero_if_vanishing(graph, slope)
+        };
+        let mut of = |h: Expr| -> Matrix {
+            self.P.iter().map(|row| row.iter().map(|&P| slope(P, h)).collect()).collect()
+        };
+        self.h.iter().map(|row| row.iter().map(|&h| of(h)).collect()).collect()
+    }
+
     pub(super) fn stress(&self, derivation: &mut Derivation, deformation: &Deformation) -> Stress {
         let n = self.h.len();
         let mut small: BTreeSet<Expr> = self.h.iter().flatten().copied().collect();

@@ -217,6 +217,48 @@ impl Solution {
     }
 }
 
+/// The chain rule `dP/dX = A : dF/dX` for the derivatives of the stress, of every law that has them.
+#[test]
+fn tangents_are_the_derivatives_of_stresses() {
+    let mut judged = 0;
+    for path in specifications() {
+        let file = path.file_name().unwrap().to_str().unwrap();
+        let spec = Spec::parse(&std::fs::read_to_string(&path).unwrap(), file).unwrap();
+        let Ok(mut fields) = spec.derive_with_tangent() else { continue };
+        let (n, square) = (spec.dimension, spec.dimension * spec.dimension);
+        let tangent: Vec<Expr> = fields.tangent.iter().flatten().flat_map(|A| A.concat()).collect();
+        let outputs = [fields.P.concat(), fields.F.concat(), tangent].concat();
+        let program = fields.program(&outputs);
+        let parameters: Vec<f64> = spec.parameters.iter().map(|p| p.default).collect();
+        let t = 0.23
+            * fields
+                .program(&[spec.period])
+                .evaluate(&[vec![0.0; n + 1], parameters.clone()].concat())[0];
+        for X in places(&spec, &mut fields) {
+            let at = |X: &[f64]| program.evaluate(&[X, &[t], &parameters].concat());
+            let A = at(&X)[2 * square..].to_vec();
+            for axis in 0..n {
+                let moved = |by: f64| {
+                    let mut X = X.clone();
+                    X[axis] += by;
+                    at(&X)[..2 * square].to_vec()
+                };
+                let slopes = derivative(moved, 1e-3);
+                let (of_P, of_F) = slopes.split_at(square);
+                for (entry, of_P) in of_P.iter().enumerate() {
+                    let terms: Vec<f64> =
+                        (0..square).map(|kL| A[kL * square + entry] * of_F[kL]).collect();
+                    let scale = A.iter().fold(of_P.abs(), |m, a| m.max(a.abs()));
+                    let sum: f64 = terms.iter().sum();
+                    assert!((sum - of_P).abs() < 1e-7 * scale, "{file}: {of_P:e} is not {sum:e}");
+                }
+            }
+        }
+        judged += 1;
+    }
+    assert!(judged > 40, "{judged}");
+}
+
 /// The derivative of values that are a function of one number, at zero; the error is of the fourth order in `h`.
 fn derivative(values: impl Fn(f64) -> Vec<f64>, h: f64) -> Vec<f64> {
     let slope = |h: f64| -> Vec<f64> {
