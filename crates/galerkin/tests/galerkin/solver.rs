@@ -74,9 +74,14 @@ fn normal<const D: usize>(
     let unit = |axis: usize| SVector::<f64, D>::from_fn(|i, _| f64::from(u8::from(i == axis)));
     let along = X.normalize();
     let axis = match (coordinates, side.axis) {
-        (Coordinates::Cartesian, axis) => unit(axis),
+        (Coordinates::Cartesian, axis) | (Coordinates::Cylindrical, axis @ 2) => unit(axis),
+        (Coordinates::Cylindrical, 0) => {
+            SVector::<f64, D>::from_fn(|i, _| if i < 2 { X[i] } else { 0.0 }).normalize()
+        }
         (_, 0) => along,
-        (Coordinates::Polar, _) | (_, 2) => (unit(1) * X[0] - unit(0) * X[1]).normalize(),
+        (Coordinates::Polar | Coordinates::Cylindrical, _) | (_, 2) => {
+            (unit(1) * X[0] - unit(0) * X[1]).normalize()
+        }
         (Coordinates::Spherical, _) => (along * along[2] - unit(2)).normalize(),
     };
     if side.upper { axis } else { -axis }
@@ -371,7 +376,7 @@ fn set_ups_that_make_no_sense_are_refused() {
     assert_eq!(error, SetupError::PolarDimension { dimension: 1 });
     has(
         message(&|(grid, _, _)| grid.coordinates = Coordinates::Spherical),
-        "spherical grids are three-dimensional; this one has dimension 2",
+        "spherical and cylindrical grids are three-dimensional; this one has dimension 2",
     );
     for (axis, [lower, upper], part) in [
         (0, [0.0, 1.0], "the inner radius"),
