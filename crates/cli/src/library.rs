@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_claims::admissible_value;
 use mmsmith_interpret::{interpret_staged, interpret_staged_single};
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
-use mmsmith_spec::{Parameter, Spec, nearest};
+use mmsmith_spec::{Coordinates, Parameter, Spec, nearest};
 use mmsmith_stage::Staged;
 use mmsmith_verify::{Provenance, body_of, has_body};
 
@@ -354,6 +354,14 @@ impl Selection {
         match &self.source {
             Source::Library(description) => description.dimension,
             Source::File(source) => source.0.dimension,
+        }
+    }
+
+    /// Whether places are the radius and the height of a body of revolution.
+    pub(crate) fn is_axisymmetric(&self, solution: &AnySolution<f64>) -> bool {
+        match &self.source {
+            Source::Library(_) => mmsmith_verify::is_axisymmetric(solution),
+            Source::File(source) => source.0.coordinates == Coordinates::Axisymmetric,
         }
     }
 

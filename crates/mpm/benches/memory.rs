@@ -9,7 +9,7 @@ mod square;
 
 use std::time::Instant;
 
-use mmsmith_laws::{Element, Flow, Memory, ReturnMap, WithMemory, with_memory};
+use mmsmith_laws::{Element, Flow, HalfPlane, Memory, ReturnMap, WithMemory, with_memory};
 use mmsmith_mpm::{Integrator, Law, Material, NoBodyForce, Shape, Simulation, Volumetric};
 use rayon::ThreadPoolBuilder;
 
@@ -61,6 +61,16 @@ fn main() {
         Law::from(hencky),
         plastic(5.0, ReturnMap::Midpoint),
     );
+    let neo_hookean = Material::NeoHookean { lambda: LAMBDA, mu: MU };
+    let half_plane = HalfPlane::new(Law::from(neo_hookean)).unwrap();
+    compare(
+        cells,
+        rounds,
+        "neo-hookean",
+        "half plane of revolution",
+        Law::from(neo_hookean),
+        Law::with_memory(half_plane),
+    );
     let maxwell = with_memory(maxwell, ReturnMap::default()).unwrap();
     compare(cells, rounds, "gent", "gent, 2 elements", Law::from(gent), maxwell);
 }
@@ -74,6 +84,7 @@ fn compare(
     law: Law<f64, 2>,
 ) {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let law_variables = law.variables().len();
     let simulation = |law| simulation_of(law, cells, Shape::Gimp, Integrator::Cd);
     let [mut elastic, mut own] = [elastic, law].map(simulation);
     let time = |simulation: &mut Simulation<f64, 2>| {
@@ -81,8 +92,11 @@ fn compare(
         pool.install(|| (0..STEPS).for_each(|_| simulation.step(&NoBodyForce).unwrap()));
         started.elapsed().as_secs_f64()
     };
+    let variables = law_variables.max(1);
     let alphas = |simulation: &Simulation<f64, 2>| -> Vec<f64> {
-        simulation.particles().internal.iter().skip(6).step_by(7).copied().collect()
+        // The last variable of a law with flow.
+        let all = simulation.particles().internal.iter();
+        all.skip(variables - 1).step_by(variables).copied().collect()
     };
     let (mut quotients, mut flowing) = (Vec::new(), 0.0);
     let mut alone = f64::INFINITY;

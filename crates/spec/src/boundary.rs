@@ -48,7 +48,7 @@ impl Reader<'_> {
             surfaces.push(("outer".into(), Surface::Outer));
         }
         if let Domain::Tube { inner, around, .. } = domain {
-            let of_tube = crate::tube::surfaces(*inner, *around);
+            let of_tube = Self::surfaces_of_tube(*inner, *around);
             surfaces = of_tube.into_iter().map(|(name, surface)| (name.into(), surface)).collect();
         }
         let known = surfaces.iter().map(|(name, surface)| (name.as_str(), *surface));

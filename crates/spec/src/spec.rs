@@ -1005,7 +1005,7 @@ impl<'a> Reader<'a> {
         // Turned about the axis, an annulus about the origin is a shell.
         let is_turned = self.coordinates == Coordinates::Axisymmetric;
         let (needed, annulus) = match shape {
-            _ if crate::tube::is_shape(shape) => return self.tube(table),
+            _ if Self::is_tube(shape) => return self.tube(table),
             "box" => (["lower", "upper"], false),
             "annulus" if self.dimension == 2 || is_turned => (["inner", "outer"], true),
             "shell" if self.dimension == 3 => (["inner", "outer"], true),
@@ -1017,7 +1017,7 @@ impl<'a> Reader<'a> {
             }
             _ => {
                 let message = format!("the shape '{shape}' is not known");
-                let help = format!("shape = 'box', 'annulus', 'shell', {}", crate::tube::NAMES);
+                let help = format!("shape = 'box', 'annulus', 'shell', {}", Self::TUBES);
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help)));
             }
         };

@@ -20,15 +20,15 @@ const SHAPES: [Shape; 3] = [
     Shape { name: "sector", has_inner: true, has_angles: true },
 ];
 
-/// Names of shapes of revolution, for messages.
-pub(crate) const NAMES: &str = "'tube', 'solid-cylinder' or 'sector'";
-
-/// Whether this is the name of a shape of revolution.
-pub(crate) fn is_shape(name: &str) -> bool {
-    SHAPES.iter().any(|shape| shape.name == name)
-}
-
 impl Reader<'_> {
+    /// Names of shapes of revolution, for messages.
+    pub(crate) const TUBES: &'static str = "'tube', 'solid-cylinder' or 'sector'";
+
+    /// Whether this is the name of a shape of revolution.
+    pub(crate) fn is_tube(name: &str) -> bool {
+        SHAPES.iter().any(|shape| shape.name == name)
+    }
+
     /// A shape of revolution by its name.
     pub(crate) fn tube(&mut self, table: &Spanned<DomainTable>) -> Result<Domain, Diagnostic> {
         let keys = table.get_ref();
@@ -134,22 +134,27 @@ impl Reader<'_> {
         let ([inner, lower], [outer, upper]) = (corner(&keys.lower)?, corner(&keys.upper)?);
         Ok(Domain::Tube { inner, outer, lower, upper, around: Around::Axisymmetric })
     }
-}
 
-/// Surfaces of a body of revolution by the names that files have for them.
-pub(crate) fn surfaces(inner: Expr, around: Around<Expr>) -> Vec<(&'static str, Surface)> {
-    let mut surfaces = vec![
-        ("R-upper", Surface::Outer),
-        ("outer", Surface::Outer),
-        ("Z-lower", Surface::Lower(2)),
-        ("Z-upper", Surface::Upper(2)),
-    ];
-    if inner != Graph::ZERO {
-        surfaces.extend([("R-lower", Surface::Inner), ("inner", Surface::Inner)]);
-    }
-    if matches!(around, Around::Sector { .. }) {
+    /// Surfaces of a body of revolution by the names that files have for them.
+    pub(crate) fn surfaces_of_tube(
+        inner: Expr,
+        around: Around<Expr>,
+    ) -> Vec<(&'static str, Surface)> {
+        let mut surfaces = vec![
+            ("R-upper", Surface::Outer),
+            ("outer", Surface::Outer),
+            ("Z-lower", Surface::Lower(2)),
+            ("Z-upper", Surface::Upper(2)),
+        ];
+        if inner != Graph::ZERO {
+            surfaces.extend([("R-lower", Surface::Inner), ("inner", Surface::Inner)]);
+        }
+        if matches!(around, Around::Sector { .. }) {
+            surfaces.extend([
+                ("theta-lower", Surface::FirstAngle),
+                ("theta-upper", Surface::LastAngle),
+            ]);
+        }
         surfaces
-            .extend([("theta-lower", Surface::FirstAngle), ("theta-upper", Surface::LastAngle)]);
     }
-    surfaces
 }

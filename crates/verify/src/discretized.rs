@@ -40,11 +40,8 @@ impl<'a> Discretized<'a> {
         if let (AnySolution::Three(exact_in_space), true) = (exact, case.scheme.updated().is_some())
             && let Some(own) = HalfPlane::new(exact_in_space.as_ref())
         {
-            let of_revolution = |why| CaseError::from(SceneError::OfRevolution { why });
-            if half_plane::turns(exact_in_space.as_ref()) {
-                return Err(of_revolution(
-                    "this body turns about its axis, and the updated Lagrangian formulation has the radius and the height alone",
-                ));
+            if let Some(why) = half_plane::needs_space(exact) {
+                return Err(SceneError::OfRevolution { why }.into());
             }
             let (plan, floors, on_grid): (_, _, Box<dyn Simulate + 'a>) = match arithmetic {
                 Arithmetic::Double => InHalfPlane::judged(own, exact_in_space.as_ref(), case)?,

@@ -88,7 +88,7 @@ pub use growth::{
     A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,
     WaveGrowth, extremes_of, growth, harmful_growth, lambda_over_mu,
 };
-pub use half_plane::is_axisymmetric;
+pub use half_plane::{is_axisymmetric, needs_space};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};

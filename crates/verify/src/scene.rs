@@ -199,7 +199,7 @@ impl<const D: usize> Scene<D> {
             return Err(SceneError::Undeclared { surfaces });
         }
         if matches!(domain, Domain::Tube { .. }) && case.scheme.updated().is_some() {
-            let why = "the updated Lagrangian formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
+            let why = "the updated formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
             return Err(SceneError::OfRevolution { why });
         }
         let mut walls = [[false; 2]; D];

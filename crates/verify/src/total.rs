@@ -165,6 +165,15 @@ impl Total {
                     "spherical for a shell in the total Lagrangian formulation",
                 ));
             }
+            (Domain::Tube { inner, around, .. }, Coordinates::Cylindrical)
+                if *inner == 0.0 && !matches!(around, Around::Axisymmetric) =>
+            {
+                return Err(CaseError::setting(
+                    "grid",
+                    name,
+                    "cylindrical for a body that is hollow or axisymmetric: cells at the axis have no width",
+                ));
+            }
             (Domain::Tube { inner, outer, lower, upper, around }, Coordinates::Cylindrical)
                 if D == 3 =>
             {

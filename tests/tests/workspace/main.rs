@@ -19,6 +19,7 @@ mod planted_solver_faults;
 mod projected_volume;
 #[path = "../../../crates/mpm/tests/reference/mod.rs"]
 mod reference;
+mod revolution;
 mod staged;
 mod statics;
 mod structure;

@@ -31,7 +31,7 @@ pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let file = Source::of(&options.points);
     let solution = selection.build()?;
-    let is_axisymmetric = mmsmith_verify::is_axisymmetric(&solution);
+    let is_axisymmetric = selection.is_axisymmetric(&solution);
     let points = points::read(file, &selection, is_axisymmetric)?;
     let json_file = Output::prepare_if(options.json.as_ref())?;
     let csv_file = Output::prepare_if(options.csv.as_ref())?;

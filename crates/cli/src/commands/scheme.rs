@@ -37,8 +37,8 @@ pub(super) struct Settled {
 #[derive(Clone)]
 pub(super) struct Choice {
     scheme: Total,
-    /// The condition that only that frame models; none where the user named the frame and left its splines open.
-    reason: Option<Boundary>,
+    /// Reason why the updated formulation does not run it, in words; none where the user named the formulation and left its splines open.
+    reason: Option<String>,
     cfl_is_chosen: bool,
 }
 
@@ -62,9 +62,10 @@ impl Settled {
     /// Options that make no scheme together.
     pub(super) fn settle(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Self> {
         let needed = verify::needs_total_frame(exact);
+        let needs_space = verify::needs_space(exact);
         let is_total = match options.formulation {
             Some(formulation) => formulation == Formulation::Total,
-            None => needed.is_some() && !says_updated(options),
+            None => (needed.is_some() || needs_space.is_some()) && !says_updated(options),
         };
         refuse_start(options, is_total)?;
         let scheme = if is_total {
@@ -105,8 +106,15 @@ impl Settled {
         if let Scheme::Total(scheme) = scheme
             && (options.formulation.is_none() || options.shape.is_none())
         {
-            let reason = needed.filter(|_| options.formulation.is_none());
-            if reason.is_some() && matches!(exact, AnySolution::Three(_)) {
+            let reason = match needed.filter(|_| options.formulation.is_none()) {
+                Some(Boundary { surface, condition }) => {
+                    Some(format!("the updated formulation does not model {condition} on {surface}"))
+                }
+                None => needs_space.filter(|_| options.formulation.is_none()).map(str::to_owned),
+            };
+            let is_solid =
+                matches!(exact, AnySolution::Three(_)) && !verify::is_axisymmetric(exact);
+            if reason.is_some() && is_solid {
                 settled.case.cells = USUAL_CELLS_OF_SOLIDS;
             }
             let (speed, cfl_is_chosen) = (speed.unwrap_or(CflSpeed::PWave), options.cfl.is_none());
@@ -150,9 +158,8 @@ impl Settled {
         if *cfl_is_chosen {
             text += &format!(", CFL {cfl} on {speed}");
         }
-        if let Some(Boundary { surface, condition }) = reason {
-            text +=
-                &format!(": the updated formulation does not model {} on {}", condition, surface);
+        if let Some(reason) = reason {
+            text += &format!(": {reason}");
         }
         let shape = self.case.scheme.shape();
         let (grid, layout) = (scheme.coordinates.name(), scheme.layout.name());

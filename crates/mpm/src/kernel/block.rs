@@ -37,6 +37,11 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
         Vec::new()
     }
 
+    /// Whether internal variables follow the deformation gradient, so that an increment needs that at its start.
+    fn needs_start(&self) -> bool {
+        true
+    }
+
     /// Whether the change of volume is projected: the solver sets the internal variables then, `theta` and `p`.
     fn is_projected(&self) -> bool {
         false

@@ -10,7 +10,7 @@
 
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::product;
-use mmsmith_laws::fault::Planted;
+use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
     AnyLaw, BlockOfStresses, Hoop, Law, LibraryLaw, Material, NeoHookean, with_hoop_stretch,
 };
@@ -48,19 +48,32 @@ fn follow<T: Lanes, const D: usize>(x: &[SVector<T, D>], internal: &mut [T]) {
     }
 }
 
-/// Sets the stress flux of a particle of a block, and adds the force of the stress around the axis.
+/// Sets the stress flux of a particle of a block; returns the force of the stress around the axis.
 #[inline(always)]
-fn set_forces<T: Lanes, const D: usize>(
+fn set_flux<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     (n, F): (usize, &SMatrix<T, D, D>),
     (tau, hoop): (&Matrix3<T>, Hoop<T>),
     contributions: &mut Contributions<T, D, BLOCK>,
-) {
+) -> T {
     let volume = contributions.volume[n];
     let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
     let in_plane = c.planted.stress_in_forces(in_plane, F);
     contributions.stress_flux[n] = in_plane * -(volume * c.inverse_spacing);
-    contributions.value[n].values[D] -= volume * tau[(2, 2)] / hoop.radius();
+    if c.planted.is(Fault::HoopStressDropped) {
+        return T::zero();
+    }
+    -volume * tau[(2, 2)] / hoop.radius()
+}
+
+/// Adds radial forces on the first particles.
+fn add_radial<T: Lanes, const D: usize>(
+    forces: &[T],
+    contributions: &mut Contributions<T, D, BLOCK>,
+) {
+    for (force, value) in forces.iter().zip(&mut contributions.value) {
+        value.values[D] += *force;
+    }
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for HalfPlane<L> {
@@ -82,6 +95,10 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for HalfPlane<L>
         vec![T::one(), X[0]]
     }
 
+    fn needs_start(&self) -> bool {
+        false
+    }
+
     fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
         follow(increment.x, internal);
     }
@@ -97,14 +114,32 @@ struct Stress<'a, T, L, const D: usize> {
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
-    fn run<V: Vectors>(self, _: V) {
+    fn run<V: Vectors>(mut self, _: V) {
+        let mut radial = [T::zero(); BLOCK];
+        let internal = self.internal;
+        if !L::HAS_SHORT || !self.stresses::<true>(&mut radial) {
+            self.stresses::<false>(&mut radial);
+        }
+        add_radial(&radial[..internal.len() / Hoop::<T>::COUNT], self.contributions);
+    }
+}
+
+impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
+    /// Sets the stress fluxes of all particles of a block, and their radial forces, by the short form of the law or the full one; returns
+    /// whether the short form holds for all of them.
+    #[inline(always)]
+    fn stresses<const SHORT: bool>(&mut self, radial: &mut [T; BLOCK]) -> bool {
         let Self { F, c, law, internal, contributions } = self;
+        let mut short = true;
         let of_particles = F.iter().zip(internal.chunks_exact(Hoop::<T>::COUNT)).enumerate();
         for (n, (F, q)) in of_particles {
             let hoop = Hoop::of(q);
-            let tau = law.kirchhoff(&with_hoop_stretch(F, hoop.stretch));
-            set_forces(c, (n, F), (&tau, hoop), contributions);
+            let in_space = with_hoop_stretch(F, hoop.stretch);
+            short &= law.is_short(&in_space);
+            let tau = if SHORT { law.kirchhoff_short(&in_space) } else { law.kirchhoff(&in_space) };
+            radial[n] = set_flux(c, (n, F), (&tau, hoop), contributions);
         }
+        short
     }
 }
 
@@ -123,10 +158,11 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnHalfPlane<T> {
             std::array::from_fn(|n| with_hoop_stretch(&F[n], hoop(n).stretch));
         in_space.iter().enumerate().for_each(|(n, F)| block.set(n, F));
         block.evaluate(law.as_ref());
-        for (n, F_in_space) in in_space.iter().enumerate() {
-            let tau = product(&block.stress(n), &F_in_space.transpose());
-            set_forces(c, (n, &F[n]), (&tau, hoop(n)), contributions);
-        }
+        let radial: [T; BLOCK] = std::array::from_fn(|n| {
+            let tau = product(&block.stress(n), &in_space[n].transpose());
+            set_flux(c, (n, &F[n]), (&tau, hoop(n)), contributions)
+        });
+        add_radial(&radial[..internal.len() / Hoop::<T>::COUNT], contributions);
     }
 
     fn variables(&self) -> usize {
@@ -135,6 +171,10 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnHalfPlane<T> {
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
         vec![T::one(), X[0]]
+    }
+
+    fn needs_start(&self) -> bool {
+        false
     }
 
     fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {

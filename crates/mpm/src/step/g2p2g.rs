@@ -138,7 +138,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             follow.advance(transfer, interpolated, &mut own);
             contributions.set_values(c, own.v, own.affine);
         } else {
-            let start = is_with_memory.then(|| F.to_vec());
+            let start = is_with_memory.then(|| match law.needs_start() {
+                true => F.to_vec(),
+                false => Vec::new(),
+            });
             let advance = AdvanceParticles {
                 c,
                 time_step: c.time_step,

@@ -151,7 +151,8 @@ impl<const D: usize> Elements<D> {
                     own += u[*node] * *value;
                     H += u[*node] * slope.transpose();
                 }
-                let weight = shapes.weight * ratio;
+                let radius = if exact.is_half_plane() { X[0] } else { 1.0 };
+                let weight = shapes.weight * ratio * radius;
                 of_u += weight * (own - exact.displacement(&X, time)).norm_squared();
                 of_H += weight * (H - exact.displacement_gradient(&X, time)).norm_squared();
                 volume += weight;

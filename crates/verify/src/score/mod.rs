@@ -55,6 +55,7 @@ use recording::recording;
 use serde::Serialize;
 
 use crate::dimension::in_dimension;
+use crate::half_plane::{HalfPlane, needs_space};
 use crate::order::Order;
 use crate::precision::Precision;
 
@@ -85,7 +86,28 @@ pub fn score(
         let (what, value) = ("periods", options.periods);
         return Err(ScoreError::Setting { what, value, admissible: "a positive number" });
     }
+    if let Some(score) = score_of_half_plane(exact, inputs, options) {
+        return Ok(score);
+    }
     in_dimension!(exact, |exact| score_in(exact, inputs, options), else Err(ScoreError::Dimension))
+}
+
+/// The score of recordings of the half plane of a body of revolution, radius and height; `None` where they are of the body in space, and for
+/// other bodies.
+fn score_of_half_plane(
+    exact: &AnySolution<f64>,
+    inputs: &[Input],
+    options: &ScoreOptions,
+) -> Option<Score> {
+    let AnySolution::Three(space) = exact else { return None };
+    let plane = HalfPlane::new(space.as_ref())?;
+    if needs_space(exact).is_some() {
+        return None;
+    }
+    let score = score_in(&plane, inputs, options).ok()?;
+    let mut findings = score.rows.iter().flat_map(|row| &row.findings);
+    let is_in_space = findings.any(|finding| ["out-of-plane", "sheets"].contains(&finding.kind));
+    (!is_in_space).then_some(score)
 }
 
 fn score_in<const D: usize>(
