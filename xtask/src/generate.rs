@@ -218,7 +218,7 @@ fn generate(repository: &Path, path: &Path, hosts: &[&Host]) -> anyhow::Result<G
     for host in hosts {
         let own = match spec.coordinates {
             Coordinates::Axisymmetric if host.in_half_plane => {
-                Some(Code::for_host(&spec, Origin::library(&spec), host)?)
+                Some(Code::for_host(&spec, Origin::library(&spec), true)?)
             }
             _ => None,
         };

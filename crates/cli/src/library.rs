@@ -54,9 +54,15 @@ const INCOMPRESSIBLE: &[(&str, &str)] = &[
     ("shears-loaded", include_str!("../../../mms-specs/incompressible/shears-loaded.toml")),
 ];
 
+/// Specifications of bodies of revolution, which are compiled in as text.
+const REVOLUTION: &[(&str, &str)] = &[
+    ("thick-cylinder", include_str!("../../../mms-specs/revolution/thick-cylinder.toml")),
+    ("twisting-cylinder", include_str!("../../../mms-specs/revolution/twisting-cylinder.toml")),
+];
+
 /// All specifications that are compiled in as text.
 fn texts() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
-    WITH_MEMORY.iter().chain(INCOMPRESSIBLE)
+    WITH_MEMORY.iter().chain(INCOMPRESSIBLE).chain(REVOLUTION)
 }
 
 /// The names of all solutions that can be listed: [`names`], then those whose fields are interpreted.

@@ -2,7 +2,6 @@
 
 use crate::fault::{Fault, NoEffect};
 use crate::table::Tabulated;
-use crate::target::Host;
 use mmsmith_expr::{Function, Operation};
 use mmsmith_spec::{Coordinates, DeriveError, Fields, Spec};
 use mmsmith_stage::Staged;
@@ -54,13 +53,18 @@ impl<'a> Code<'a> {
         Code { spec, staged, origin, wrong: None, is_of_half_plane: false, table: None }
     }
 
-    /// Derives and stages the fields in the components in which a host computes.
+    /// Derives and stages the fields in the components in which a host computes: in the half plane of a body of revolution where the host
+    /// has it [there](crate::Host::in_half_plane).
     ///
     /// # Errors
     ///
     /// [`DeriveError`] where a field is nowhere defined.
-    pub fn for_host(spec: &'a Spec, origin: Origin, host: &Host) -> Result<Self, DeriveError> {
-        let is_of_half_plane = host.in_half_plane && spec.coordinates == Coordinates::Axisymmetric;
+    pub fn for_host(
+        spec: &'a Spec,
+        origin: Origin,
+        in_half_plane: bool,
+    ) -> Result<Self, DeriveError> {
+        let is_of_half_plane = in_half_plane && spec.coordinates == Coordinates::Axisymmetric;
         let fields = if is_of_half_plane { spec.derive_for_hosts()? } else { spec.derive()? };
         Ok(Code { is_of_half_plane, ..Code::of(spec, fields, origin) })
     }

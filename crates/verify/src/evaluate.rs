@@ -8,7 +8,7 @@ use crate::error::SceneError;
 use crate::points::outside;
 use crate::precision::Precision;
 use mmsmith_laws::{Differentiated, Tangent};
-use mmsmith_runtime::{AnySolution, Fields, Solution};
+use mmsmith_runtime::{AnySolution, Around, Domain, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -62,6 +62,37 @@ fn is_false(value: &bool) -> bool {
 const OUTSIDE: f64 = 1e-12;
 
 impl FieldRow {
+    /// This with `change` applied to every value.
+    fn map(mut self, change: impl Fn(f64) -> f64) -> Self {
+        let vectors = [&mut self.u, &mut self.v, &mut self.a, &mut self.b];
+        let matrices = [&mut self.H, &mut self.F, &mut self.P];
+        let entries = vectors.into_iter().flatten();
+        let entries = entries.chain(matrices.into_iter().flatten().flatten());
+        let others = self.F_zz.iter_mut().chain(self.internal.values_mut());
+        for value in entries.chain([&mut self.J]).chain(others) {
+            *value = change(*value);
+        }
+        self
+    }
+
+    /// The sum of this and of another row times a factor.
+    fn plus(self, other: &Self, factor: f64) -> Self {
+        let values: Vec<f64> = other.entries().collect();
+        let next = std::cell::Cell::new(0);
+        self.map(|value| {
+            let place = next.replace(next.get() + 1);
+            value + factor * values.get(place).copied().unwrap_or(f64::NAN)
+        })
+    }
+
+    /// Every value, in the order of [`map`](Self::map).
+    fn entries(&self) -> impl Iterator<Item = f64> + '_ {
+        let vectors = [&self.u, &self.v, &self.a, &self.b].into_iter().flatten();
+        let matrices = [&self.H, &self.F, &self.P].into_iter().flatten().flatten();
+        let others = self.F_zz.iter().chain(self.internal.values());
+        vectors.chain(matrices).chain([&self.J]).chain(others).copied()
+    }
+
     /// Each field's letter, the shape of its value at a point, and its entries row by row.
     #[must_use]
     pub fn named(&self) -> Vec<(&str, Vec<usize>, Vec<f64>)> {
@@ -162,7 +193,51 @@ where
 /// [`WrongLength`] when `X` does not have one coordinate for each dimension.
 pub fn evaluate(solution: &AnySolution<f64>, X: &[f64], t: f64) -> Result<FieldRow, WrongLength> {
     let unknown = || Err(WrongLength { given: X.len(), dimension: 0 });
-    in_dimension!(solution, |s| evaluate_in(s, X, t), else unknown())
+    let row = in_dimension!(solution, |s| evaluate_in(s, X, t), else unknown())?;
+    match (solution, X) {
+        (AnySolution::Three(space), [0.0, 0.0, Z]) if !row.not_finite.is_empty() => {
+            Ok(limit_at_axis(space.as_ref(), *Z, t).unwrap_or(row))
+        }
+        _ => Ok(row),
+    }
+}
+
+/// The limits of all fields on the axis of a solid body that is axisymmetric; `None` for other bodies.
+///
+/// Along a line through the axis every Cartesian entry is smooth, so that means over both sides are even functions of the distance. They are
+/// extrapolated from six distances by the polynomial of the squares.
+fn limit_at_axis(space: &dyn Solution<f64, 3>, Z: f64, t: f64) -> Option<FieldRow> {
+    const DISTANCES: usize = 6;
+    // Small beside the body, large beside what rounding loses in quotients by the distance.
+    const SHARE: f64 = 0.01;
+    let Domain::Tube { inner: 0.0, outer, around: Around::Axisymmetric, .. } = space.domain()
+    else {
+        return None;
+    };
+    let mut limit: Option<FieldRow> = None;
+    for k in 1..=DISTANCES {
+        // Lagrange's weight at zero of the square of the distance.
+        let square = |k: usize| (k * k) as f64;
+        let weight: f64 = (1..=DISTANCES)
+            .filter(|other| *other != k)
+            .map(|other| square(other) / (square(other) - square(k)))
+            .product();
+        for side in [1.0, -1.0] {
+            let X = side * SHARE * outer * k as f64;
+            let row = evaluate_in(space, &[X, 0.0, Z], t).ok()?;
+            limit = Some(match limit {
+                None => row.map(|value| 0.5 * weight * value),
+                Some(sum) => sum.plus(&row, 0.5 * weight),
+            });
+        }
+    }
+    let limit = limit?;
+    let is_finite =
+        |(.., values): &(&str, Vec<usize>, Vec<f64>)| values.iter().all(|v| v.is_finite());
+    limit.named().iter().all(is_finite).then(|| {
+        let outside = outside(&space.domain(), &SVector::from([0.0, 0.0, Z]));
+        FieldRow { outside: outside.is_some_and(|share| share > OUTSIDE), ..limit }
+    })
 }
 
 fn evaluate_in<const D: usize>(

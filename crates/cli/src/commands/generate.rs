@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{Code, Names, Origin};
 use mmsmith_interpret::{TableFile, TableFileError};
-use mmsmith_spec::Spec;
+use mmsmith_spec::{Coordinates, Spec};
 use mmsmith_stage::Staged;
 
 use super::eval::points::positions;
@@ -48,11 +48,16 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             table = Some(text);
             code
         }
+        None if options.tangent && spec.coordinates == Coordinates::Axisymmetric => bail!(
+            "--tangent: files of a body of revolution have the fields of its half plane, and the tangent is known in Cartesian components: state \
+             the body with coordinates = 'cylindrical' and shape = 'tube'"
+        ),
         None if options.tangent => {
             let fields = spec.derive_with_tangent().with_context(|| found.file())?;
             Code::of(&spec, fields, origin)
         }
-        None => Code::for_host(&spec, origin, options.target).with_context(|| found.file())?,
+        None => Code::for_host(&spec, origin, options.target.in_half_plane)
+            .with_context(|| found.file())?,
         Some(fault) => {
             let fields = spec.derive().with_context(|| found.file())?;
             Code::with_fault(&spec, fields, origin, fault)
