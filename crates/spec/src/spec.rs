@@ -544,7 +544,11 @@ impl<'a> Reader<'a> {
             let dimension = document.dimension.get_ref().0;
             let message =
                 format!("{} coordinates do not come in {dimension} dimensions", coordinates.name());
-            let help = format!("dimension = {}", coordinates.dimensions());
+            let mut help = format!("dimension = {}", coordinates.dimensions());
+            if coordinates == Coordinates::Cylindrical && dimension == 2 {
+                help +=
+                    "; for a body of revolution stated by R and Z, coordinates = 'axisymmetric'";
+            }
             return Err(source.error(message, document.dimension.span(), Some(help)));
         }
         let scope = Scope::new(source, &coordinates.place_names(dimension));
@@ -1011,13 +1015,24 @@ impl<'a> Reader<'a> {
             "shell" if self.dimension == 3 => (["inner", "outer"], true),
             "annulus" | "shell" => {
                 let message = "an annulus is a shape of the plane, a shell one of space";
-                let help =
-                    "shape = 'annulus' with dimension = 2, 'shell' with dimension = 3, or 'box'";
+                let help = match self.coordinates {
+                    Coordinates::Cylindrical => {
+                        "between two radii about the axis Z lies shape = 'tube', with inner, outer, lower and upper"
+                    }
+                    _ => {
+                        "shape = 'annulus' with dimension = 2, 'shell' with dimension = 3, or 'box'"
+                    }
+                };
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help.into())));
             }
             _ => {
                 let message = format!("the shape '{shape}' is not known");
-                let help = format!("shape = 'box', 'annulus', 'shell', {}", Self::TUBES);
+                let mut help = format!("shape = 'box', 'annulus', 'shell', {}", Self::TUBES);
+                if shape == "cylinder" {
+                    help = format!(
+                        "a hollow cylinder is a 'tube', a solid one a 'solid-cylinder'; {help}"
+                    );
+                }
                 return Err(self.scope.source.error(message, keys.shape.span(), Some(help)));
             }
         };
