@@ -215,7 +215,8 @@ impl<'a, T: Precision<2>> InHalfPlane<'a, T> {
     }
 
     fn on_grid(&self) -> Result<OnGrid<'_, T, 2>, CaseError> {
-        OnGrid::prepare(&self.exact, &self.model, &self.case)
+        let on_grid = OnGrid::prepare(&self.exact, &self.model, &self.case);
+        on_grid.map_err(half_plane::named_in_space)
     }
 }
 

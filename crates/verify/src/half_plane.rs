@@ -7,6 +7,8 @@ use mmsmith_runtime::{
 };
 use nalgebra::{SMatrix, SVector};
 
+use crate::error::{CaseError, SceneError};
+
 /// The axes of space that the half plane has: at the angle zero, `R` lies along the first and `Z` along the third.
 const AXES: [usize; 2] = [0, 2];
 
@@ -91,6 +93,21 @@ fn in_plane(surface: Surface) -> Option<Surface> {
         Surface::Upper(2) => Some(Surface::Upper(1)),
         _ => None,
     }
+}
+
+/// Errors that name sides of the half plane with the names that they have in space.
+pub(crate) fn named_in_space(error: CaseError) -> CaseError {
+    let named = |surface: Surface| in_space(surface).unwrap_or(surface);
+    let CaseError::Scene(scene) = error else { return error };
+    CaseError::Scene(match scene {
+        SceneError::Unmodelled { surface, condition, instead } => {
+            SceneError::Unmodelled { surface: named(surface), condition, instead }
+        }
+        SceneError::Undeclared { surfaces } => {
+            SceneError::Undeclared { surfaces: surfaces.into_iter().map(named).collect() }
+        }
+        other => other,
+    })
 }
 
 /// The surface of space that a side of the box in the half plane is.
