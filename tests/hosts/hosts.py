@@ -75,7 +75,9 @@ class Case:
         self.variables, self.worst_of_table = getattr(solution, "INTERNAL", []), 0.0
         if self.points_file:
             self.write_points(self.X)
-        rows = [{"X": list(X), "t": t} for X, t in zip(self.X, self.t)]
+        # Of a body of revolution the angle means nothing.
+        places = self.X[:, [0, 2]] if hasattr(solution, "COORDINATES") else self.X
+        rows = [{"X": list(X), "t": t} for X, t in zip(places, self.t)]
         out = call([mms, "eval", self.given, "--points", "-", "--json", "-"], input=json.dumps(rows).encode())
         rows = json.loads(out)["rows"]
         self.exact = {field: np.array([row[field] for row in rows], dtype=float) for field in FIELDS}
@@ -120,7 +122,11 @@ class Case:
     def points(self, solution):
         random = np.random.default_rng(20)
         shares = random.random((POINTS, self.dimension))
-        if hasattr(solution, "lower"):
+        if hasattr(solution, "COORDINATES"):
+            lower = np.array([solution.inner(), 0.0, solution.lower()])
+            upper = np.array([solution.outer(), 2.0 * np.pi, solution.upper()])
+            X = lower + shares * (upper - lower)
+        elif hasattr(solution, "lower"):
             lower, upper = np.array(solution.lower()), np.array(solution.upper())
             X = lower + shares * (upper - lower)
         else:

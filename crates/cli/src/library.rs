@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use mmsmith_claims::admissible_value;
-use mmsmith_interpret::{interpret_staged, interpret_staged_single};
+use mmsmith_interpret::{interpret_fields, interpret_staged, interpret_staged_single};
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
 use mmsmith_spec::{Coordinates, Parameter, Spec, nearest};
 use mmsmith_stage::Staged;
@@ -387,6 +387,17 @@ impl Selection {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
                 Ok(interpret_staged(&source.0, &source.1, pairs)?)
             }
+        }
+    }
+
+    /// As [`build`](Self::build), in the components of files for hosts: a body of revolution in its half plane.
+    pub(crate) fn build_for_hosts(&self) -> Result<AnySolution<f64>> {
+        match &self.source {
+            Source::File(source) if source.0.coordinates == Coordinates::Axisymmetric => {
+                let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
+                Ok(interpret_fields(&source.0, source.0.derive_for_hosts()?, pairs)?)
+            }
+            _ => self.build(),
         }
     }
 

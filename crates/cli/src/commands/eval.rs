@@ -30,7 +30,7 @@ const MOST_NAMED: usize = 5;
 pub(crate) fn eval(options: &EvalOptions) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.parameters.set)?;
     let file = Source::of(&options.points);
-    let solution = selection.build()?;
+    let solution = selection.build_for_hosts()?;
     let is_axisymmetric = selection.is_axisymmetric(&solution);
     let points = points::read(file, &selection, is_axisymmetric)?;
     let json_file = Output::prepare_if(options.json.as_ref())?;
@@ -179,5 +179,5 @@ fn fields_at(
     if parameters.is_empty() {
         return at(solution);
     }
-    at(&selection.with(parameters)?.build()?)
+    at(&selection.with(parameters)?.build_for_hosts()?)
 }

@@ -136,8 +136,12 @@ impl Python {
             .map(|p| format!("{}: {}", string(&p.name), self.literal(p.default)))
             .collect();
         text += &format!(
-            "    NAME = {}\n    DIMENSION = {}\n    DEFAULTS = {{{}}}\n\n    def __init__(self, **parameters):\n{}",
+            "    NAME = {}\n{}    DIMENSION = {}\n    DEFAULTS = {{{}}}\n\n    def __init__(self, **parameters):\n{}",
             string(&spec.name),
+            match code.is_of_half_plane {
+                true => "    COORDINATES = (\"R\", \"theta\", \"Z\")\n",
+                false => "",
+            },
             spec.dimension,
             defaults.join(", "),
             self.demands,
