@@ -339,6 +339,20 @@ pub trait LibraryLaw<T: RealField + Copy>: Copy + Send + Sync + 'static {
         self.kirchhoff(F)
     }
 
+    /// Kirchhoff stress in a half plane and around the axis, where the stretch is `hoop`, and whether the short form was right, which is
+    /// asked for by `SHORT`. Default: by the law of space.
+    #[inline(always)]
+    fn kirchhoff_with_hoop<const SHORT: bool, const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+        hoop: T,
+    ) -> (SMatrix<T, D, D>, T, bool) {
+        let in_space = with_hoop_stretch(F, hoop);
+        let is_short = self.is_short(&in_space);
+        let tau = if SHORT { self.kirchhoff_short(&in_space) } else { self.kirchhoff(&in_space) };
+        (SMatrix::from_fn(|i, j| tau[(i, j)]), tau[(2, 2)], is_short)
+    }
+
     /// First Piola-Kirchhoff stress.
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D>;
 

@@ -1,6 +1,7 @@
 //! The neo-Hookean law.
 
-use mmsmith_lanes::tensor::{det_minus_one, inverse_transpose_minus_identity, real};
+use mmsmith_lanes::tensor::{det_minus_one, determinant, inverse_transpose_minus_identity, real};
+use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{RealField, SMatrix};
 
 use super::{
@@ -60,6 +61,30 @@ impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
     #[inline(always)]
     fn kirchhoff_short<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
         plus_diagonal(finger_minus_identity(F) * self.mu, self.lambda * log_jacobian_short(F))
+    }
+
+    /// Without the products with the zeros of the law of space.
+    #[inline(always)]
+    fn kirchhoff_with_hoop<const SHORT: bool, const D: usize>(
+        &self,
+        F: &SMatrix<T, D, D>,
+        hoop: T,
+    ) -> (SMatrix<T, D, D>, T, bool) {
+        let (in_plane, h) = (det_minus_one(&displacement_gradient(F)), hoop - T::one());
+        let growth = in_plane + h + in_plane * h;
+        let of_growth: f64 = nalgebra::convert_unchecked(growth);
+        let is_linear = self.planted.is(Fault::LinearLogarithm);
+        let is_short = !is_linear && is_near_one(of_growth);
+        let pressure = if is_linear {
+            self.lambda * growth
+        } else if SHORT {
+            self.lambda * real(ln_near_one(of_growth))
+        } else {
+            let J = nalgebra::convert_unchecked(determinant(F) * hoop);
+            self.lambda * real(ln_of_both_in_range(of_growth, J))
+        };
+        let around = (h + h + h * h) * self.mu + pressure;
+        (plus_diagonal(finger_minus_identity(F) * self.mu, pressure), around, is_short)
     }
 
     #[inline(always)]

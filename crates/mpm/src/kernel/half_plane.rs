@@ -53,17 +53,16 @@ fn follow<T: Lanes, const D: usize>(x: &[SVector<T, D>], internal: &mut [T]) {
 fn set_flux<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     (n, F): (usize, &SMatrix<T, D, D>),
-    (tau, hoop): (&Matrix3<T>, Hoop<T>),
+    (tau, around, hoop): (&SMatrix<T, D, D>, T, Hoop<T>),
     contributions: &mut Contributions<T, D, BLOCK>,
 ) -> T {
     let volume = contributions.volume[n];
-    let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
-    let in_plane = c.planted.stress_in_forces(in_plane, F);
+    let in_plane = c.planted.stress_in_forces(*tau, F);
     contributions.stress_flux[n] = in_plane * -(volume * c.inverse_spacing);
     if c.planted.is(Fault::HoopStressDropped) {
         return T::zero();
     }
-    -volume * tau[(2, 2)] / hoop.radius()
+    -volume * around / hoop.radius()
 }
 
 /// Adds radial forces on the first particles.
@@ -134,10 +133,9 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
         let of_particles = F.iter().zip(internal.chunks_exact(Hoop::<T>::COUNT)).enumerate();
         for (n, (F, q)) in of_particles {
             let hoop = Hoop::of(q);
-            let in_space = with_hoop_stretch(F, hoop.stretch);
-            short &= law.is_short(&in_space);
-            let tau = if SHORT { law.kirchhoff_short(&in_space) } else { law.kirchhoff(&in_space) };
-            radial[n] = set_flux(c, (n, F), (&tau, hoop), contributions);
+            let (tau, around, is_short) = law.kirchhoff_with_hoop::<SHORT, D>(F, hoop.stretch);
+            short &= is_short;
+            radial[n] = set_flux(c, (n, F), (&tau, around, hoop), contributions);
         }
         short
     }
@@ -160,7 +158,8 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnHalfPlane<T> {
         block.evaluate(law.as_ref());
         let radial: [T; BLOCK] = std::array::from_fn(|n| {
             let tau = product(&block.stress(n), &in_space[n].transpose());
-            set_flux(c, (n, &F[n]), (&tau, hoop(n)), contributions)
+            let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
+            set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoop(n)), contributions)
         });
         add_radial(&radial[..internal.len() / Hoop::<T>::COUNT], contributions);
     }
