@@ -35,6 +35,21 @@ impl<T: RealField + Copy> Hoop<T> {
     /// How many internal variables these are.
     pub const COUNT: usize = 2;
 
+    /// The internal variables of a particle at rest.
+    #[must_use]
+    pub fn at_rest<const D: usize>(X: &SVector<T, D>) -> [T; 2] {
+        [T::one(), X[0]]
+    }
+
+    /// Sets the stretch in the internal variables of a particle at a position.
+    #[inline(always)]
+    pub fn follow<const D: usize>(x: &SVector<T, D>, q: &mut [T]) {
+        let R = Self::of(q).reference_radius;
+        if let Some(stretch) = q.first_mut() {
+            *stretch = x[0] / R;
+        }
+    }
+
     /// From the internal variables of a particle; at rest at radius one where there are too few.
     #[inline(always)]
     #[must_use]
@@ -113,7 +128,7 @@ impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
     fn evolve(&self, _: &Increment<'_, T, D>, _: &mut [[T; BLOCK]]) {}
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        vec![T::one(), X[0]]
+        Hoop::at_rest(X).to_vec()
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {

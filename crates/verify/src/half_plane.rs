@@ -1,6 +1,5 @@
 //! A body of revolution in its half plane: what a solver with the coordinates `R` and `Z` sees of it.
 
-use mmsmith_laws::Hoop;
 use mmsmith_runtime::{
     AnySolution, Around, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields,
     InternalAtPoints, Lattice, Law, PlainPoints, Real, Solution, StateAtPoints, StateRun, Surface,
@@ -43,11 +42,6 @@ impl<'a, T: Real> HalfPlane<'a, T> {
             upper: SVector::from([outer, upper]),
         };
         Some(Self { space, domain, boundaries })
-    }
-
-    fn internal_of(&self, X: &SVector<T, 2>, t: T) -> Vec<T> {
-        let u = self.displacement(X, t);
-        vec![T::one() + u[0] / X[0]]
     }
 }
 
@@ -233,7 +227,7 @@ impl<T: Real> Solution<T, 2> for HalfPlane<'_, T> {
     }
 
     fn internal(&self, X: &SVector<T, 2>, t: T) -> Vec<T> {
-        self.internal_of(X, t)
+        vec![T::one() + self.displacement(X, t)[0] / X[0]]
     }
 
     fn internal_at(&self, X: &[SVector<T, 2>]) -> Box<dyn InternalAtPoints<T> + '_> {
@@ -304,13 +298,5 @@ impl<T: Real> StateAtPoints<T, 2> for StateInPlane<'_, T> {
 
     fn bytes_per_point(&self) -> usize {
         self.0.bytes_per_point()
-    }
-}
-
-/// Sets the hoop stretches of particles at their places.
-pub(crate) fn set_hoop_stretch<T: Real>(x: T, q: &mut [T]) {
-    let R = Hoop::of(q).reference_radius;
-    if let Some(stretch) = q.first_mut() {
-        *stretch = x / R;
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_clip::{Clip, Facet, Side};
+use mmsmith_laws::Hoop;
 use mmsmith_mpm::{
     Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share, Solver,
 };
@@ -14,7 +15,6 @@ use nalgebra::SVector;
 
 use crate::case::{Case, Extent, law_of};
 use crate::error::{CaseError, SceneError};
-use crate::half_plane::set_hoop_stretch;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Placement, Start, Updated};
@@ -291,7 +291,7 @@ fn set_memory<T: Real, const D: usize>(
         let mut q = law.initial(X);
         law.start_at_rate(&rate.map(Real::nearest), &mut q);
         if law.of_half_plane().is_some() {
-            set_hoop_stretch(x[0], &mut q);
+            Hoop::follow(x, &mut q);
         }
         particles.internal.extend(q);
     }

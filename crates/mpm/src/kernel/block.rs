@@ -37,8 +37,8 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
         Vec::new()
     }
 
-    /// Whether internal variables follow the deformation gradient, so that an increment needs that at its start.
-    fn needs_start(&self) -> bool {
+    /// Whether internal variables follow the deformation gradient; else they follow the position, and increments need no gradients.
+    fn follows_deformation(&self) -> bool {
         true
     }
 
@@ -70,11 +70,11 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
 /// An increment of the deformation of no more than a block of particles.
 pub(crate) struct BlockIncrement<'a, T, const D: usize> {
     pub(crate) time: T,
-    /// Deformation gradients at the start.
+    /// Deformation gradients at the start, where internal variables follow them.
     pub(crate) start: &'a [SMatrix<T, D, D>],
     /// Deformation gradients at the end.
     pub(crate) end: &'a [SMatrix<T, D, D>],
-    /// Positions at the end.
+    /// Positions at the end, where [internal variables follow them](BlockLaw::follows_deformation).
     pub(crate) x: &'a [SVector<T, D>],
 }
 

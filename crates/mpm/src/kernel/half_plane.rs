@@ -28,25 +28,36 @@ pub(crate) fn of_law<T: Lanes, const D: usize>(
 ) -> Box<dyn BlockLaw<T, D>> {
     match law {
         Law::Library(Material::NeoHookean { lambda, mu }) => {
-            Box::new(HalfPlane(NeoHookean { lambda: *lambda, mu: *mu, planted }))
+            Box::new(HalfPlane(OfLibrary(NeoHookean { lambda: *lambda, mu: *mu, planted })))
         }
-        Law::Library(material) => Box::new(HalfPlane(AnyLaw(planted.law_in_stresses(*material)))),
-        Law::Own(_) | Law::WithMemory(_) => Box::new(OwnHalfPlane(law.clone())),
+        Law::Library(material) => {
+            Box::new(HalfPlane(OfLibrary(AnyLaw(planted.law_in_stresses(*material)))))
+        }
+        Law::Own(_) | Law::WithMemory(_) => Box::new(HalfPlane(OfCaller(law.clone()))),
     }
+}
+
+/// Particles of a half plane, with the stresses of a law of space.
+struct HalfPlane<S>(S);
+
+/// A law of space as particles of a half plane ask for it.
+trait StressesOfSpace<T, const D: usize>: Send + Sync {
+    /// Sets the stress fluxes of particles with these deformation gradients and internal variables, and the radial forces on them.
+    fn set(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        internal: &[T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+        radial: &mut [T; BLOCK],
+    );
 }
 
 /// A law of the library.
-struct HalfPlane<L>(L);
+struct OfLibrary<L>(L);
 
 /// A law that the caller brings.
-struct OwnHalfPlane<T>(Law<T, 3>);
-
-/// Sets the hoop stretches of a block at new positions.
-fn follow<T: Lanes, const D: usize>(x: &[SVector<T, D>], internal: &mut [T]) {
-    for (x, q) in x.iter().zip(internal.chunks_exact_mut(Hoop::<T>::COUNT)) {
-        q[0] = x[0] / Hoop::of(q).reference_radius;
-    }
-}
+struct OfCaller<T>(Law<T, 3>);
 
 /// Sets the stress flux of a particle of a block; returns the force of the stress around the axis.
 #[inline(always)]
@@ -65,17 +76,7 @@ fn set_flux<T: Lanes, const D: usize>(
     -volume * around / hoop.radius()
 }
 
-/// Adds radial forces on the first particles.
-fn add_radial<T: Lanes, const D: usize>(
-    forces: &[T],
-    contributions: &mut Contributions<T, D, BLOCK>,
-) {
-    for (force, value) in forces.iter().zip(&mut contributions.value) {
-        value.values[D] += *force;
-    }
-}
-
-impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for HalfPlane<L> {
+impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for HalfPlane<S> {
     fn stress(
         &self,
         c: &Constants<T, D>,
@@ -83,7 +84,12 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for HalfPlane<L>
         internal: &[T],
         contributions: &mut Contributions<T, D, BLOCK>,
     ) {
-        dispatch(Stress { F, c, law: self.0, internal, contributions });
+        let mut radial = [T::zero(); BLOCK];
+        self.0.set(c, F, internal, contributions, &mut radial);
+        let count = internal.len() / Hoop::<T>::COUNT;
+        for (force, value) in radial[..count].iter().zip(&mut contributions.value) {
+            value.values[D] += *force;
+        }
     }
 
     fn variables(&self) -> usize {
@@ -91,15 +97,30 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> BlockLaw<T, D> for HalfPlane<L>
     }
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        vec![T::one(), X[0]]
+        Hoop::at_rest(X).to_vec()
     }
 
-    fn needs_start(&self) -> bool {
+    fn follows_deformation(&self) -> bool {
         false
     }
 
     fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
-        follow(increment.x, internal);
+        for (x, q) in increment.x.iter().zip(internal.chunks_exact_mut(Hoop::<T>::COUNT)) {
+            Hoop::follow(x, q);
+        }
+    }
+}
+
+impl<T: Lanes, L: LibraryLaw<T>, const D: usize> StressesOfSpace<T, D> for OfLibrary<L> {
+    fn set(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        internal: &[T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+        radial: &mut [T; BLOCK],
+    ) {
+        dispatch(Stress { F, c, law: self.0, internal, contributions, radial });
     }
 }
 
@@ -109,17 +130,15 @@ struct Stress<'a, T, L, const D: usize> {
     law: L,
     internal: &'a [T],
     contributions: &'a mut Contributions<T, D, BLOCK>,
+    radial: &'a mut [T; BLOCK],
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(mut self, _: V) {
-        let mut radial = [T::zero(); BLOCK];
-        let internal = self.internal;
-        if !L::HAS_SHORT || !self.stresses::<true>(&mut radial) {
-            self.stresses::<false>(&mut radial);
+        if !L::HAS_SHORT || !self.stresses::<true>() {
+            self.stresses::<false>();
         }
-        add_radial(&radial[..internal.len() / Hoop::<T>::COUNT], self.contributions);
     }
 }
 
@@ -127,8 +146,8 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
     /// Sets the stress fluxes of all particles of a block, and their radial forces, by the short form of the law or the full one; returns
     /// whether the short form holds for all of them.
     #[inline(always)]
-    fn stresses<const SHORT: bool>(&mut self, radial: &mut [T; BLOCK]) -> bool {
-        let Self { F, c, law, internal, contributions } = self;
+    fn stresses<const SHORT: bool>(&mut self) -> bool {
+        let Self { F, c, law, internal, contributions, radial } = self;
         let mut short = true;
         let of_particles = F.iter().zip(internal.chunks_exact(Hoop::<T>::COUNT)).enumerate();
         for (n, (F, q)) in of_particles {
@@ -141,13 +160,14 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
     }
 }
 
-impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnHalfPlane<T> {
-    fn stress(
+impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
+    fn set(
         &self,
         c: &Constants<T, D>,
         F: &[SMatrix<T, D, D>; BLOCK],
         internal: &[T],
         contributions: &mut Contributions<T, D, BLOCK>,
+        radial: &mut [T; BLOCK],
     ) {
         let Law::Own(law) = &self.0 else { return };
         let mut block = BlockOfStresses::at_rest();
@@ -156,27 +176,10 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for OwnHalfPlane<T> {
             std::array::from_fn(|n| with_hoop_stretch(&F[n], hoop(n).stretch));
         in_space.iter().enumerate().for_each(|(n, F)| block.set(n, F));
         block.evaluate(law.as_ref());
-        let radial: [T; BLOCK] = std::array::from_fn(|n| {
+        for (n, radial) in radial.iter_mut().enumerate() {
             let tau = product(&block.stress(n), &in_space[n].transpose());
             let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
-            set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoop(n)), contributions)
-        });
-        add_radial(&radial[..internal.len() / Hoop::<T>::COUNT], contributions);
-    }
-
-    fn variables(&self) -> usize {
-        Hoop::<T>::COUNT
-    }
-
-    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        vec![T::one(), X[0]]
-    }
-
-    fn needs_start(&self) -> bool {
-        false
-    }
-
-    fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
-        follow(increment.x, internal);
+            *radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoop(n)), contributions);
+        }
     }
 }

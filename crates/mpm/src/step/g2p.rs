@@ -75,8 +75,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 let internal = of_internal.next().unwrap_or_default();
                 if !internal.is_empty() {
                     // Positions follow when forces are known; until then particles are as far as their velocity takes them.
-                    let ahead: Vec<SVector<T, D>> =
-                        x.iter().zip(interpolated).map(|(x, of)| x + of.velocity * time).collect();
+                    let moved = x.iter().zip(interpolated).map(|(x, of)| x + of.velocity * time);
+                    let ahead: Vec<SVector<T, D>> = match law.follows_deformation() {
+                        true => Vec::new(),
+                        false => moved.collect(),
+                    };
                     let end = &*F_early;
                     law.evolve(BlockIncrement { time, start: F, end, x: &ahead }, internal);
                 }
@@ -282,7 +285,10 @@ impl<T: Lanes, const D: usize> Follow<'_, T, D> {
             internal.copy_from_slice(early.internal);
         }
         if late > T::zero() {
-            let start = if internal.is_empty() { Vec::new() } else { F.to_vec() };
+            let start = match !internal.is_empty() && law.follows_deformation() {
+                true => F.to_vec(),
+                false => Vec::new(),
+            };
             for (F, interpolated) in F.iter_mut().zip(interpolated) {
                 *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
             }

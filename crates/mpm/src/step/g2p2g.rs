@@ -138,7 +138,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             follow.advance(transfer, interpolated, &mut own);
             contributions.set_values(c, own.v, own.affine);
         } else {
-            let start = is_with_memory.then(|| match law.needs_start() {
+            let start = is_with_memory.then(|| match law.follows_deformation() {
                 true => F.to_vec(),
                 false => Vec::new(),
             });
