@@ -62,35 +62,12 @@ fn is_false(value: &bool) -> bool {
 const OUTSIDE: f64 = 1e-12;
 
 impl FieldRow {
-    /// This with `change` applied to every value.
-    fn map(mut self, change: impl Fn(f64) -> f64) -> Self {
-        let vectors = [&mut self.u, &mut self.v, &mut self.a, &mut self.b];
-        let matrices = [&mut self.H, &mut self.F, &mut self.P];
-        let entries = vectors.into_iter().flatten();
-        let entries = entries.chain(matrices.into_iter().flatten().flatten());
+    /// Every value but those of the tangent.
+    fn values(&mut self) -> impl Iterator<Item = &mut f64> {
+        let vectors = [&mut self.u, &mut self.v, &mut self.a, &mut self.b].into_iter().flatten();
+        let matrices = [&mut self.H, &mut self.F, &mut self.P].into_iter().flatten().flatten();
         let others = self.F_zz.iter_mut().chain(self.internal.values_mut());
-        for value in entries.chain([&mut self.J]).chain(others) {
-            *value = change(*value);
-        }
-        self
-    }
-
-    /// The sum of this and of another row times a factor.
-    fn plus(self, other: &Self, factor: f64) -> Self {
-        let values: Vec<f64> = other.entries().collect();
-        let next = std::cell::Cell::new(0);
-        self.map(|value| {
-            let place = next.replace(next.get() + 1);
-            value + factor * values.get(place).copied().unwrap_or(f64::NAN)
-        })
-    }
-
-    /// Every value, in the order of [`map`](Self::map).
-    fn entries(&self) -> impl Iterator<Item = f64> + '_ {
-        let vectors = [&self.u, &self.v, &self.a, &self.b].into_iter().flatten();
-        let matrices = [&self.H, &self.F, &self.P].into_iter().flatten().flatten();
-        let others = self.F_zz.iter().chain(self.internal.values());
-        vectors.chain(matrices).chain([&self.J]).chain(others).copied()
+        vectors.chain(matrices).chain([&mut self.J]).chain(others)
     }
 
     /// Each field's letter, the shape of its value at a point, and its entries row by row.
@@ -224,11 +201,12 @@ fn limit_at_axis(space: &dyn Solution<f64, 3>, Z: f64, t: f64) -> Option<FieldRo
             .product();
         for side in [1.0, -1.0] {
             let X = side * SHARE * outer * k as f64;
-            let row = evaluate_in(space, &[X, 0.0, Z], t).ok()?;
-            limit = Some(match limit {
-                None => row.map(|value| 0.5 * weight * value),
-                Some(sum) => sum.plus(&row, 0.5 * weight),
-            });
+            let mut row = evaluate_in(space, &[X, 0.0, Z], t).ok()?;
+            row.values().for_each(|value| *value *= 0.5 * weight);
+            match &mut limit {
+                None => limit = Some(row),
+                Some(sum) => sum.values().zip(row.values()).for_each(|(sum, own)| *sum += *own),
+            }
         }
     }
     let limit = limit?;
