@@ -429,7 +429,7 @@ impl<'de> Deserialize<'de> for Measure {
 }
 
 impl Listed for Measure {
-    const FORM: &'static str = "a list in brackets, as in ['...', '...']";
+    const FORM: &'static str = Text::FORM;
 
     fn alone(text: &str) -> Option<Self> {
         Some(Measure(Text { value: text.to_owned(), span: 0..0 }))

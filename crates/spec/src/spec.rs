@@ -1006,10 +1006,12 @@ impl<'a> Reader<'a> {
             ("inner", keys.inner.is_some()),
             ("outer", keys.outer.is_some()),
         ];
+        if let Some(tube) = self.tube(table)? {
+            return Ok(tube);
+        }
         // Turned about the axis, an annulus about the origin is a shell.
         let is_turned = self.coordinates == Coordinates::Axisymmetric;
         let (needed, annulus) = match shape {
-            _ if Self::is_tube(shape) => return self.tube(table),
             "box" => (["lower", "upper"], false),
             "annulus" if self.dimension == 2 || is_turned => (["inner", "outer"], true),
             "shell" if self.dimension == 3 => (["inner", "outer"], true),

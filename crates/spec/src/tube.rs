@@ -24,16 +24,14 @@ impl Reader<'_> {
     /// Names of shapes of revolution, for messages.
     pub(crate) const TUBES: &'static str = "'tube', 'solid-cylinder' or 'sector'";
 
-    /// Whether this is the name of a shape of revolution.
-    pub(crate) fn is_tube(name: &str) -> bool {
-        SHAPES.iter().any(|shape| shape.name == name)
-    }
-
-    /// A shape of revolution by its name.
-    pub(crate) fn tube(&mut self, table: &Spanned<DomainTable>) -> Result<Domain, Diagnostic> {
+    /// A shape of revolution by its name; `None` where the name is that of another shape.
+    pub(crate) fn tube(
+        &mut self,
+        table: &Spanned<DomainTable>,
+    ) -> Result<Option<Domain>, Diagnostic> {
         let keys = table.get_ref();
         let Some(shape) = SHAPES.iter().find(|shape| shape.name == keys.shape.get_ref()) else {
-            return Err(self.scope.source.error("no such shape", keys.shape.span(), None));
+            return Ok(None);
         };
         self.check_coordinates_of_tube(keys, shape)?;
         let given = [
@@ -75,7 +73,7 @@ impl Reader<'_> {
             None => Graph::ONE,
         };
         let (lower, upper) = (self.height(&keys.lower)?, self.height(&keys.upper)?);
-        Ok(Domain::Tube { inner, outer, lower, upper, around })
+        Ok(Some(Domain::Tube { inner, outer, lower, upper, around }))
     }
 
     fn check_coordinates_of_tube(
