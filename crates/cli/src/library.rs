@@ -10,13 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::fs;
 use std::path::{Component, Path, PathBuf, is_separator};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use mmsmith_claims::admissible_value;
-use mmsmith_interpret::{interpret_fields, interpret_staged, interpret_staged_single};
+use mmsmith_interpret::{interpret_staged, interpret_staged_single};
 use mmsmith_solutions::{AnySolution, CATALOGUE, Description, Precision, build};
-use mmsmith_spec::{Coordinates, Parameter, Spec, nearest};
+use mmsmith_spec::{Coordinates, DeriveError, Parameter, Spec, nearest};
 use mmsmith_stage::Staged;
 use mmsmith_verify::{Provenance, body_of, has_body};
 
@@ -285,13 +285,21 @@ pub(crate) struct Selection {
     parameters: BTreeMap<String, f64>,
 }
 
+/// A specification with its fields in stages.
+struct Interpretable {
+    spec: Spec,
+    staged: Staged,
+    /// Stages in the components of files for hosts, once a command asks for them where they are others.
+    for_hosts: OnceLock<Result<Staged, DeriveError>>,
+}
+
 /// Where a solution's fields come from.
 #[derive(Clone)]
 enum Source {
     /// Code generated from the library's specifications.
     Library(&'static Description),
     /// A specification that is interpreted; nothing needs to have been generated from it.
-    File(Arc<(Spec, Staged)>),
+    File(Arc<Interpretable>),
 }
 
 impl Selection {
@@ -314,7 +322,8 @@ impl Selection {
                 let pairs = spec.parameters.iter().map(|p| (p.name.clone(), p.default));
                 let defaults = pairs.collect();
                 let staged = Staged::of(&spec, fields);
-                (Source::File(Arc::new((spec, staged))), defaults)
+                let for_hosts = OnceLock::new();
+                (Source::File(Arc::new(Interpretable { spec, staged, for_hosts })), defaults)
             }
             Origin::BuiltIn(description) => {
                 let parameters = description.parameters.iter();
@@ -341,7 +350,7 @@ impl Selection {
                 build::<f64>(description.name, &description.resolve(pairs)?).transpose()?;
             }
             Source::File(source) => {
-                interpret_staged(&source.0, &source.1, pairs)?;
+                interpret_staged(&source.spec, &source.staged, pairs)?;
             }
         }
         Ok(changed)
@@ -351,7 +360,7 @@ impl Selection {
     pub(crate) fn name(&self) -> &str {
         match &self.source {
             Source::Library(description) => description.name,
-            Source::File(source) => &source.0.name,
+            Source::File(source) => &source.spec.name,
         }
     }
 
@@ -359,7 +368,7 @@ impl Selection {
     pub(crate) fn dimension(&self) -> usize {
         match &self.source {
             Source::Library(description) => description.dimension,
-            Source::File(source) => source.0.dimension,
+            Source::File(source) => source.spec.dimension,
         }
     }
 
@@ -367,7 +376,7 @@ impl Selection {
     pub(crate) fn is_axisymmetric(&self, solution: &AnySolution<f64>) -> bool {
         match &self.source {
             Source::Library(_) => mmsmith_verify::is_axisymmetric(solution),
-            Source::File(source) => source.0.coordinates == Coordinates::Axisymmetric,
+            Source::File(source) => source.spec.coordinates == Coordinates::Axisymmetric,
         }
     }
 
@@ -375,7 +384,7 @@ impl Selection {
     pub(crate) fn is_static(&self) -> bool {
         match &self.source {
             Source::Library(_) => false,
-            Source::File(source) => source.0.is_static(),
+            Source::File(source) => source.spec.is_static(),
         }
     }
 
@@ -385,7 +394,7 @@ impl Selection {
             Source::Library(description) => self.generated(description),
             Source::File(source) => {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-                Ok(interpret_staged(&source.0, &source.1, pairs)?)
+                Ok(interpret_staged(&source.spec, &source.staged, pairs)?)
             }
         }
     }
@@ -393,9 +402,11 @@ impl Selection {
     /// As [`build`](Self::build), in the components of files for hosts: a body of revolution in its half plane.
     pub(crate) fn build_for_hosts(&self) -> Result<AnySolution<f64>> {
         match &self.source {
-            Source::File(source) if source.0.coordinates == Coordinates::Axisymmetric => {
+            Source::File(source) if source.spec.coordinates == Coordinates::Axisymmetric => {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-                Ok(interpret_fields(&source.0, source.0.derive_for_hosts()?, pairs)?)
+                let stage = || Ok(Staged::of(&source.spec, source.spec.derive_for_hosts()?));
+                let staged = source.for_hosts.get_or_init(stage).as_ref().map_err(Clone::clone)?;
+                Ok(interpret_staged(&source.spec, staged, pairs)?)
             }
             _ => self.build(),
         }
@@ -407,7 +418,7 @@ impl Selection {
             Source::Library(description) => self.generated(description),
             Source::File(source) => {
                 let pairs = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-                Ok(interpret_staged_single(&source.0, &source.1, pairs)?)
+                Ok(interpret_staged_single(&source.spec, &source.staged, pairs)?)
             }
         }
     }
@@ -435,7 +446,7 @@ impl Selection {
                 description.parameters.iter().map(|p| (p.name.into(), p.unit.into())).collect()
             }
             Source::File(source) => {
-                source.0.parameters.iter().map(|p| (p.name.clone(), p.unit.clone())).collect()
+                source.spec.parameters.iter().map(|p| (p.name.clone(), p.unit.clone())).collect()
             }
         }
     }
