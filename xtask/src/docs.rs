@@ -1,7 +1,7 @@
 //! The README and the book in `docs/`: their examples are run, their links followed, their measurements written by
 //! commands.
 
-use crate::read;
+use crate::{formulas, read};
 use anyhow::{Context, bail};
 use blocks::Workplace;
 use links::{BOOK, Pages};
@@ -61,6 +61,11 @@ pub(crate) fn check(repository: &Path, mms: &Path) -> anyhow::Result<Report> {
                     section.commands.len()
                 )),
                 Err(fault) => faults.push((path.clone(), section.line, fault)),
+            }
+        }
+        for (line, latex) in &page.formulas {
+            if let Err(fault) = formulas::mathml(latex, false) {
+                faults.push((path.clone(), *line, format!("the formula cannot be set: {fault}")));
             }
         }
         for (line, prose) in &page.prose {

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 mod ablation;
 mod docs;
+mod formulas;
 mod generate;
 
 /// Tasks of the repository itself.
@@ -45,6 +46,12 @@ enum Task {
         /// Leave the book as it is.
         #[arg(long)]
         check: bool,
+    },
+    /// Set the formulas of the book for mdBook, which calls this: see docs/book.toml.
+    Formulas {
+        /// The question of mdBook whether a kind of output is served; all are.
+        #[arg(value_name = "supports OUTPUT")]
+        question: Vec<String>,
     },
     /// Run the examples of README and book, follow their links, and write the measurements of their pages.
     #[command(group = clap::ArgGroup::new("what").required(true))]
@@ -83,6 +90,12 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             (outcome.lines, outcome.stale)
         }
         Task::Ablation { check } => ablation::run(&repository(), check)?,
+        Task::Formulas { question } => {
+            if question.is_empty() {
+                formulas::preprocess(std::io::stdin().lock(), std::io::stdout().lock())?;
+            }
+            (Vec::new(), false)
+        }
         Task::Docs { write: true, mms, pages, .. } => {
             docs::write(&repository(), &mms, &pages, say)?;
             (Vec::new(), false)

@@ -1,6 +1,7 @@
 //! Fate of each code block: it is run, read, compared, or exempt with a reason.
 
 use super::markdown::{Block, Page};
+use crate::formulas;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -17,6 +18,8 @@ pub(crate) enum Action {
     File(String),
     /// It must be JSON.
     Json,
+    /// It is a formula in LaTeX that can be set.
+    Formula,
     /// It is run as a script that must end with this status.
     Run(i32),
     /// It is what the script before it prints.
@@ -63,6 +66,7 @@ impl Action {
         }
         match language {
             "json" => Ok(Self::Json),
+            "math" => Ok(Self::Formula),
             "rust" if has_doctests => Ok(Self::Doctest),
             "rust" => Err("the page is no documentation test: name it in tests/src/lib.rs, or write <!-- exempt: REASON --> before the block".to_owned()),
             _ => Err("neither run nor exempt: write <!-- run -->, <!-- output -->, <!-- file: NAME --> or <!-- exempt: REASON --> before it".to_owned()),
@@ -193,6 +197,10 @@ fn act(
         Action::Exempt(reason) => Ok(format!("exempt: {reason}")),
         Action::Doctest => Ok("run by the documentation tests of mmsmith-tests".to_owned()),
         Action::Json => parse_json(&block.text),
+        Action::Formula => match formulas::mathml(&block.text, true) {
+            Ok(_) => Ok("a formula that can be set".to_owned()),
+            Err(fault) => Err(format!("the formula cannot be set: {fault}")),
+        },
         Action::Output => match printed.as_ref() {
             Some(printed) => compare(&block.text, &format!("{}{}", printed.out, printed.errors)),
             None => Err("no script was run before it".to_owned()),
@@ -342,6 +350,7 @@ mod tests {
         );
         assert_eq!(Action::of(&block("rust", &[]), true), Ok(Action::Doctest));
         assert_eq!(Action::of(&block("json", &[]), false), Ok(Action::Json));
+        assert_eq!(Action::of(&block("math", &[]), false), Ok(Action::Formula));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The parts of a Markdown page that can go wrong: code blocks, links, headings and generated sections.
 
+use crate::formulas::{self, Piece};
 use std::ops::Range;
 
 /// A page, cut into the parts that are checked. Line numbers count from one.
@@ -17,6 +18,8 @@ pub(crate) struct Page {
     pub(crate) prose: Vec<(usize, String)>,
     /// Code spans outside of generated sections.
     pub(crate) spans: Vec<(usize, String)>,
+    /// Formulas in LaTeX on lines of text.
+    pub(crate) formulas: Vec<(usize, String)>,
     /// Faults of the page's own structure.
     pub(crate) faults: Vec<(usize, String)>,
 }
@@ -184,7 +187,22 @@ impl Page {
     }
 
     fn text(&mut self, number: usize, line: &str, generated: bool) {
-        let (prose, spans) = without_code(line);
+        let mut own = String::new();
+        for piece in formulas::pieces(line) {
+            match piece {
+                Piece::Text(text) => own.push_str(text),
+                Piece::Formula(latex) => {
+                    self.formulas.push((number, latex.to_owned()));
+                    // Something must be left, as for code.
+                    own.push('$');
+                }
+                Piece::Open => self.faults.push((
+                    number,
+                    "the formula has no end on its line; write \\$ for a dollar sign".to_owned(),
+                )),
+            }
+        }
+        let (prose, spans) = without_code(&own);
         if let Some(heading) = heading(line) {
             let slug = slug(&heading.replace('`', ""));
             let same = |known: &&String| {
