@@ -28,16 +28,17 @@ pub(crate) struct Report {
     pub(crate) failed: bool,
 }
 
-/// Runs the examples of all pages, and looks for broken links, stale sections and measurements that no command wrote.
-pub(crate) fn check(repository: &Path, mms: &Path) -> anyhow::Result<Report> {
+/// Runs the examples of the given pages, or of all, and looks for broken links, stale sections and measurements that no command wrote.
+pub(crate) fn check(repository: &Path, mms: &Path, wanted: &[PathBuf]) -> anyhow::Result<Report> {
     let start = Instant::now();
     require(mms)?;
     let texts = texts(repository)?;
+    require_known(&texts, wanted)?;
     let pages: Pages = texts.iter().map(|(path, text)| (path.clone(), Page::parse(text))).collect();
     let doctests = read(&repository.join("tests/src/lib.rs"))?;
     let (mut lines, mut faults) = (Vec::new(), Vec::new());
     let mut blocks = 0;
-    for (path, text) in &texts {
+    for (path, text) in texts.iter().filter(|(path, _)| is_wanted(path, wanted)) {
         let Some(page) = pages.get(path) else { continue };
         let shown = path.display().to_string();
         let place = Workplace::new(mms, repository, &shown)?;
@@ -125,13 +126,8 @@ pub(crate) fn write(
 ) -> anyhow::Result<()> {
     require(mms)?;
     let texts = texts(repository)?;
-    let is_wanted =
-        |path: &Path| wanted.is_empty() || wanted.iter().any(|wanted| path.ends_with(wanted));
-    let is_known = |wanted: &Path| texts.iter().any(|(path, _)| path.ends_with(wanted));
-    if let Some(missing) = wanted.iter().find(|wanted| !is_known(wanted)) {
-        bail!("no page {}; pages are README.md and those in {BOOK}", missing.display());
-    }
-    for (path, text) in texts.iter().filter(|(path, _)| is_wanted(path)) {
+    require_known(&texts, wanted)?;
+    for (path, text) in texts.iter().filter(|(path, _)| is_wanted(path, wanted)) {
         let shown = path.display();
         let start = Instant::now();
         let place = Workplace::new(mms, repository, &shown.to_string())?;
@@ -143,6 +139,21 @@ pub(crate) fn write(
         }
     }
     Ok(())
+}
+
+/// Whether a page is among those that were asked for: all where none is.
+fn is_wanted(path: &Path, wanted: &[PathBuf]) -> bool {
+    wanted.is_empty() || wanted.iter().any(|wanted| path.ends_with(wanted))
+}
+
+fn require_known(texts: &[(PathBuf, String)], wanted: &[PathBuf]) -> anyhow::Result<()> {
+    let is_known = |wanted: &Path| texts.iter().any(|(path, _)| path.ends_with(wanted));
+    match wanted.iter().find(|wanted| !is_known(wanted)) {
+        Some(missing) => {
+            bail!("no page {}; pages are README.md and those in {BOOK}", missing.display())
+        }
+        None => Ok(()),
+    }
 }
 
 fn require(mms: &Path) -> anyhow::Result<()> {

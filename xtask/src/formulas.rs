@@ -59,7 +59,7 @@ pub(crate) fn pieces(line: &str) -> Vec<Piece<'_>> {
 
 /// Whether a name as the shell has it follows, such as `MMS_OUT`.
 fn is_variable(text: &str) -> bool {
-    text.chars().take_while(|c| c.is_ascii_uppercase() || *c == '_').count() > 2
+    text.chars().take_while(char::is_ascii_uppercase).count() > 2
 }
 
 /// The place of the dollar sign that ends a formula.
@@ -85,6 +85,7 @@ pub(crate) fn mathml(latex: &str, display: bool) -> Result<String, String> {
     let out = out
         .replace("\"minsize=", "\" minsize=")
         .replace('\u{b5}', "\u{3bc}")
+        .replace("&amp;nbsp;", "\u{a0}")
         .replace("&nbsp;", "\u{a0}")
         .replace("<mo>/</mo>", "<mo lspace=\"0\" rspace=\"0\">/</mo>");
     let mut safe = String::with_capacity(out.len());
@@ -193,6 +194,7 @@ mod tests {
         assert_eq!(pieces("5 $ and 6 $"), [Piece::Text("5 $ and 6 $")]);
         assert_eq!(pieces(r"\$x$ is"), [Piece::Text(r"\$x$ is")]);
         assert_eq!(pieces("in $MMS_A or $MMS_B"), [Piece::Text("in $MMS_A or $MMS_B")]);
+        assert_eq!(pieces("$X_J$"), [Piece::Formula("X_J")]);
         assert_eq!(pieces("$x is"), [Piece::Open, Piece::Text("x is")]);
     }
 

@@ -65,8 +65,8 @@ enum Task {
         /// The command mms that is run.
         #[arg(long, value_name = "FILE", default_value = "target/release/mms")]
         mms: PathBuf,
-        /// Pages to write, such as README.md or results/library.md; all where none is given.
-        #[arg(value_name = "PAGE", conflicts_with = "check")]
+        /// Pages to write, or whose examples are run, such as README.md or results/library.md; all where none is given.
+        #[arg(value_name = "PAGE")]
         pages: Vec<PathBuf>,
     },
 }
@@ -100,8 +100,8 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             docs::write(&repository(), &mms, &pages, say)?;
             (Vec::new(), false)
         }
-        Task::Docs { mms, .. } => {
-            let report = docs::check(&repository(), &mms)?;
+        Task::Docs { mms, pages, .. } => {
+            let report = docs::check(&repository(), &mms, &pages)?;
             (report.lines, report.failed)
         }
     };
