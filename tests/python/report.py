@@ -149,7 +149,7 @@ class Browser:
                 "--no-first-run",
                 "--hide-scrollbars",
                 "--force-color-profile=srgb",
-                "--host-resolver-rules=MAP * ~NOTFOUND",
+                "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
                 "--remote-debugging-pipe",
                 f"--user-data-dir={profile}",
             ],
