@@ -1,4 +1,4 @@
-//! The checksum that tells this build from all that may compute other bits.
+//! The checksum that tells this build from all that may compute other bits, and the commit of its sources.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -7,18 +7,25 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn main() -> io::Result<()> {
-    let crates = Path::new("..").canonicalize()?;
+    // A published package lies beside strangers; its own Cargo.lock tells the versions of all others.
+    let in_repository = Path::new("../../crates/cli/Cargo.toml").is_file();
+    let crates = Path::new(if in_repository { ".." } else { "." }).canonicalize()?;
+    let packages = if in_repository {
+        fs::read_dir(&crates)?.map(|package| Ok(package?.path())).collect::<io::Result<Vec<_>>>()?
+    } else {
+        vec![crates.clone()]
+    };
     let mut files = Vec::new();
-    for package in fs::read_dir(&crates)? {
-        let source = package?.path().join("src");
+    for source in packages.iter().map(|package| package.join("src")) {
         if source.is_dir() {
             println!("cargo::rerun-if-changed={}", source.display());
             collect(&source, &mut files)?;
         }
     }
     // Versions of dependencies, and the levels of optimisation.
+    let root = if in_repository { crates.join("..") } else { crates.clone() };
     for name in ["Cargo.lock", "Cargo.toml"] {
-        let file = crates.join("..").join(name);
+        let file = root.join(name);
         if file.is_file() {
             println!("cargo::rerun-if-changed={}", file.display());
             files.push(file);
@@ -40,7 +47,37 @@ fn main() -> io::Result<()> {
         std::env::var(name).unwrap_or_default().hash(&mut sum);
     }
     println!("cargo::rustc-env=MMS_BUILD={:016x}", sum.finish());
+    let commit = if in_repository { commit_of(&root) } else { packaged_commit() };
+    let commit = commit.map(|commit| format!(" ({commit})")).unwrap_or_default();
+    let version = std::env::var("CARGO_PKG_VERSION").unwrap_or_default();
+    println!("cargo::rustc-env=MMS_VERSION={version}{commit}");
     Ok(())
+}
+
+/// The commit that is checked out, and whether sources differ from it. This runs anew where sources change, so that it is the state
+/// from which the command was built, also after that state has been committed.
+fn commit_of(root: &Path) -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let done = Command::new("git").arg("-C").arg(root).args(arguments).output().ok()?;
+        done.status.success().then(|| String::from_utf8_lossy(&done.stdout).trim().to_owned())
+    };
+    let commit = git(&["rev-parse", "--short=10", "HEAD"]).filter(|commit| !commit.is_empty())?;
+    let changes =
+        git(&["status", "--porcelain", "--", "crates", "mms-specs", "Cargo.toml", "Cargo.lock"])?;
+    Some(if changes.is_empty() { commit } else { format!("{commit} with changes") })
+}
+
+/// The commit from which `cargo package` took this package.
+fn packaged_commit() -> Option<String> {
+    let text = fs::read_to_string(".cargo_vcs_info.json").ok()?;
+    let (_, rest) = text.split_once("\"sha1\"")?;
+    let commit: String = rest
+        .chars()
+        .skip_while(|c| !c.is_ascii_hexdigit())
+        .take_while(char::is_ascii_hexdigit)
+        .take(10)
+        .collect();
+    (!commit.is_empty()).then_some(commit)
 }
 
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {

@@ -181,7 +181,7 @@ fn sources(folder: &Path) -> anyhow::Result<String> {
 }
 
 /// The files of a folder and those within it that have an ending, in order.
-fn files(folder: &Path, ending: &str) -> anyhow::Result<Vec<PathBuf>> {
+pub(crate) fn files(folder: &Path, ending: &str) -> anyhow::Result<Vec<PathBuf>> {
     let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(folder) = folders.pop() {
         let context = || format!("cannot read {}", folder.display());

@@ -81,10 +81,11 @@ pub(crate) fn mathml(latex: &str, display: bool) -> Result<String, String> {
     push_mathml(&mut out, events.into_iter().map(Ok::<_, ParserError>), config)
         .map_err(|error| error.to_string())?;
     // Version 0.8.0 forgets a blank before the sizes of \bigl, and takes the micro sign, which has no italic form, for mu. A slash of
-    // a quotient stands closer than an operator.
+    // a quotient and the strokes of a size stand closer than operators.
     let out = out
         .replace("\"minsize=", "\" minsize=")
         .replace('\u{b5}', "\u{3bc}")
+        .replace("stretchy=\"false\">|", "stretchy=\"false\" lspace=\"0\" rspace=\"0\">|")
         .replace("&amp;nbsp;", "\u{a0}")
         .replace("&nbsp;", "\u{a0}")
         .replace("<mo>/</mo>", "<mo lspace=\"0\" rspace=\"0\">/</mo>");

@@ -12,6 +12,7 @@ mod ablation;
 mod docs;
 mod formulas;
 mod generate;
+mod publish;
 
 /// Tasks of the repository itself.
 #[derive(Parser)]
@@ -52,6 +53,15 @@ enum Task {
         /// The question of mdBook whether a kind of output is served; all are.
         #[arg(value_name = "supports OUTPUT")]
         question: Vec<String>,
+    },
+    /// Look whether all crates can be published: what their manifests say, and what `cargo publish` would do.
+    Publish {
+        /// Publish nothing. There is no other way: whoever publishes runs `cargo publish --workspace`.
+        #[arg(long, required = true)]
+        check: bool,
+        /// Package the crates without compiling each package by itself, which takes most of the time.
+        #[arg(long)]
+        no_build: bool,
     },
     /// Run the examples of README and book, follow their links, and write the measurements of their pages.
     #[command(group = clap::ArgGroup::new("what").required(true))]
@@ -96,6 +106,7 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             }
             (Vec::new(), false)
         }
+        Task::Publish { no_build, .. } => publish::check(&repository(), no_build)?,
         Task::Docs { write: true, mms, pages, .. } => {
             docs::write(&repository(), &mms, &pages, say)?;
             (Vec::new(), false)

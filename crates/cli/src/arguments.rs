@@ -55,7 +55,7 @@ pub(crate) use tradeoff::TradeoffOptions;
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
 #[derive(Parser)]
-#[command(name = "mms", version)]
+#[command(name = "mms", version = env!("MMS_VERSION"))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(crate) talk: TalkOptions,

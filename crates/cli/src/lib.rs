@@ -65,7 +65,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     } else {
         terminal::silence();
     }
-    terminal::detail(format_args!("mms {}", env!("CARGO_PKG_VERSION")));
+    terminal::detail(format_args!("mms {}", env!("MMS_VERSION")));
     let outcome = joined
         .and_then(|()| processes::admit(&arguments.command))
         .and_then(|()| perform(&arguments, &given));

@@ -33,31 +33,31 @@ const LONGEST: u64 = mmsmith_spec::LONGEST_FILE as u64;
 
 /// Specifications of laws that remember, or that depend on the place, which are compiled in as text.
 const WITH_MEMORY: &[(&str, &str)] = &[
-    ("bar-j2", include_str!("../../../mms-specs/with-memory/bar-j2.toml")),
-    ("bar-kelvin-voigt", include_str!("../../../mms-specs/with-memory/bar-kelvin-voigt.toml")),
-    ("bar-own-law", include_str!("../../../mms-specs/with-memory/bar-own-law.toml")),
-    ("block-graded", include_str!("../../../mms-specs/with-memory/block-graded.toml")),
-    ("block-j2", include_str!("../../../mms-specs/with-memory/block-j2.toml")),
-    ("block-j2-3d", include_str!("../../../mms-specs/with-memory/block-j2-3d.toml")),
-    ("block-maxwell", include_str!("../../../mms-specs/with-memory/block-maxwell.toml")),
-    ("block-perzyna", include_str!("../../../mms-specs/with-memory/block-perzyna.toml")),
-    ("block-warm", include_str!("../../../mms-specs/with-memory/block-warm.toml")),
-    ("ring-j2", include_str!("../../../mms-specs/with-memory/ring-j2.toml")),
-    ("ring-simo", include_str!("../../../mms-specs/with-memory/ring-simo.toml")),
+    ("bar-j2", include_str!("../library/with-memory/bar-j2.toml")),
+    ("bar-kelvin-voigt", include_str!("../library/with-memory/bar-kelvin-voigt.toml")),
+    ("bar-own-law", include_str!("../library/with-memory/bar-own-law.toml")),
+    ("block-graded", include_str!("../library/with-memory/block-graded.toml")),
+    ("block-j2", include_str!("../library/with-memory/block-j2.toml")),
+    ("block-j2-3d", include_str!("../library/with-memory/block-j2-3d.toml")),
+    ("block-maxwell", include_str!("../library/with-memory/block-maxwell.toml")),
+    ("block-perzyna", include_str!("../library/with-memory/block-perzyna.toml")),
+    ("block-warm", include_str!("../library/with-memory/block-warm.toml")),
+    ("ring-j2", include_str!("../library/with-memory/ring-j2.toml")),
+    ("ring-simo", include_str!("../library/with-memory/ring-simo.toml")),
 ];
 
 /// Specifications of motions without a change of volume, for tests next to incompressibility, which are compiled in as text.
 const INCOMPRESSIBLE: &[(&str, &str)] = &[
-    ("ring-isochoric", include_str!("../../../mms-specs/incompressible/ring-isochoric.toml")),
-    ("shears", include_str!("../../../mms-specs/incompressible/shears.toml")),
-    ("shears-3d", include_str!("../../../mms-specs/incompressible/shears-3d.toml")),
-    ("shears-loaded", include_str!("../../../mms-specs/incompressible/shears-loaded.toml")),
+    ("ring-isochoric", include_str!("../library/incompressible/ring-isochoric.toml")),
+    ("shears", include_str!("../library/incompressible/shears.toml")),
+    ("shears-3d", include_str!("../library/incompressible/shears-3d.toml")),
+    ("shears-loaded", include_str!("../library/incompressible/shears-loaded.toml")),
 ];
 
 /// Specifications of bodies of revolution, which are compiled in as text.
 const REVOLUTION: &[(&str, &str)] = &[
-    ("thick-cylinder", include_str!("../../../mms-specs/revolution/thick-cylinder.toml")),
-    ("twisting-cylinder", include_str!("../../../mms-specs/revolution/twisting-cylinder.toml")),
+    ("thick-cylinder", include_str!("../library/revolution/thick-cylinder.toml")),
+    ("twisting-cylinder", include_str!("../library/revolution/twisting-cylinder.toml")),
 ];
 
 /// All specifications that are compiled in as text.
