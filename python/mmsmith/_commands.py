@@ -81,7 +81,7 @@ def run(
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
-    cfl_speed: Literal["bar", "p-wave"] | None = None,
+    cfl_speed: Literal["bar", "p-wave", "viscous"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
     start: Literal["exact", "data", "halved"] | None = None,
@@ -160,10 +160,12 @@ def run(
             `polar`: Radius and angle.
             `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself, or a CFL number of less than 0.4.
+        cfl_speed: Wave speed in the CFL number. Default: bar; viscous if the stress follows the rate of the deformation; p-wave if mms
+            chose both the total Lagrangian formulation and the CFL number itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+            `viscous`: Speed of P-waves made larger by the viscosity of the law on narrow cells: v + sqrt(c^2 + v^2), where v = 2 eta/(rho0
+                h).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.
@@ -249,7 +251,7 @@ def converge(
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
-    cfl_speed: Literal["bar", "p-wave"] | None = None,
+    cfl_speed: Literal["bar", "p-wave", "viscous"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
     start: Literal["exact", "data", "halved"] | None = None,
@@ -331,10 +333,12 @@ def converge(
             `polar`: Radius and angle.
             `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself, or a CFL number of less than 0.4.
+        cfl_speed: Wave speed in the CFL number. Default: bar; viscous if the stress follows the rate of the deformation; p-wave if mms
+            chose both the total Lagrangian formulation and the CFL number itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+            `viscous`: Speed of P-waves made larger by the viscosity of the law on narrow cells: v + sqrt(c^2 + v^2), where v = 2 eta/(rho0
+                h).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.
@@ -406,7 +410,7 @@ def stability(
     volume: Literal["pointwise", "projected"] | None = None,
     layout: Literal["lattice", "body-fitted", "clipped", "gauss"] | None = None,
     grid: Literal["cartesian", "polar", "cylindrical", "spherical"] | None = None,
-    cfl_speed: Literal["bar", "p-wave"] | None = None,
+    cfl_speed: Literal["bar", "p-wave", "viscous"] | None = None,
     integrator: Literal["usf", "usl", "musl", "usavg", "cd"] | None = None,
     transfer: str | None = None,
     start: Literal["exact", "data", "halved"] | None = None,
@@ -499,10 +503,12 @@ def stability(
             `polar`: Radius and angle.
             `cylindrical`: Radius, angle and height.
             `spherical`: Radius, polar angle and azimuth, without a cone of 45 degrees about the third axis.
-        cfl_speed: Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL number
-            itself, or a CFL number of less than 0.4.
+        cfl_speed: Wave speed in the CFL number. Default: bar; viscous if the stress follows the rate of the deformation; p-wave if mms
+            chose both the total Lagrangian formulation and the CFL number itself, or a CFL number of less than 0.4.
             `bar`: Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed.
             `p-wave`: Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0).
+            `viscous`: Speed of P-waves made larger by the viscosity of the law on narrow cells: v + sqrt(c^2 + v^2), where v = 2 eta/(rho0
+                h).
         integrator: Time integrator. Default: cd.
             `usf`: Update stress first.
             `usl`: Update stress last.

@@ -8,7 +8,6 @@ use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
 use crate::named::{Named, named};
-use crate::points;
 use crate::precision::Precision;
 use crate::scheme::{Placement, Scheme, Start, Updated};
 use crate::stated_law;
@@ -61,6 +60,8 @@ pub enum CflSpeed {
     Bar,
     /// P-waves in the undeformed solid, `sqrt((lambda + 2 mu)/rho0)`.
     PWave,
+    /// P-waves with the viscosity of the law on the cells of a grid, see [`on_grid`](Self::on_grid).
+    Viscous,
 }
 
 named! {
@@ -69,6 +70,8 @@ named! {
             "Speed of waves in a bar, sqrt(E/rho0), unless the specification states a wave speed";
         PWave = "p-wave":
             "Speed of P-waves in the undeformed solid, sqrt((lambda + 2 mu)/rho0)";
+        Viscous = "viscous":
+            "Speed of P-waves made larger by the viscosity of the law on narrow cells: v + sqrt(c^2 + v^2), where v = 2 eta/(rho0 h)";
     }
     ReturnMap {
         Exponential = "exponential": "The direction of flow at the end of a step: first order in time";
@@ -85,35 +88,6 @@ named! {
             "The part between the planes of symmetry: a quarter of a ring, an eighth of a shell";
         Full = "full": "All of it";
     }
-}
-
-impl CflSpeed {
-    pub(crate) fn of<const D: usize>(self, exact: &dyn Solution<f64, D>) -> Result<f64, CaseError>
-    where
-        f64: Precision<D>,
-    {
-        match self {
-            Self::Bar => Ok(exact.wave_speed()),
-            Self::PWave => {
-                let law = law_of_body::<f64, D>(exact)?;
-                Ok((p_wave_modulus(&law, exact) / exact.density()).sqrt())
-            }
-        }
-    }
-}
-
-/// The modulus of P-waves in the body at rest; of a law that differs from place to place the largest one at sampled places.
-fn p_wave_modulus<const D: usize>(law: &Law<f64, D>, exact: &dyn Solution<f64, D>) -> f64
-where
-    f64: Precision<D>,
-{
-    const PLACES: usize = 64;
-    let Law::WithMemory(own) = law else { return law.p_wave_modulus() };
-    if own.elastic().is_some() {
-        return law.p_wave_modulus();
-    }
-    let places = (0..PLACES).filter_map(|n| points::interior(&exact.domain(), 1.0, n));
-    places.map(|(X, _)| law.with_variables(&own.initial(&X)).p_wave_modulus()).fold(0.0, f64::max)
 }
 
 /// A positive number rounded down to two digits.

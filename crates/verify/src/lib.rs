@@ -67,6 +67,7 @@ mod tradeoff;
 mod updated;
 mod usual_step;
 mod verdict;
+mod waves;
 mod whole_file;
 
 pub use blind::{BlindSpot, blind_spots};
@@ -133,7 +134,9 @@ pub use tradeoff::{
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
     differences, extrapolate, families, leading, list, listed, median, pareto, tradeoff,
 };
-pub use usual_step::{LARGEST_USUAL_CFL, OnPWaves, USUAL_CFL, UsualStep, on_p_waves, usual_step};
+pub use usual_step::{
+    LARGEST_USUAL_CFL, OnPWaves, USUAL_CFL, UsualStep, on_p_waves, stiffest, usual_step,
+};
 pub use verdict::{
     Behaviour, Expected, ORDER_TOLERANCE, Values, Verdict as OrderVerdict, expected_in_space,
     expected_in_time, verdicts, verdicts_above,

@@ -95,7 +95,7 @@ where
     let &OnGrid { exact, waves, .. } = on_grid;
     let steps = on_grid.steps_at(0.5)?.count as f64;
     Ok(Scales {
-        p_wave_limit: waves.speed / CflSpeed::PWave.of(exact)?,
+        p_wave_limit: waves.speed / CflSpeed::PWave.on_wide_cells(exact)?,
         end: on_grid.end.max(waves.time_step(LEAST_CELLS)),
         period: exact.period(),
         floor: FLOOR * (on_grid.rounding() * steps.sqrt()),

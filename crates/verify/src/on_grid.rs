@@ -64,7 +64,8 @@ where
         // First, since no other scheme would mend it.
         law_of_body::<f64, D>(exact)?;
         let scene = Scene::new(exact, case, end)?;
-        let waves = Waves { speed: case.cfl_speed.of(exact)?, spacing: scene.spacing };
+        let waves =
+            Waves { speed: case.cfl_speed.on_grid(exact, scene.spacing)?, spacing: scene.spacing };
         let steps = Steps::new(case.cfl, end, waves)?;
         prepare_until(exact, model, end)?;
         if let Scheme::Updated(updated) = &case.scheme {
@@ -98,7 +99,7 @@ where
     }
 
     pub(crate) fn floors(&self, u: f64) -> Result<PerField<f64>, CaseError> {
-        let speed = CflSpeed::PWave.of(self.exact)?;
+        let speed = CflSpeed::PWave.on_wide_cells(self.exact)?;
         let strain = u / self.scene.spacing;
         let stress = self.exact.density() * speed * speed * strain;
         Ok(PerField { u, v: speed * strain, F: strain, P: stress })

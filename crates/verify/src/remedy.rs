@@ -3,13 +3,13 @@
 use mmsmith_mpm::{Shape, Transfer};
 use mmsmith_runtime::{AnySolution, Domain};
 
-use crate::case::{Arithmetic, Case, CflSpeed};
+use crate::case::{Arithmetic, Case};
 use crate::discretized::Discretized;
 use crate::distortion::distortion;
 use crate::error::CaseError;
 use crate::run::{Outputs, Status};
 use crate::scheme::{GridPose, Placement, Scheme, Total, Updated};
-use crate::usual_step::{stable_cfl, usual_step};
+use crate::usual_step::{stable_cfl, stiffest, usual_step};
 
 /// Particles times steps of one attempt, at most.
 const MOST_WORK: f64 = 6e6;
@@ -189,7 +189,7 @@ fn total_candidate(exact: &AnySolution<f64>, stopped: &Case) -> Option<Case> {
         mmsmith_galerkin::Layout::Gauss => total.degree + 1,
         mmsmith_galerkin::Layout::Lattice => 2,
     };
-    let cfl_speed = CflSpeed::PWave;
+    let cfl_speed = stiffest(exact).ok()?;
     let cfl = total.usual_cfl(exact, cfl_speed).ok()?;
     Some(Case { scheme: Scheme::Total(total), per_cell, cfl, cfl_speed, ..*stopped })
 }
@@ -204,7 +204,7 @@ fn with_usual_step(exact: &AnySolution<f64>, case: Case) -> Option<Case> {
 fn with_stable_step(exact: &AnySolution<f64>, case: Case) -> Option<Case> {
     let stable = |speed| stable_cfl(exact, &case.scheme, case.periods, speed).ok();
     let is_long = case.cfl > 1.01 * stable(case.cfl_speed)?;
-    let cfl_speed = CflSpeed::PWave;
+    let cfl_speed = stiffest(exact).ok()?;
     let cfl = stable(cfl_speed)?;
     is_long.then_some(Case { cfl, cfl_speed, ..case })
 }

@@ -258,7 +258,7 @@ where
     // The condition of the matrix, about the square of the cells, takes some of the digits of the displacement.
     let rounding = 16.0 * f64::EPSILON * scene.reach();
     let strain = rounding / scene.spacing * degree;
-    let speed = CflSpeed::PWave.of(exact)?;
+    let speed = CflSpeed::PWave.on_wide_cells(exact)?;
     let stress = exact.density() * speed * speed * strain;
     let floors = StaticErrors { u: rounding, F: strain, P: stress };
     Ok(StaticPlan { points, bytes, floors })

@@ -78,12 +78,18 @@ impl Total {
     /// [`CaseError`] for a material that the solver has no law for.
     pub fn usual_cfl(&self, exact: &AnySolution<f64>, speed: CflSpeed) -> Result<f64, CaseError> {
         const TIMES_DEGREE: f64 = 0.6;
-        let on_p_waves = TIMES_DEGREE / self.degree.max(1) as f64;
+        let degree = self.degree.max(1) as f64;
+        let on_p_waves = TIMES_DEGREE / degree;
         in_dimension!(
             exact,
             |s| {
-                let ratio = speed.of(s)? / CflSpeed::PWave.of(s)?;
-                Ok(two_digits(on_p_waves * narrowest(s) * ratio))
+                let ratio = speed.on_wide_cells(s)? / CflSpeed::PWave.on_wide_cells(s)?;
+                // Viscosity acts with the square of the largest frequency of the grid.
+                let again = match speed {
+                    CflSpeed::Viscous => (3.0 / degree).min(1.0) * narrowest(s),
+                    _ => 1.0,
+                };
+                Ok(two_digits(on_p_waves * narrowest(s) * ratio * again))
             },
             else Err(CaseError::Dimension)
         )

@@ -1,16 +1,13 @@
 //! The time step of a run that is given none, and what steps are on the fastest waves of a motion.
 
-use mmsmith_mpm::Law;
-use mmsmith_runtime::{AnySolution, Solution};
-use nalgebra::{SMatrix, SVector};
+use mmsmith_runtime::AnySolution;
 
-use crate::case::{Case, CflSpeed, law_of_body, two_digits};
+use crate::case::{Case, CflSpeed, two_digits};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
-use crate::points;
-use crate::precision::Precision;
 use crate::run::Row;
 use crate::scheme::Scheme;
+use crate::waves::{fastest_p_wave, largest_viscous_modulus};
 
 /// The CFL number of runs that are given none: that of the original study, on bar waves.
 pub const USUAL_CFL: f64 = 0.4;
@@ -44,11 +41,18 @@ pub fn usual_step(
     periods: f64,
     said: Option<CflSpeed>,
 ) -> Result<UsualStep, CaseError> {
-    let speed = said.unwrap_or(CflSpeed::Bar);
+    let speed = said.unwrap_or(match stiffest(exact)? {
+        CflSpeed::Viscous => CflSpeed::Viscous,
+        _ => CflSpeed::Bar,
+    });
+    if speed == CflSpeed::Viscous {
+        let cfl = stable_cfl(exact, scheme, periods, speed)?.min(USUAL_CFL);
+        return Ok(UsualStep { cfl, speed, too_long: None });
+    }
     let on_fastest = USUAL_CFL
         * in_dimension!(
             exact,
-            |s| fastest_p_wave(s, periods)? / speed.of(s)?,
+            |s| fastest_p_wave(s, periods)? / speed.on_wide_cells(s)?,
             else return Err(CaseError::Dimension)
         );
     if on_fastest <= LARGEST_USUAL_CFL || !on_fastest.is_finite() {
@@ -75,10 +79,20 @@ pub(crate) fn stable_cfl(
         Scheme::Total(total) => total.usual_cfl(exact, speed),
         Scheme::Updated(_) => in_dimension!(
             exact,
-            |s| Ok(two_digits(LARGEST_USUAL_CFL * speed.of(s)? / fastest_p_wave(s, periods)?)),
+            |s| Ok(two_digits(LARGEST_USUAL_CFL * speed.on_wide_cells(s)? / fastest_p_wave(s, periods)?)),
             else Err(CaseError::Dimension)
         ),
     }
+}
+
+/// The speed that limits time steps: of P-waves, and where the stress follows the rate of the deformation, of viscous waves.
+///
+/// # Errors
+///
+/// [`CaseError`] for a material that the solver has no law for.
+pub fn stiffest(exact: &AnySolution<f64>) -> Result<CflSpeed, CaseError> {
+    let modulus = in_dimension!(exact, |s| largest_viscous_modulus(s)?, else return Err(CaseError::Dimension));
+    Ok(if modulus > 0.0 { CflSpeed::Viscous } else { CflSpeed::PWave })
 }
 
 /// A time step as CFL numbers on P-waves.
@@ -101,66 +115,10 @@ pub fn on_p_waves(exact: &AnySolution<f64>, case: &Case, row: &Row) -> Result<On
         |s| {
             let cfl = |speed: f64| row.dt * speed / row.h;
             let fastest = fastest_p_wave(s, case.periods)?;
-            Ok(OnPWaves { at_rest: cfl(CflSpeed::PWave.of(s)?), fastest: cfl(fastest) })
+            Ok(OnPWaves { at_rest: cfl(CflSpeed::PWave.on_wide_cells(s)?), fastest: cfl(fastest) })
         },
         else Err(CaseError::Dimension)
     )
-}
-
-/// The speed of the fastest waves along the axes in the deformed body, at sampled places and times of the exact motion and at rest.
-pub(crate) fn fastest_p_wave<const D: usize>(
-    exact: &dyn Solution<f64, D>,
-    periods: f64,
-) -> Result<f64, CaseError>
-where
-    f64: Precision<D>,
-{
-    const SAMPLES: usize = 256;
-    let law = law_of_body::<f64, D>(exact)?;
-    let at_rest = CflSpeed::PWave.of(exact)?;
-    // Periodic motion repeats.
-    let span = exact.period() * periods.min(1.0);
-    let modulus = (0..SAMPLES)
-        .filter_map(|n| points::interior(&exact.domain(), span, n))
-        .map(|(X, t)| largest_modulus(&law, &exact.deformation_gradient(&X, t)))
-        .fold(0.0, f64::max);
-    Ok(at_rest.max((modulus / exact.density()).sqrt()))
-}
-
-/// The largest eigenvalue of the acoustic tensors `A` of waves along the axes in a body deformed by `F`, per volume at rest: the speed of
-/// a wave is the root of its quotient by the reference density. Zero where the law has no finite stress.
-fn largest_modulus<const D: usize>(law: &Law<f64, D>, F: &SMatrix<f64, D, D>) -> f64
-where
-    f64: Precision<D>,
-{
-    let along = |axis: usize| -> Option<f64> {
-        let normal = F.row(axis).transpose();
-        let step = 1e-6 / normal.norm().max(1.0);
-        let mut tensor = SMatrix::<f64, D, D>::zeros();
-        for j in 0..D {
-            let mut change = SMatrix::<f64, D, D>::zeros();
-            change.set_row(j, &(normal.transpose() * step));
-            let stresses = [F + change, F - change].map(|F| law.first_piola_kirchhoff(&F));
-            let [Some(above), Some(below)] = stresses else { return None };
-            tensor.set_column(j, &((above - below) * normal / (2.0 * step)));
-        }
-        Some(largest_eigenvalue(&tensor))
-    };
-    (0..D).filter_map(along).filter(|modulus| modulus.is_finite()).fold(0.0, f64::max)
-}
-
-/// The largest eigenvalue of a symmetric tensor of positive ones, by powers.
-fn largest_eigenvalue<const D: usize>(tensor: &SMatrix<f64, D, D>) -> f64 {
-    // No axis of symmetry lies across it.
-    let mut direction = SVector::<f64, D>::from_fn(|i, _| 1.0 + 0.3 * i as f64).normalize();
-    for _ in 0..24 {
-        let next = tensor * direction;
-        match next.try_normalize(f64::MIN_POSITIVE) {
-            Some(next) => direction = next,
-            None => return 0.0,
-        }
-    }
-    direction.dot(&(tensor * direction))
 }
 
 #[cfg(test)]
@@ -199,14 +157,5 @@ mod tests {
         // A motion that compresses strongly is stiffer than the solid at rest.
         let [mild, strong] = [0.01, 0.28].map(|A| usual("axis-aligned", &[A, 1e4, 0.48, 4.0]).cfl);
         assert!(strong < 0.8 * mild, "{strong} {mild}");
-    }
-
-    #[test]
-    fn waves_of_a_solid_at_rest_have_the_p_wave_modulus() {
-        let exact = mmsmith_solutions::build::<f64>("axis-aligned-3d", &[]).unwrap().unwrap();
-        let AnySolution::Three(exact) = exact else { panic!("it is solid") };
-        let law = law_of_body::<f64, 3>(exact.as_ref()).unwrap();
-        let modulus = largest_modulus(&law, &SMatrix::identity());
-        assert!((modulus / law.p_wave_modulus() - 1.0).abs() < 1e-6, "{modulus}");
     }
 }

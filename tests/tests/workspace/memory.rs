@@ -33,6 +33,19 @@ const SERIES: &[Series] = &[
         of: "u",
         order: [1.9, 2.1],
     },
+    // The usual step follows the viscosity, whose limit falls with the square of the cells.
+    Series {
+        call: "bar-kelvin-voigt --shape gimp --periods 0.2",
+        cells: "128,256",
+        of: "u",
+        order: [1.9, 2.1],
+    },
+    Series {
+        call: "bar-kelvin-voigt --formulation total-lagrangian --shape bspline4 --periods 0.2",
+        cells: "128,256",
+        of: "u",
+        order: [3.0, 4.0],
+    },
     Series {
         call: "block-graded --shape gimp --periods 0.5",
         cells: "16,32",

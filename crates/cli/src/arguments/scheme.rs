@@ -43,8 +43,8 @@ pub(crate) struct SchemeOptions {
     /// spherical for shells
     #[arg(long, value_parser = one_of::<verify::Coordinates>())]
     pub(crate) grid: Option<verify::Coordinates>,
-    /// Wave speed in the CFL number. Default: bar; p-wave if mms chose both the total Lagrangian formulation and the CFL
-    /// number itself, or a CFL number of less than 0.4
+    /// Wave speed in the CFL number. Default: bar; viscous if the stress follows the rate of the deformation; p-wave if mms
+    /// chose both the total Lagrangian formulation and the CFL number itself, or a CFL number of less than 0.4
     #[arg(long, value_parser = one_of::<verify::CflSpeed>())]
     pub(crate) cfl_speed: Option<verify::CflSpeed>,
     /// Time integrator

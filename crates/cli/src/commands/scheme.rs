@@ -31,6 +31,8 @@ pub(super) struct Settled {
     pub(super) loaded: Vec<Boundary>,
     /// The CFL number of the fastest P-waves with the usual step, where a shorter one was taken for that.
     pub(super) too_long: Option<f64>,
+    /// Whether the CFL number is the user's.
+    cfl_is_given: bool,
 }
 
 /// A total Lagrangian formulation that was not asked for.
@@ -51,7 +53,14 @@ pub(super) fn usual(shape: Shape, integrator: Integrator, cells: usize) -> Case 
 impl Settled {
     /// A case in double precision.
     pub(super) fn of(case: Case) -> Self {
-        Self { case, precision: Precision::F64, chosen: None, loaded: Vec::new(), too_long: None }
+        Self {
+            case,
+            precision: Precision::F64,
+            chosen: None,
+            loaded: Vec::new(),
+            too_long: None,
+            cfl_is_given: true,
+        }
     }
 
     /// The scheme that the options leave for a solution. What they say holds; what they leave open is chosen so that the
@@ -102,6 +111,7 @@ impl Settled {
             chosen: None,
             loaded,
             too_long: step.too_long,
+            cfl_is_given: options.cfl.is_some(),
         };
         if let Scheme::Total(scheme) = scheme
             && (options.formulation.is_none() || options.shape.is_none())
@@ -117,7 +127,8 @@ impl Settled {
             if reason.is_some() && is_solid {
                 settled.case.cells = USUAL_CELLS_OF_SOLIDS;
             }
-            let (speed, cfl_is_chosen) = (speed.unwrap_or(CflSpeed::PWave), options.cfl.is_none());
+            let cfl_is_chosen = options.cfl.is_none();
+            let speed = speed.or_else(|| verify::stiffest(exact).ok()).unwrap_or(CflSpeed::PWave);
             // What cannot be told from here is refused when the case is looked at.
             if cfl_is_chosen && let Ok(cfl) = scheme.usual_cfl(exact, speed) {
                 (settled.case.cfl, settled.case.cfl_speed) = (cfl, speed);
@@ -150,10 +161,7 @@ impl Settled {
             verify::Layout::Gauss => "Gauss points",
             verify::Layout::Lattice => "a lattice of particles",
         };
-        let speed = match cfl_speed {
-            CflSpeed::Bar => "bar waves",
-            CflSpeed::PWave => "P-waves",
-        };
+        let speed = waves(cfl_speed);
         let mut text = format!("total Lagrangian, {degree} splines on a {grid} grid, {layout}");
         if *cfl_is_chosen {
             text += &format!(", CFL {cfl} on {speed}");
@@ -174,11 +182,17 @@ impl Settled {
 
     /// Lines about a step that is shorter than the usual one, and why; empty where it is the usual one, or was given.
     fn step(&self) -> String {
-        let Some(too_long) = self.too_long else { return String::new() };
         let Case { cfl, cfl_speed, .. } = self.case;
-        let waves = match cfl_speed {
-            CflSpeed::Bar => "bar waves",
-            CflSpeed::PWave => "P-waves",
+        let waves = waves(cfl_speed);
+        let Some(too_long) = self.too_long else {
+            return match (cfl_speed, self.cfl_is_given) {
+                (CflSpeed::Viscous, false) => format!(
+                    "CFL {cfl} on {waves}: steps fall with the square of the cells where viscosity limits them\n  as with --cfl {cfl} \
+                     --cfl-speed {}\n",
+                    cfl_speed.name()
+                ),
+                _ => String::new(),
+            };
         };
         let too_long = number::rounded(too_long, 2);
         format!(
@@ -196,6 +210,15 @@ impl Settled {
         let told = self.loaded.iter().map(|own| format!("{} ({})", own.surface, own.condition));
         let told: Vec<_> = told.collect();
         format!("the traction of the exact motion acts on {} in place of that\n", told.join(", "))
+    }
+}
+
+/// The waves that CFL numbers refer to, in words.
+fn waves(speed: CflSpeed) -> &'static str {
+    match speed {
+        CflSpeed::Bar => "bar waves",
+        CflSpeed::PWave => "P-waves",
+        CflSpeed::Viscous => "P-waves and viscosity",
     }
 }
 
