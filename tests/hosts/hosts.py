@@ -1,4 +1,4 @@
-"""Files of `mms gen` in the hands of their hosts, at 1,000 points a solution, beside `mms eval`.
+"""Files of `mms gen` in the hands of their hosts, at 1,000 points a solution (or MMSMITH_POINTS), beside `mms eval`.
 
     python hosts.py MMS FOLDER [--solutions NAME|FILE,...] HOST...
 
@@ -25,7 +25,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 SPECS = HERE.parents[1] / "mms-specs"
 FIELDS = {"u": 1, "v": 1, "a": 1, "H": 2, "F": 2, "J": 0, "P": 2, "b": 1}
-POINTS = 1000
+POINTS = int(os.environ.get("MMSMITH_POINTS", "1000"))
 LARGEST = {"c": 0, "cpp": 0, "rust": 0, "cuda": 16, "fortran": 0, "calculix": 0, "numpy": 16, "jax": 16, "ufl": 32, "moose": 32, "kratos": 32, "febio": 32, "julia": 16}
 
 
