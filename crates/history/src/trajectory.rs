@@ -105,6 +105,8 @@ const LENIENCE: f64 = 30.0;
 /// So many steps are shortened before their errors are compared with the rounding of rates, and so many roundings are left to a step.
 const MOST_REJECTIONS: usize = 3;
 const ROUNDINGS: f64 = 64.0;
+/// From one step to the next the estimate of an error falls by its length to the eighth power and by such a share, at most.
+const LEAST_SHARE: f64 = 0.1;
 /// Evaluations of rates, at most: a second or so.
 const MOST_EVALUATIONS: usize = 1_000_000;
 /// Intervals in which a time without flow is searched for its end, at least.
@@ -356,6 +358,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
         let mut rejected: Option<f64> = None;
         let mut trials = 0;
         let mut rejections = 0;
+        let mut last_step: Option<(f64, f64)> = None;
         step.begin(&mut rate, self.time);
         if self.step <= 0.0 {
             self.step = (end - self.time) / 32.0;
@@ -377,6 +380,10 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
             let Errors { of_values, of_slopes } =
                 step.go(&mut rate, length, self.tolerance, scales);
             let mut error = if counts_slopes { of_values.max(of_slopes) } else { of_values };
+            // The estimate of a lone variable may pass through zero: it is no less than a share of that of the step before, at this length.
+            if let Some((before, its_length)) = last_step {
+                error = error.max(LEAST_SHARE * before * (length / its_length).powi(8));
+            }
             if error > 1.0 || error.is_nan() {
                 if let Some(before) = rejected
                     && of_values <= 1.0
@@ -408,6 +415,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
             }
             let growth = if rejected.is_some() { 1.0 } else { 6.0 };
             (rejected, trials, rejections) = (None, 0, 0);
+            last_step = Some((error, length));
             scales = step.scales(scales);
             let stop = if length == rest { end } else { self.time + length };
             step.finish(&mut rate);

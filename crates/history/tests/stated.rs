@@ -307,3 +307,37 @@ fn variables_of_tiny_strains_are_followed_from_rest() {
         }
     }
 }
+
+/// The estimate of the error of one variable passes through zero now and then. A step after that must not be as long as it allows.
+#[test]
+fn a_lone_variable_is_followed_to_every_time_alike() {
+    let stated = Stated {
+        internal: vec![internal("q", "(ln(F11) - q)/tau", "0")],
+        ..stated(stress(&[["E*(ln(F11) - q)/F11", "0"], ["0", "0"]]), &["E", "tau"], &[])
+    };
+    let law = AnyLaw::new(&Law::Stated(stated), 2).unwrap();
+    let at = |time: f64| {
+        let (sine, cosine) = (314.16 * time).sin_cos();
+        let of = |unit: f64, own: f64| -> Tensor<Dual<f64, 2>> {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let unit = if i == j { unit } else { 0.0 };
+                    number(if i + j == 0 { unit + own } else { unit }, [0.0; 2])
+                })
+            })
+        };
+        Kinematics { F: of(1.0, 0.0257 * sine), rate: of(0.0, 0.0257 * 314.16 * cosine) }
+    };
+    let names = law.constants();
+    let motion = WithPlaces { at, X: [0.0; 2], constants: vec![1e4, 0.005], names };
+    let mut worst = 0.0_f64;
+    for n in 0..2000 {
+        let end = 0.02 * (0.1 + 0.9 * f64::from(n) / 2000.0);
+        let [found, closer] = [1e-15, 1e-16].map(|tolerance| {
+            Trajectory::new(&law, &motion, &[end], tolerance).unwrap().states[0][0].value
+        });
+        worst = worst.max((found - closer).abs());
+    }
+    println!("steps to a time: {worst:e}");
+    assert!(worst < 1e-15, "{worst:e}");
+}
