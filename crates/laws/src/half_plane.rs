@@ -12,7 +12,9 @@ use mmsmith_lanes::tensor::{determinant, inverse_transpose, product};
 use mmsmith_vocabulary::Material;
 use nalgebra::{Matrix3, RealField, SMatrix, SVector};
 
-use crate::memory::{Increment, InternalVariable, LawWithMemory, of_particle, set_stress};
+use crate::memory::{
+    ElasticInSpace, Increment, InternalVariable, LawWithMemory, of_particle, set_stress,
+};
 use crate::{BLOCK, Law, Stressed};
 
 /// An isotropic elastic law of space in a half plane. Its internal variables are the stretch around the axis, which solvers set to the
@@ -20,6 +22,7 @@ use crate::{BLOCK, Law, Stressed};
 #[derive(Clone, Debug)]
 pub struct HalfPlane<T> {
     law: Law<T, 3>,
+    in_space: ElasticInSpace<T>,
 }
 
 /// The internal variables of a particle in a half plane.
@@ -87,17 +90,14 @@ impl<T: Stressed<3>> HalfPlane<T> {
     /// The law of space in the half plane; none of a law with directions or with internal variables.
     #[must_use]
     pub fn new(law: Law<T, 3>) -> Option<Self> {
-        match &law {
-            Law::Library(material) if material.row().is_isotropic => Some(Self { law }),
-            Law::Own(_) => Some(Self { law }),
-            Law::Library(_) | Law::WithMemory(_) => None,
-        }
-    }
-
-    /// The law of space.
-    #[must_use]
-    pub fn in_space(&self) -> &Law<T, 3> {
-        &self.law
+        let in_space = match &law {
+            Law::Library(material) if material.row().is_isotropic => {
+                ElasticInSpace::Library(*material)
+            }
+            Law::Own(own) => ElasticInSpace::Own(own.clone()),
+            Law::Library(_) | Law::WithMemory(_) => return None,
+        };
+        Some(Self { law, in_space })
     }
 }
 
@@ -136,14 +136,14 @@ impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
         Some(tau[(D.min(2), D.min(2))])
     }
 
-    fn of_half_plane(&self) -> Option<&Law<T, 3>> {
-        Some(&self.law)
+    fn of_half_plane(&self) -> Option<&ElasticInSpace<T>> {
+        Some(&self.in_space)
     }
 
     fn elastic(&self) -> Option<Material<T>> {
-        match &self.law {
-            Law::Library(material) => Some(*material),
-            Law::Own(_) | Law::WithMemory(_) => None,
+        match &self.in_space {
+            ElasticInSpace::Library(material) => Some(*material),
+            ElasticInSpace::Own(_) => None,
         }
     }
 }

@@ -44,7 +44,7 @@ pub use law::BlockOfStresses;
 pub use law::{ConstitutiveLaw, Law, LawCheck};
 #[doc(hidden)]
 pub use memory::BlockWithMemory;
-pub use memory::{Increment, InternalVariable, LawWithMemory};
+pub use memory::{ElasticInSpace, Increment, InternalVariable, LawWithMemory};
 pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volumetric, WithMemory};
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};

@@ -7,10 +7,19 @@ use mmsmith_lanes::tensor::{determinant, inverse_transpose, product, real};
 use mmsmith_vocabulary::Material;
 use nalgebra::{Matrix3, RealField, SMatrix, SVector};
 
-use crate::{BLOCK, ConstitutiveLaw, Law, jacobian};
+use crate::{BLOCK, ConstitutiveLaw, jacobian};
 
 /// The entries of a symmetric tensor in the order of internal variables.
 pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
+/// A law of space without internal variables of its own.
+#[derive(Clone, Debug)]
+pub enum ElasticInSpace<T> {
+    /// Of the library.
+    Library(Material<T>),
+    /// That the caller brings.
+    Own(Arc<dyn ConstitutiveLaw<T, 3>>),
+}
 
 /// An internal variable of a law.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +123,7 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
 
     /// The law of space, where this is that of a [half plane](crate::HalfPlane): solvers set the internal variables then, and the stress
     /// around the axis acts on the grid. Default: it is not.
-    fn of_half_plane(&self) -> Option<&Law<T, 3>> {
+    fn of_half_plane(&self) -> Option<&ElasticInSpace<T>> {
         None
     }
 

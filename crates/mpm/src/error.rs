@@ -160,6 +160,12 @@ pub enum SetupError {
          leave --volume out"
     )]
     ProjectedMemory,
+    /// A projected change of volume of a body of revolution in its half plane.
+    #[error(
+        "--volume projected: particles of a half plane have the stretch around the axis from their own radius, and their change of volume is not \
+         projected; leave --volume out, or write --formulation total-lagrangian --grid cylindrical"
+    )]
+    ProjectedHalfPlane,
     /// More processes than a grid can be cut for.
     #[error(
         "{ranks} processes are more than the {most} that the rows of this grid can be shared out to; start {most} at most"

@@ -219,6 +219,7 @@ pub(crate) fn law_of<T: Precision<D>, const D: usize>(
     let law = law_of_body_by(solution, case.return_map.unwrap_or_default())?;
     match case.volume {
         Volume::Pointwise => Ok(law),
+        Volume::Projected if solution.is_half_plane() => Err(SetupError::ProjectedHalfPlane.into()),
         Volume::Projected => Ok(with_projected_volume(law).ok_or(SetupError::ProjectedMemory)?),
     }
 }

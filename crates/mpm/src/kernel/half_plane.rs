@@ -8,11 +8,14 @@
 //! the power of the hoop stress asks for. Source: Nairn & Guilkey, IJNME 101 (2015) 127-147, with the weights at the particle in the place of
 //! their averages over its domain.
 
+use std::sync::Arc;
+
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::product;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
-    AnyLaw, BlockOfStresses, Hoop, Law, LibraryLaw, Material, NeoHookean, with_hoop_stretch,
+    AnyLaw, BlockOfStresses, ConstitutiveLaw, ElasticInSpace, Hoop, LibraryLaw, Material,
+    NeoHookean, with_hoop_stretch,
 };
 use nalgebra::{Matrix3, SMatrix, SVector};
 
@@ -23,17 +26,17 @@ use crate::kernel::copies::BLOCK;
 
 /// The law of space for blocks of particles in a half plane.
 pub(crate) fn of_law<T: Lanes, const D: usize>(
-    law: &Law<T, 3>,
+    law: &ElasticInSpace<T>,
     planted: Planted,
 ) -> Box<dyn BlockLaw<T, D>> {
     match law {
-        Law::Library(Material::NeoHookean { lambda, mu }) => {
+        ElasticInSpace::Library(Material::NeoHookean { lambda, mu }) => {
             Box::new(HalfPlane(OfLibrary(NeoHookean { lambda: *lambda, mu: *mu, planted })))
         }
-        Law::Library(material) => {
+        ElasticInSpace::Library(material) => {
             Box::new(HalfPlane(OfLibrary(AnyLaw(planted.law_in_stresses(*material)))))
         }
-        Law::Own(_) | Law::WithMemory(_) => Box::new(HalfPlane(OfCaller(law.clone()))),
+        ElasticInSpace::Own(law) => Box::new(HalfPlane(OfCaller(law.clone()))),
     }
 }
 
@@ -57,7 +60,7 @@ trait StressesOfSpace<T, const D: usize>: Send + Sync {
 struct OfLibrary<L>(L);
 
 /// A law that the caller brings.
-struct OfCaller<T>(Law<T, 3>);
+struct OfCaller<T>(Arc<dyn ConstitutiveLaw<T, 3>>);
 
 /// Sets the stress flux of a particle of a block; returns the force of the stress around the axis.
 #[inline(always)]
@@ -169,13 +172,12 @@ impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
         contributions: &mut Contributions<T, D, BLOCK>,
         radial: &mut [T; BLOCK],
     ) {
-        let Law::Own(law) = &self.0 else { return };
         let mut block = BlockOfStresses::at_rest();
         let hoop = |n: usize| Hoop::of(internal.get(n * Hoop::<T>::COUNT..).unwrap_or_default());
         let in_space: [Matrix3<T>; BLOCK] =
             std::array::from_fn(|n| with_hoop_stretch(&F[n], hoop(n).stretch));
         in_space.iter().enumerate().for_each(|(n, F)| block.set(n, F));
-        block.evaluate(law.as_ref());
+        block.evaluate(self.0.as_ref());
         for (n, radial) in radial.iter_mut().enumerate() {
             let tau = product(&block.stress(n), &in_space[n].transpose());
             let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
