@@ -30,7 +30,8 @@ pub struct UsualStep {
 }
 
 /// The CFL number of a run by `scheme` until so many periods that is given none, and at most the speed that it refers to: [`USUAL_CFL`], and where
-/// that is more than [`LARGEST_USUAL_CFL`] on the fastest P-waves of the motion, a number with which the scheme is stable.
+/// that is more than [`LARGEST_USUAL_CFL`] on the fastest P-waves of the motion or than suits splines of the total formulation, a number with
+/// which the scheme is stable.
 ///
 /// # Errors
 ///
@@ -56,7 +57,11 @@ pub fn usual_step(
             else return Err(CaseError::Dimension)
         );
     if on_fastest <= LARGEST_USUAL_CFL || !on_fastest.is_finite() {
-        return Ok(UsualStep { cfl: USUAL_CFL, speed, too_long: None });
+        let cfl = match scheme {
+            Scheme::Total(total) => total.usual_cfl(exact, speed)?.min(USUAL_CFL),
+            Scheme::Updated(_) => USUAL_CFL,
+        };
+        return Ok(UsualStep { cfl, speed, too_long: None });
     }
     let speed = said.unwrap_or(CflSpeed::PWave);
     let cfl = stable_cfl(exact, scheme, periods, speed)?;
@@ -124,7 +129,7 @@ pub fn on_p_waves(exact: &AnySolution<f64>, case: &Case, row: &Row) -> Result<On
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scheme::Updated;
+    use crate::scheme::{Total, Updated};
 
     fn usual(name: &str, given: &[f64]) -> UsualStep {
         let exact = mmsmith_solutions::build::<f64>(name, given).unwrap().unwrap();
@@ -154,6 +159,15 @@ mod tests {
             assert!((least..most).contains(&too_long), "{nu}: {found:?}");
             assert!(found.cfl <= 0.6 && found.speed == CflSpeed::PWave, "{nu}: {found:?}");
         }
+        // Splines of the total formulation have their own limits, which fall with the degree.
+        let exact = mmsmith_solutions::build::<f64>("ring", &[]).unwrap().unwrap();
+        let of_degree = |degree| {
+            let coordinates = Total::coordinates_for(&exact);
+            let total = Total { coordinates, ..Total::of_degree(degree) };
+            usual_step(&exact, &Scheme::Total(total), 1.0, None).unwrap().cfl
+        };
+        let all = [2, 3, 4, 5].map(of_degree);
+        assert!(all.is_sorted_by(|one, next| one > next) && all[0] < 0.3, "{all:?}");
         // A motion that compresses strongly is stiffer than the solid at rest.
         let [mild, strong] = [0.01, 0.28].map(|A| usual("axis-aligned", &[A, 1e4, 0.48, 4.0]).cfl);
         assert!(strong < 0.8 * mild, "{strong} {mild}");

@@ -60,7 +60,7 @@ pub(crate) struct SchemeOptions {
     #[arg(long, value_name = "N", value_parser = positive_count)]
     pub(crate) ppc: Option<usize>,
     /// CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest
-    /// P-waves of the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines
+    /// P-waves of the motion; in the total Lagrangian formulation a number that suits the splines
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) cfl: Option<f64>,
     /// End time, in periods of the solution
