@@ -16,6 +16,9 @@ import numpy
 from solve import solve
 
 STUDIES = {"ring": (8, 16, 32), "vortex": (16, 32), "ring-nu": (8, 16, 32), "skew-2d": (8, 16, 32)}
+# Other conditions on the components of a side.
+CONDITIONS = Path(__file__).parents[2] / "data" / "specs" / "conditions"
+STUDIES |= {str(CONDITIONS / f"{name}.toml"): (8, 16) for name in ("moving-rollers", "sticking")}
 
 
 def written(folder, name, cells, result):
@@ -23,7 +26,7 @@ def written(folder, name, cells, result):
     heads = {"X": ["X", "Y"], "u": ["ux", "uy"], "F": ["F11", "F12", "F21", "F22"]}
     columns = {field: result[field].reshape(len(result["X"]), -1) for field in heads if field in result}
     table = numpy.column_stack([numpy.full(len(result["X"]), result["t"]), *columns.values()])
-    path = folder / f"{name}-{cells}-{'-'.join(columns)}.csv"
+    path = folder / f"{Path(name).stem}-{cells}-{'-'.join(columns)}.csv"
     head = ",".join(["t", *(name for field in columns for name in heads[field])])
     numpy.savetxt(path, table, fmt="%.17g", delimiter=",", header=head, comments="")
     return path

@@ -40,6 +40,19 @@ def mesh_of(solution, cells):
     return mesh, sides
 
 
+def by_component(solution, surface):
+    """The conditions on the components along X and Y: `prescribed-motion`, `prescribed-traction` or `traction-free`."""
+    condition = solution.boundaries.get(surface, "prescribed-motion")
+    if condition in ("symmetry", "sliding"):
+        condition = "normal prescribed-motion, tangential traction-free"
+    if "," not in condition:
+        return [condition, condition]
+    if surface[0] not in "XY":
+        raise NotImplementedError(f"{condition} on {surface}: components here are those along X and Y")
+    parts = dict(part.split() for part in condition.split(", "))
+    return [parts["normal" if axis == surface[0] else "tangential"] for axis in "XY"]
+
+
 def first_piola_kirchhoff(F, lam, mu):
     """tau = lambda ln(J) I + mu (F F^T - I), P = tau F^-T."""
     J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
@@ -75,14 +88,13 @@ def solve(solution, cells, periods=0.4, where="nodes"):
     mass = solution.density * skfem.asm(skfem.LinearForm(lambda v, w: v), scalar)[:, None]
     held, loaded = numpy.zeros((mesh.nvertices, 2), bool), []
     for surface, on in sides.items():
-        condition = solution.boundaries.get(surface, "prescribed-motion")
-        if condition in ("symmetry", "sliding"):
-            held[on, "XY".index(surface[0])] = True
-        elif condition == "prescribed-motion":
-            held[on] = True
-        elif condition == "prescribed-traction":
+        conditions = by_component(solution, surface)
+        held[on] |= [condition == "prescribed-motion" for condition in conditions]
+        given = numpy.array([condition == "prescribed-traction" for condition in conditions])
+        if given.any():
             facets = mesh.boundary_facets()
-            loaded.append((surface, skfem.FacetBasis(mesh, element, facets=facets[on[mesh.facets[:, facets]].all(axis=0)])))
+            basis_of_side = skfem.FacetBasis(mesh, element, facets=facets[on[mesh.facets[:, facets]].all(axis=0)])
+            loaded.append((surface, given, basis_of_side))
 
     def state(u):
         F = basis.interpolate(u.ravel()).grad + numpy.eye(2)[:, :, None, None]
@@ -91,9 +103,10 @@ def solve(solution, cells, periods=0.4, where="nodes"):
     def acceleration(u, t):
         b = solution.density * points.b(t).T.reshape(inside.shape)
         force = skfem.asm(balance, basis, b=b, P=state(u)[1])
-        for surface, facet_basis in loaded:
+        for surface, given, facet_basis in loaded:
             X = facet_basis.global_coordinates().value
-            force += skfem.asm(load, facet_basis, traction=solution.traction(surface, rows(X), t).T.reshape(X.shape))
+            traction = solution.traction(surface, rows(X), t) * given
+            force += skfem.asm(load, facet_basis, traction=traction.T.reshape(X.shape))
         return force.reshape(-1, 2) / mass
 
     end = periods * solution.period
