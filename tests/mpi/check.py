@@ -30,6 +30,7 @@ COUNTS = [1, 2, 3, 4, 7]
 SHAPES = ["linear", "ugimp", "gimp", "bspline2", "bspline3", "cpdi", "cpdi2"]
 TRANSFERS = ["flip", "apic", "xpic2"]
 INTEGRATORS = ["cd", "usl", "usf", "musl"]
+REVOLUTION = Path(__file__).resolve().parents[1] / "data" / "specs" / "revolution"
 PLANE = ["axis-aligned", "ring", "swirl", "skew-2d"]
 
 # Each shape with each transfer, on a problem and with an integrator of their own; f32; whole rings; space.
@@ -47,6 +48,9 @@ CASES = [
     "swirl --cells 64 --periods 0.1 --shape bspline3 --layout clipped --transfer apic --integrator usf",
     "skew-2d --cells 64 --periods 0.1 --shape bspline2 --layout clipped --transfer xpic2 --integrator musl --grid-shift 0.3",
     "sphere-shell --cells 56 --periods 0.01 --shape cpdi2 --layout clipped",
+    # In the half plane of a body of revolution.
+    f"{REVOLUTION}/ring-in-walls.toml --cells 64 --periods 0.05",
+    f"{REVOLUTION}/ring-in-walls.toml --cells 64 --periods 0.05 --shape cpdi2 --layout clipped",
     # It is turned inside out.
     "axis-aligned --cells 64 --shape linear --integrator usl --cfl 1.9",
 ]

@@ -25,6 +25,27 @@ const SERIES: &[Series] = &[
     },
     // Its motion is a polynomial of third degree along the radius, which splines of that degree have.
     Series { call: "ring-nu", cells: &[("linear", "16,32"), ("bspline2", "16,32")] },
+    Series {
+        call: "thick-cylinder",
+        cells: &[
+            ("linear", "16,32"),
+            ("bspline2", "16,32"),
+            ("bspline3", "16,32"),
+            ("bspline4", "12,24"),
+            ("bspline5", "12,24"),
+        ],
+    },
+    // Solid, with a turn about the axis.
+    Series {
+        call: "twisting-cylinder",
+        cells: &[
+            ("linear", "16,32"),
+            ("bspline2", "16,32"),
+            ("bspline3", "16,32"),
+            ("bspline4", "24,48"),
+            ("bspline5", "20,40"),
+        ],
+    },
     // Its layers of twisted material take many cells.
     Series {
         call: "vortex --set A=0.2",

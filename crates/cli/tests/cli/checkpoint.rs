@@ -23,11 +23,18 @@ fn result(path: &Path) -> Value {
     result
 }
 
-/// Eight schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
+/// Eleven schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
 #[cfg(unix)]
 #[test]
 fn a_killed_run_goes_on_to_the_same_bits() {
-    for scheme in [
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/data/specs/revolution/ring-in-walls.toml --cells 8 --periods 0.3 --threads 2"
+    );
+    // In the half plane, on a lattice and clipped.
+    let of_half_plane = ["", " --shape cpdi2 --layout clipped"].map(|more| format!("{file}{more}"));
+    for scheme in of_half_plane.iter().map(String::as_str).chain([
+        "thick-cylinder --cells 8 --formulation total-lagrangian --shape bspline2 --periods 0.3",
         "axis-aligned --cells 16 --vtk frames --frames 9 --history history.csv",
         "axis-aligned --cells 16 --precision f32 --threads 2 --integrator musl",
         "ring --cells 16 --shape ugimp --integrator usf --threads 2",
@@ -36,7 +43,7 @@ fn a_killed_run_goes_on_to_the_same_bits() {
         "axis-aligned --cells 10 --transfer apic --integrator usavg",
         "axis-aligned --cells 24 --frame total --shape bspline3",
         "axis-aligned-3d --cells 4 --shape linear --integrator usl --history history.csv",
-    ] {
+    ]) {
         is_killed_and_goes_on(scheme, &|steps| vec![3, steps / 2, steps - steps % 3]);
     }
 }

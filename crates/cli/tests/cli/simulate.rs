@@ -276,14 +276,27 @@ fn tables_and_a_plot_are_written_where_asked_for() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let place = tempfile::tempdir().unwrap();
-    let errors = ["1", "2"].map(|threads| {
-        let call = format!("run ring --cells 16 --threads {threads} --json row.json");
-        assert_eq!(mms(place.path(), &call).status, 0);
-        let result = read_json(&place.path().join("row.json"));
-        assert_eq!(result["settings"]["threads"].to_string(), threads);
-        result["result"]["errors"].to_string()
-    });
-    assert_eq!(errors[0], errors[1]);
+    let revolution = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/specs/revolution");
+    for call in [
+        "ring --cells 16",
+        // In the half plane.
+        &format!("{revolution}/ring-in-walls.toml --cells 16 --periods 0.1"),
+        &format!(
+            "{revolution}/ring-in-walls.toml --cells 16 --periods 0.1 --shape cpdi2 --layout clipped"
+        ),
+        // From rest, with the residuals of Newton's method.
+        "skew-2d --static --cells 16",
+        "thick-cylinder --static --cells 16 --load-steps 2",
+    ] {
+        let results = ["1", "2"].map(|threads| {
+            let call = format!("run {call} --threads {threads} --json row.json");
+            assert_eq!(mms(place.path(), &call).status, 0, "{call}");
+            let result = read_json(&place.path().join("row.json"));
+            assert_eq!(result["settings"]["threads"].to_string(), threads);
+            [&result["result"]["errors"], &result["result"]["load_steps"]].map(ToString::to_string)
+        });
+        assert_eq!(results[0], results[1], "{call}");
+    }
 }
 
 #[test]

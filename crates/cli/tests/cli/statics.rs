@@ -37,6 +37,29 @@ fn orders_are_judged_by_theory_and_by_what_is_asked_for() {
 }
 
 #[test]
+fn kept_equilibria_are_read_and_not_solved_again() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let rows = |cells: &str, more: &str| {
+        let options = format!("--static --shape linear --cells {cells} {more} --json made.json");
+        let called = mms(at, &format!("converge skew-2d {options}"));
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        read_json(&at.join("made.json"))["rows"].as_array().unwrap().clone()
+    };
+    let first = rows("8,16", "--out kept");
+    let second = rows("8,16,32", "--out kept");
+    // With the time that they took at first.
+    assert_eq!(first[..], second[..2]);
+    let lasting = |row: &serde_json::Value| {
+        let mut row = row.clone();
+        row.as_object_mut().unwrap().remove("wall_s").unwrap();
+        row
+    };
+    let whole = rows("8,16,32", "--threads 1");
+    assert!(whole.iter().map(lasting).eq(second.iter().map(lasting)), "{whole:?}");
+}
+
+#[test]
 fn what_does_not_move_is_solved_from_rest_unless_a_run_through_time_is_asked_for() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
@@ -85,6 +108,7 @@ fn options_without_a_meaning_are_refused_by_their_names() {
         ("run skew-2d --static --integrator usl", "leave --integrator out"),
         ("run skew-2d --static --shape gimp", "--shape: an equilibrium"),
         ("run skew-2d --static --vtk frames", "leave --vtk out"),
+        ("run skew-2d --static --checkpoint kept", "leave --checkpoint out"),
         ("converge skew-2d --static --cells 8 --cfls 0.1,0.2", "leave --cfls out"),
         (
             "run skew-2d --load-steps 4",
