@@ -180,7 +180,7 @@ def run(
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
         cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
-            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
+            the motion; in the total Lagrangian formulation a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
@@ -353,7 +353,7 @@ def converge(
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
         cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
-            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
+            the motion; in the total Lagrangian formulation a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.
@@ -523,7 +523,7 @@ def stability(
             `halved`: Velocity at time zero, first acceleration halved.
         ppc: Particles per cell and direction. Default: 2; with Gauss points the degree of the splines plus 1.
         cfl: CFL number: time step times wave speed over grid spacing. Default: 0.4, or less if that exceeds 0.6 on the fastest P-waves of
-            the motion; if mms chose the total Lagrangian formulation itself, a number that suits the splines.
+            the motion; in the total Lagrangian formulation a number that suits the splines.
         periods: End time, in periods of the solution. Default: 1.
         extent: Part of a ring or a shell that is simulated. Default: the part between its planes of symmetry, if it has any.
             `quarter`: The part between the planes of symmetry: a quarter of a ring, an eighth of a shell.

@@ -1,13 +1,10 @@
 //! The exact fields at one point, in a form that can be written.
 
 use crate::across::has_stretch_across;
-use crate::case::law_of_body;
-use crate::check::at_point;
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points::outside;
-use crate::precision::Precision;
-use mmsmith_laws::{Differentiated, Tangent};
+use crate::tangent::exact_tangent;
 use mmsmith_runtime::{AnySolution, Around, Domain, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
@@ -121,6 +118,14 @@ pub enum TangentError {
         "the stress depends on the history of the deformation, so that its tangent is that of the step by which a solver follows it"
     )]
     History,
+    /// A matrix or a tangent with the wrong number of entries.
+    #[error("{given} entries stand where {needed} belong")]
+    Entries {
+        /// The number of entries given.
+        given: usize,
+        /// The number needed.
+        needed: usize,
+    },
 }
 
 /// [`evaluate`] with the tangent of the solver's law at the exact deformation.
@@ -134,33 +139,11 @@ pub fn evaluate_with_tangent(
     t: f64,
 ) -> Result<FieldRow, TangentError> {
     let mut row = evaluate(solution, X, t)?;
-    row.dPdF = in_dimension!(solution, |s| tangent(s, X, t)?, else Vec::new());
+    row.dPdF = in_dimension!(solution, |s| exact_tangent(s, X, t)?, else Vec::new());
     if row.dPdF.iter().flatten().flatten().flatten().any(|entry| !entry.is_finite()) {
         row.not_finite.push("dPdF".to_owned());
     }
     Ok(row)
-}
-
-fn tangent<const D: usize>(
-    solution: &dyn Solution<f64, D>,
-    X: &[f64],
-    t: f64,
-) -> Result<Vec<Vec<Vec<Vec<f64>>>>, TangentError>
-where
-    f64: Precision<D> + Differentiated<D>,
-{
-    let X = SVector::<f64, D>::from_fn(|i, _| X.get(i).copied().unwrap_or(f64::NAN));
-    if !solution.internal_variables().is_empty() {
-        return Err(TangentError::History);
-    }
-    let law = law_of_body::<f64, D>(solution)?;
-    let law = at_point(&law, solution, &X, t).ok_or(TangentError::History)?;
-    let mut A: [Tangent<D>; 1] = [[[SMatrix::zeros(); D]; D]];
-    f64::tangents(&law, &[solution.deformation_gradient(&X, t)], &[], &mut A);
-    let of = |i: usize, J: usize| -> Vec<Vec<f64>> {
-        A[0].iter().map(|row| row.iter().map(|along| along[(i, J)]).collect()).collect()
-    };
-    Ok((0..D).map(|i| (0..D).map(|J| of(i, J)).collect()).collect())
 }
 
 /// Every field of `solution` at the reference position `X` and time `t`.

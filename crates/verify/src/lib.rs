@@ -60,6 +60,7 @@ mod state_of_stress;
 mod stated_law;
 mod statics;
 mod study;
+mod tangent;
 mod temporal;
 mod timing;
 mod total;
@@ -126,6 +127,10 @@ pub use statics::{
     expected_of_statics, is_at_rest, usual_moment,
 };
 pub use study::{Study, Sweep, converge};
+pub use tangent::{
+    JudgedTangent, NamedTangentMistake, TANGENT_MISTAKES, TangentMistake, TangentSample,
+    WrongEntry, judge_tangent,
+};
 pub use temporal::{Temporal, TemporalRow};
 pub use timing::Timing;
 pub use total::POLAR_ANGLES;

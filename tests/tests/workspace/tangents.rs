@@ -120,3 +120,43 @@ fn logs_of_newtons_method_tell_of_the_tangent() {
         assert!(format!("{out}{errors}").contains(words), "{words} is not in\n{out}{errors}");
     }
 }
+
+/// The status and the output for a tangent that `change` made of the right one.
+fn diagnosed(change: impl Fn(String) -> String) -> (Option<i32>, String, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let [points, file] = ["points.csv", "tangent.csv"].map(|name| folder.path().join(name));
+    std::fs::write(&points, "X,Y,t\n0.3,0.6,0.01\n0.7,0.2,0.02\n").unwrap();
+    let mut call = mms();
+    call.args(["eval", "skew-2d", "--tangent", "--points"]).arg(&points).arg("--csv").arg(&file);
+    let (status, out, errors) = outcome(&mut call);
+    assert_eq!(status, Some(0), "{out}{errors}");
+    std::fs::write(&file, change(std::fs::read_to_string(&file).unwrap())).unwrap();
+    outcome(mms().args(["diagnose", "skew-2d", "--tangent"]).arg(&file))
+}
+
+#[test]
+fn mistakes_in_tangents_are_named_from_the_file_of_their_values() {
+    let (status, out, errors) = diagnosed(|text| text);
+    assert_eq!(status, Some(0), "{out}{errors}");
+    assert!(out.contains("The tangent is right at 2 points"), "{out}");
+    // The names of F's components in the order of columns.
+    let turned = |text: String| {
+        let text = text.replacen("dF12", "dF!", 4).replacen("dF21", "dF12", 4);
+        text.replacen("dF!", "dF21", 4)
+    };
+    let (status, out, errors) = diagnosed(turned);
+    assert_eq!(status, Some(1), "{out}{errors}");
+    for expected in ["WRONG", "columns-transposed", "dP12dF21"] {
+        assert!(out.contains(expected), "{expected} is not in\n{out}");
+    }
+    let (status, _, errors) = diagnosed(|text| text.replace("dP22dF11", "dPyydFxx"));
+    assert_eq!(status, Some(2), "{errors}");
+    assert!(errors.contains("there is no column dP22dF11"), "{errors}");
+    assert!(errors.contains("mms eval skew-2d --points POINTS --tangent --csv FILE"), "{errors}");
+    let (status, _, errors) = diagnosed(|text| text.replace("F22,J", "Fyy,J"));
+    assert_eq!(status, Some(2), "{errors}");
+    assert!(
+        errors.contains("there is no column F22, and other columns of F are there"),
+        "{errors}"
+    );
+}

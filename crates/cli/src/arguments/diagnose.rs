@@ -15,11 +15,11 @@ pub(crate) struct DiagnoseOptions {
     #[arg(value_name = "NAME|SPEC.toml", required_unless_present = "list")]
     pub(crate) name: Option<String>,
     /// Language of the fields that the solver takes, as of mms gen
-    #[arg(long, value_parser = hosts(), required_unless_present = "list")]
+    #[arg(long, value_parser = hosts(), required_unless_present_any = ["list", "tangent"])]
     pub(crate) target: Option<&'static Host>,
     /// Command that builds and runs the solver. {fields} is the folder of the fields' file, {cells} the number of cells,
     /// {out} a folder for the files that mms score reads
-    #[arg(long, value_name = "CMD", required_unless_present = "list")]
+    #[arg(long, value_name = "CMD", required_unless_present_any = ["list", "tangent"])]
     pub(crate) run: Option<String>,
     /// Command that builds the solver, once for all grids; {fields} is the folder of the fields' file
     #[arg(long, value_name = "CMD")]
@@ -45,6 +45,10 @@ pub(crate) struct DiagnoseOptions {
     /// Folder of all fields and results. Default: a temporary one
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Name the mistake in the solver's tangent, in place of its runs: CSV with the place and time of a point, dP11dF11, dP11dF12, ... there, and
+    /// F11, F12, ... where the deformation is not the exact one; mms eval NAME --points POINTS --tangent --csv FILE writes such a file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["target", "run", "build", "dt", "out", "list"])]
+    pub(crate) tangent: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) parameters: ParameterOptions,
     /// List the mistakes that are looked for

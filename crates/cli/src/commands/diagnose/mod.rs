@@ -2,6 +2,7 @@
 
 mod runs;
 mod search;
+mod tangent;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,7 +14,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{CAUSES, Cause, Origin, Unused};
 use mmsmith_solutions::AnySolution;
 use mmsmith_spec::Condition;
-use mmsmith_verify::Quantity;
+use mmsmith_verify::{Quantity, TANGENT_MISTAKES, TangentMistake};
 use serde_json::{Value, json};
 
 use super::growth::Warnings;
@@ -36,6 +37,9 @@ pub(crate) fn diagnose(options: &DiagnoseOptions) -> Result<bool> {
     let output = Output::prepare_if(options.json.as_ref())?;
     if options.list {
         return list(output);
+    }
+    if let (Some(name), Some(file)) = (&options.name, &options.tangent) {
+        return tangent::judge(name, file, &options.parameters.set, output);
     }
     let (Some(name), Some(target), Some(run)) = (&options.name, options.target, &options.run)
     else {
@@ -117,12 +121,17 @@ fn list(output: Option<Output>) -> Result<bool> {
     for cause in CAUSES {
         text += &format!("{}: {}.\n  Look at {}.\n", cause.name, cause.mistake, cause.look);
     }
+    text += "in tangents, by --tangent:\n";
+    for TangentMistake { name, mistake, write, .. } in TANGENT_MISTAKES {
+        text += &format!("{name}: {mistake}.\n  Write {write}.\n");
+    }
     terminal::say(&text)?;
     if let Some(output) = output {
         let row = |cause: &Cause| json!({"name": cause.name, "mistake": cause.mistake, "look": cause.look});
         output.write(&json!({
             "schema": "mmsmith.causes/1",
             "causes": CAUSES.iter().map(row).collect::<Vec<_>>(),
+            "tangents": TANGENT_MISTAKES.iter().map(tangent::of_mistake).collect::<Vec<_>>(),
         }))?;
     }
     Ok(true)

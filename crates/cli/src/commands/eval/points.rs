@@ -16,16 +16,16 @@ pub(super) const AXES: [&str; 3] = ["X", "Y", "Z"];
 const LONGEST: u64 = 1 << 30;
 
 /// A point at a time.
-pub(super) struct Point {
+pub(crate) struct Point {
     /// The reference position.
-    pub(super) X: Vec<f64>,
-    pub(super) t: f64,
+    pub(crate) X: Vec<f64>,
+    pub(crate) t: f64,
     /// Parameters of this point alone.
-    pub(super) parameters: Vec<(String, f64)>,
+    pub(crate) parameters: Vec<(String, f64)>,
 }
 
 /// Where the point `index` is, for messages.
-pub(super) fn place(file: Source, index: usize) -> String {
+pub(crate) fn place(file: Source, index: usize) -> String {
     format!("{file}, entry {index} (counted from 0)")
 }
 
@@ -34,7 +34,7 @@ const OF_HALF_PLANE: [&str; 2] = ["R", "Z"];
 
 /// The points of a file: JSON where it begins as a list or an object does, else CSV. Those of a body of revolution have the coordinates R and
 /// Z, and lie at the angle zero.
-pub(super) fn read(
+pub(crate) fn read(
     file: Source,
     selection: &Selection,
     is_axisymmetric: bool,

@@ -230,7 +230,7 @@ fn told(histories: &[History], passed: bool) -> String {
         return format!(
             "NOT QUADRATIC: exponent {:.2} in step {step}, where Newton's method has 2; the residual falls to {} of itself in an iteration. \
              The tangent is not the derivative of the residual: a part is left out, such as the geometric stiffness, or it is that of \
-             another law, or kept from an earlier iteration. `mms eval NAME --points FILE --tangent` has the right dP/dF.\n",
+             another law, or kept from an earlier iteration. `mms diagnose NAME --tangent FILE` names the mistake by values of dP/dF.\n",
             exponent.unwrap_or(f64::NAN),
             ratio.map_or_else(|| "-".into(), |ratio| rounded(ratio, 2)),
         );
