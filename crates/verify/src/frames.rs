@@ -80,6 +80,19 @@ fn whole(Held { ranks, ids }: Held<'_>, own: Option<Frame>) -> Option<Frame> {
     (ranks.rank() == 0).then_some(frame)
 }
 
+/// Writes one state alone, of a body at rest: without velocities.
+pub(crate) fn write_at_rest<T: Precision<D>, const D: usize>(
+    output: &FrameOutput,
+    state: (&Particles<T, D>, &Law<T, D>),
+    exact: &dyn Solution<f64, D>,
+    time: f64,
+) -> Result<(), Error> {
+    let mut series = Series::create(&output.folder, &output.name)?;
+    let Some(mut frame) = frame(state, exact, 0, time) else { return Ok(()) };
+    frame.arrays.retain(|array| array.name != "velocity");
+    series.write(&Frame { provenance: output.provenance.clone(), ..frame }).map(|_| ())
+}
+
 /// Writes the frames of one run. Frames tell the time of their velocities, but for the first state, whose velocity belongs to
 /// no time of the scheme yet.
 pub(crate) struct FrameWriter {

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::{Case, CflSpeed, law_of};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
+use crate::frames::{FrameOutput, write_at_rest};
 use crate::order::Order;
 use crate::points;
 use crate::precision::Precision;
@@ -196,9 +197,22 @@ impl<'a> StaticProblem<'a> {
     ///
     /// [`CaseError`] for settings that cannot be solved. A case whose load is not reached is a row that says so.
     pub fn solve(&self, seen: &mut dyn FnMut(f64, &[f64])) -> Result<StaticRow, CaseError> {
+        self.solve_and_write(seen, None)
+    }
+
+    /// [`solve`](Self::solve), with a particle file of the equilibrium.
+    ///
+    /// # Errors
+    ///
+    /// Also where the file cannot be written.
+    pub fn solve_and_write(
+        &self,
+        seen: &mut dyn FnMut(f64, &[f64]),
+        output: Option<&FrameOutput>,
+    ) -> Result<StaticRow, CaseError> {
         in_dimension!(
             self.exact,
-            |s| solve(s, &self.case, seen),
+            |s| solve(s, &self.case, seen, output),
             else Err(CaseError::Dimension)
         )
     }
@@ -268,6 +282,7 @@ fn solve<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &StaticCase,
     seen: &mut dyn FnMut(f64, &[f64]),
+    output: Option<&FrameOutput>,
 ) -> Result<StaticRow, CaseError>
 where
     f64: Precision<D>,
@@ -311,6 +326,9 @@ where
             row.errors = Some(errors(exact, body.as_mut(), time));
             row.cut_backs = found.cut_backs;
             row.load_steps = steps(&found);
+            if let Some(output) = output {
+                write_at_rest(output, body.observe(), exact, time)?;
+            }
         }
         Err(error) => {
             if let StaticsError::NotReached { factor, residuals, cut_backs, .. } = &error {

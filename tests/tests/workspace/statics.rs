@@ -46,6 +46,17 @@ const SERIES: &[Series] = &[
             ("bspline5", "20,40"),
         ],
     },
+    // Clamped around, loaded on both faces.
+    Series {
+        call: "tests/data/specs/revolution/bulging-plate.toml --load-steps 2",
+        cells: &[
+            ("linear", "32,64"),
+            ("bspline2", "16,32"),
+            ("bspline3", "16,32"),
+            ("bspline4", "16,32"),
+            ("bspline5", "16,32"),
+        ],
+    },
     // Its layers of twisted material take many cells.
     Series {
         call: "vortex --set A=0.2",

@@ -21,7 +21,7 @@ pub(crate) struct RunOptions {
     pub(crate) scheme: SchemeOptions,
     #[command(flatten)]
     pub(crate) statics: StaticOptions,
-    /// Write particle files (.vtu, and a .pvd that lists them) to this folder
+    /// Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium
     #[arg(long, value_name = "DIR")]
     pub(crate) vtk: Option<PathBuf>,
     /// Number of particle files, spread evenly from the first state to the last

@@ -32,7 +32,6 @@ use crate::{number, processes, sheets, terminal};
 pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
     let of_time = [
-        ("--vtk", options.vtk.is_some()),
         ("--checkpoint", options.checkpoint.is_some()),
         ("--history", options.history.is_some()),
         ("--plot", options.plot.is_some()),

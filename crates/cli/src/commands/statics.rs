@@ -2,12 +2,12 @@
 
 mod told;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Formulation, Integrator, Layout as Points, Named, ORDER_TOLERANCE, Scheme, Shape, Start,
-    StaticCase, StaticErrors, StaticProblem, StaticRow, StaticStudy, Total, Transfer, Volume,
-    expected_of_statics, is_at_rest, usual_moment,
+    Case, Formulation, FrameOutput, Integrator, Layout as Points, Named, ORDER_TOLERANCE, Scheme,
+    Shape, Start, StaticCase, StaticErrors, StaticProblem, StaticRow, StaticStudy, Total, Transfer,
+    Volume, expected_of_statics, is_at_rest, usual_moment,
 };
 use serde_json::{Value, json};
 
@@ -15,10 +15,11 @@ use super::study::{Request, Show, Study, conduct};
 use crate::arguments::{
     ConvergeOptions, Layout, Precision, RunOptions, SchemeOptions, StaticOptions, Weights,
 };
+use crate::json::prepare_folder;
 use crate::library::Selection;
 use crate::processes::with_threads;
 use crate::progress::Bar;
-use crate::report::{Asked, Form, Report};
+use crate::report::{Asked, Form, Report, Section};
 use crate::{expect, memory, number, processes};
 
 /// The number of cells where nothing else is said, by dimension.
@@ -194,15 +195,30 @@ pub(super) fn run(selection: Selection, options: &RunOptions) -> Result<bool> {
     let cells = options.cells.unwrap_or(problem.case.case.cells);
     let on_grid = problem.on(cells)?;
     let files = Asked(vec![(Form::Json, &options.scheme.json)]).prepare()?;
+    let output = options.vtk.as_ref().map(|folder| FrameOutput {
+        folder: folder.clone(),
+        name: problem.selection.name().to_owned(),
+        count: 1,
+        provenance: Some(problem.selection.provenance()),
+    });
+    if let Some(FrameOutput { folder, .. }) = &output {
+        prepare_folder(folder).context("--vtk")?;
+    }
     with_threads(options.scheme.threads, || {
         let row = {
             let bar = Bar::expecting("starting", None);
             let what = format!("{cells} cells");
-            on_grid.solve(&mut |factor, residuals| {
+            let show = &mut |factor: f64, residuals: &[f64]| {
                 bar.show_share(|| told::under_way(&what, factor, residuals), factor);
-            })?
+            };
+            on_grid.solve_and_write(show, output.as_ref())?
         };
-        told::run(&problem, &row).publish(files)
+        let mut report = told::run(&problem, &row);
+        if let Some(FrameOutput { folder, name, .. }) = output.filter(|_| row.errors.is_some()) {
+            let list = folder.join(format!("{name}.pvd"));
+            report.sections.push(Section::Note(format!("particle file: {}\n", list.display())));
+        }
+        report.publish(files)
     })
 }
 
