@@ -202,7 +202,7 @@ def run(
         load_steps: Load steps of equal length; one that Newton's method does not take is halved. Default: 1.
         moment: Moment of the motion that is held, in periods of the solution. Default: 0.25, or another one where the body passes through
             rest then.
-        vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder.
+        vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium.
         frames: Number of particle files, spread evenly from the first state to the last. Default: 20.
         checkpoint: Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one.
         every: Steps between checkpoints. Default: 1000.

@@ -15,9 +15,9 @@ pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1),
 /// A law of space without internal variables of its own.
 #[derive(Clone, Debug)]
 pub enum ElasticInSpace<T> {
-    /// Of the library.
+    /// A law of the library.
     Library(Material<T>),
-    /// That the caller brings.
+    /// A law that the caller brings.
     Own(Arc<dyn ConstitutiveLaw<T, 3>>),
 }
 

@@ -2,14 +2,12 @@
 
 use crate::across::has_stretch_across;
 use crate::dimension::in_dimension;
-use crate::error::SceneError;
 use crate::points::outside;
-use crate::tangent::exact_tangent;
+use crate::tangent::{TangentError, WrongLength, exact_tangent};
 use mmsmith_runtime::{AnySolution, Around, Domain, Fields, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use thiserror::Error;
 
 /// All fields at a point; vectors as lists, matrices as lists of rows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -92,40 +90,6 @@ impl FieldRow {
         all.extend(internal.map(|(name, value)| (name.as_str(), Vec::new(), vec![*value])));
         all
     }
-}
-
-/// A position with the wrong number of coordinates.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("X has {given} coordinates, but the solution is {dimension}-dimensional")]
-pub struct WrongLength {
-    /// The number of coordinates given.
-    pub given: usize,
-    /// The number needed.
-    pub dimension: usize,
-}
-
-/// Why a law has no tangent at a point.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum TangentError {
-    /// A position with the wrong number of coordinates.
-    #[error(transparent)]
-    Length(#[from] WrongLength),
-    /// The solver does not have the law.
-    #[error(transparent)]
-    Law(#[from] SceneError),
-    /// The stress is no function of the deformation.
-    #[error(
-        "the stress depends on the history of the deformation, so that its tangent is that of the step by which a solver follows it"
-    )]
-    History,
-    /// A matrix or a tangent with the wrong number of entries.
-    #[error("{given} entries stand where {needed} belong")]
-    Entries {
-        /// The number of entries given.
-        given: usize,
-        /// The number needed.
-        needed: usize,
-    },
 }
 
 /// [`evaluate`] with the tangent of the solver's law at the exact deformation.

@@ -83,7 +83,7 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
-pub use evaluate::{FieldRow, TangentError, WrongLength, evaluate, evaluate_with_tangent};
+pub use evaluate::{FieldRow, evaluate, evaluate_with_tangent};
 pub use flow::{has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
 pub use growth::{
