@@ -12,6 +12,7 @@ mod ablation;
 mod docs;
 mod formulas;
 mod generate;
+mod page;
 mod publish;
 
 /// Tasks of the repository itself.
@@ -79,6 +80,15 @@ enum Task {
         #[arg(value_name = "PAGE")]
         pages: Vec<PathBuf>,
     },
+    /// Build the page where anyone tries mmsmith in a browser: a folder of static files.
+    Page {
+        /// The folder.
+        #[arg(long, value_name = "DIR", default_value = "target/site")]
+        out: PathBuf,
+        /// Leave the solver out: the page has no checks and no orders then.
+        #[arg(long)]
+        no_solver: bool,
+    },
 }
 
 fn main() -> ExitCode {
@@ -106,6 +116,7 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             }
             (Vec::new(), false)
         }
+        Task::Page { out, no_solver } => (page::run(&repository(), &out, !no_solver)?, false),
         Task::Publish { no_build, .. } => publish::check(&repository(), no_build)?,
         Task::Docs { write: true, mms, pages, .. } => {
             docs::write(&repository(), &mms, &pages, say)?;

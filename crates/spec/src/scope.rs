@@ -22,6 +22,8 @@ pub(crate) struct Scope<'a> {
     pub(crate) source: Source<'a>,
     pub(crate) graph: Graph,
     names: BTreeMap<String, Expr>,
+    /// The `[let]` expressions, each after those that it refers to.
+    pub(crate) lets: Vec<(String, Expr)>,
     /// Names that exist but not here, with the reason.
     elsewhere: BTreeMap<String, String>,
     pub(crate) coordinates: Vec<Expr>,
@@ -54,6 +56,7 @@ impl<'a> Scope<'a> {
             source,
             graph,
             names,
+            lets: Vec::new(),
             elsewhere,
             coordinates: symbols,
             time,
@@ -245,6 +248,7 @@ impl<'a> Scope<'a> {
             let (name, text) = &lets[index];
             let value = self.build(&syntax[index].0, text)?;
             self.names.insert(name.get_ref().clone(), value);
+            self.lets.push((name.get_ref().clone(), value));
         }
         Ok(())
     }

@@ -41,6 +41,8 @@ pub struct Spec {
     pub requirements: Vec<Requirement>,
     /// The graph that all expressions belong to.
     pub graph: Graph,
+    /// The expressions of `[let]` by their names, each after those that it refers to.
+    pub lets: Vec<(String, Expr)>,
     /// Physical components of the displacement.
     pub displacement: Vec<Expr>,
     /// The constitutive law; the elastic part of one with [`memory`](Self::memory).
@@ -642,6 +644,7 @@ impl<'a> Reader<'a> {
             parameters,
             requirements,
             graph: std::mem::take(&mut self.scope.graph),
+            lets: std::mem::take(&mut self.scope.lets),
             displacement,
             material,
             variation,

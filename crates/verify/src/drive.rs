@@ -3,15 +3,14 @@
 use std::collections::HashSet;
 use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::Arc;
-use std::time::Instant;
 
-use cpu_time::ProcessTime;
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{AtTime, BodyForce, Load, SavedState, SavedStateError, Solver, StepError};
 use mmsmith_ranks::{Ranks, gather};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
+use crate::clock::Begun;
 use crate::error::CaseError;
 use crate::interrupt::StepLoop;
 use crate::kept_stress::KeptStress;
@@ -105,10 +104,9 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
     ) -> Result<Outcome<R>, CaseError> {
         let step_loop = StepLoop::begin();
         for step in steps {
-            let (computing, started) = (ProcessTime::now(), Instant::now());
+            let begun = Begun::now();
             let outcome = self.solver.step(&self.body_force);
-            let (wall_s, cpu_s) =
-                (started.elapsed().as_secs_f64(), computing.elapsed().as_secs_f64());
+            let [wall_s, cpu_s] = begun.elapsed_s();
             if let Err(error) = outcome {
                 return Ok(Outcome::Stopped(error));
             }

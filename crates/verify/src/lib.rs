@@ -23,6 +23,7 @@ mod blind;
 mod case;
 mod check;
 mod checkpoint;
+mod clock;
 mod cost;
 mod coverage;
 mod difference;
