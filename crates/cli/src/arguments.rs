@@ -16,6 +16,7 @@ mod resume;
 mod run;
 mod scheme;
 mod score;
+mod serve;
 mod shared;
 mod stability;
 mod statics;
@@ -47,6 +48,7 @@ pub(crate) use resume::ResumeOptions;
 pub(crate) use run::{PictureOptions, RunOptions, Stress};
 pub(crate) use scheme::{HighDegree, Layout, Precision, SchemeOptions, Weights};
 pub(crate) use score::ScoreOptions;
+pub(crate) use serve::ServeOptions;
 pub(crate) use shared::KeepOptions;
 pub(crate) use stability::StabilityOptions;
 pub(crate) use statics::StaticOptions;
@@ -140,6 +142,8 @@ pub(crate) enum Command {
     Batch(BatchOptions),
     /// Repeat the study of Wallstedt and Guilkey on both of its problems, with a report, tables, data and particle files
     Reproduce(ReproduceOptions),
+    /// Serve programs that speak the model context protocol: list, explain, check, derive, gen, score and diagnose as tools
+    Serve(ServeOptions),
     /// Write the script that completes commands, options and names of solutions in a shell
     Completions(CompletionsOptions),
     /// Write the manual pages

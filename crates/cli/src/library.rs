@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::fs;
 use std::path::{Component, Path, PathBuf, is_separator};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use anyhow::{Context, Result, bail};
@@ -199,9 +200,20 @@ fn same_lines(one: &str, other: &str) -> bool {
     one.lines().eq(other.lines())
 }
 
+/// Whether names are those of the library alone.
+static HAS_NO_FOLDERS: AtomicBool = AtomicBool::new(false);
+
+/// From now on a name is one of the library, whatever lies in the working folder and above it.
+pub(crate) fn forget_folders() {
+    HAS_NO_FOLDERS.store(true, Ordering::Relaxed);
+}
+
 /// The folders that names are looked for in, in their order, whether they exist or not; those above the working folder
 /// only where they exist.
 fn folders() -> Vec<PathBuf> {
+    if HAS_NO_FOLDERS.load(Ordering::Relaxed) {
+        return Vec::new();
+    }
     let mut folders = vec![PathBuf::from(FOLDER)];
     let above = env::current_dir().map_or(0, |folder| {
         folder.components().filter(|part| matches!(part, Component::Normal(_))).count()

@@ -14,14 +14,14 @@ const GROUPS: [(&str, &[&str]); 5] = [
         "Simulate with the material point solver",
         &["run", "resume", "converge", "stability", "tradeoff", "reproduce"],
     ),
-    ("Other", &["batch", "completions", "man", "help"]),
+    ("Other", &["batch", "serve", "completions", "man", "help"]),
 ];
 
 /// A command line, and the purpose it serves.
 type Example = (&'static str, &'static str);
 
 /// Examples of each command.
-const EXAMPLES: [(&str, &[Example]); 18] = [
+const EXAMPLES: [(&str, &[Example]); 19] = [
     (
         "list",
         &[
@@ -132,6 +132,13 @@ const EXAMPLES: [(&str, &[Example]); 18] = [
         ],
     ),
     ("reproduce", &[("mms reproduce --out study", "everything, in minutes")]),
+    (
+        "serve",
+        &[
+            ("mms serve --mcp --folder .", "as a client starts it; files of the working folder"),
+            ("mms serve --mcp --folder . --run ./run.sh", "with the tool diagnose"),
+        ],
+    ),
     ("completions", &[("mms completions bash", "for ~/.bash_completion")]),
     ("man", &[("mms man man1", "mms.1, mms-run.1, ...")]),
 ];
