@@ -18,7 +18,7 @@ from solve import solve
 STUDIES = {"ring": (8, 16, 32), "vortex": (16, 32), "ring-nu": (8, 16, 32), "skew-2d": (8, 16, 32)}
 # Other conditions on the components of a side.
 CONDITIONS = Path(__file__).parents[2] / "data" / "specs" / "conditions"
-STUDIES |= {str(CONDITIONS / f"{name}.toml"): (8, 16) for name in ("moving-rollers", "sticking")}
+STUDIES |= {str(CONDITIONS / f"{name}.toml"): (16, 32) for name in ("moving-rollers", "sticking")}
 
 
 def written(folder, name, cells, result):
