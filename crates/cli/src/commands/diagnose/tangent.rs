@@ -154,7 +154,7 @@ fn told(judged: &JudgedTangent, samples: &[TangentSample]) -> String {
     }
     text += &table.text();
     if judged.entries.len() > MOST_SHOWN {
-        text += &format!("{} more\n", counted(judged.entries.len() - MOST_SHOWN, "entry"));
+        text += &format!("{} more\n", counted(judged.entries.len() - MOST_SHOWN, "component"));
     }
     for (index, own) in judged.named.iter().take(MOST_NAMED).enumerate() {
         let or = if index > 0 { "or " } else { "" };
