@@ -10,9 +10,9 @@ use num_traits::{One, Signed, Zero};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is shorter is written out where it occurs.
+/// An expression that is shorter is written out where it occurs.
 const SHORTEST_NAMED: usize = 7;
-/// What is longer, or nests deeper, has a line of its own.
+/// An expression that is longer, or nests deeper, has a line of its own.
 const LONGEST: usize = 45;
 const DEEPEST: usize = 9;
 /// Nobody reads more lines.
@@ -89,7 +89,7 @@ struct Set<'a> {
     named: BTreeMap<Expr, Value>,
     /// The expressions of `[let]` that are a power, by base and exponent: as factors they are lost in products.
     powers: BTreeMap<(Expr, Rational), Expr>,
-    /// Those that are told, each after those that it refers to.
+    /// Names that are told, each after the names that it refers to.
     lines: Vec<Expr>,
 }
 
@@ -372,7 +372,7 @@ fn is_leaf(graph: &Graph, expr: Expr) -> bool {
     matches!(graph.node(expr), Node::Number(_) | Node::Pi | Node::Symbol(_))
 }
 
-/// What an expression is made of, with powers that are stated in the place of their bases.
+/// The parts of an expression, with powers that are stated in the place of their bases.
 fn parts(graph: &Graph, powers: &BTreeMap<(Expr, Rational), Expr>, expr: Expr) -> Vec<Expr> {
     let Node::Product(factors) = graph.node(expr) else {
         return graph.children(expr).map(|child| inner(graph, child)).collect();

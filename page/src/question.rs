@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub(crate) enum Question {
     /// Reads and derives a specification.
     Open {
-        /// What messages and files of hosts call it.
+        /// Its name in messages and in files of hosts.
         file: String,
         /// All of it.
         text: String,

@@ -64,7 +64,7 @@ impl Session {
         Ok(session)
     }
 
-    /// What the page shows of it at once.
+    /// The part of it that the page shows at once.
     pub(crate) fn about(&self) -> Value {
         let spec = &self.spec;
         let parameters = spec.parameters.iter().map(|parameter| {

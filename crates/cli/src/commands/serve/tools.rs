@@ -22,7 +22,7 @@ use crate::progress::Watch;
 /// Longer files go back only where they were written to a folder.
 const LONGEST_TEXT: usize = 1 << 20;
 
-/// What comes of a call.
+/// The result of a call.
 pub(super) enum Outcome {
     /// A document.
     Done(Value),
@@ -263,7 +263,7 @@ impl Tools {
         }
     }
 
-    /// What a call is about, all its paths within the folders.
+    /// The subject of a call, all its paths within the folders.
     fn begin(&self, tool: &Tool, given: Given) -> Result<Work> {
         let folder = tempfile::tempdir().context("a folder for the call")?;
         let mut subject = String::new();
