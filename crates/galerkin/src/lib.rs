@@ -70,7 +70,8 @@ pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;
 pub use statics::{
-    AtRest, Equilibrium, LoadStep, Loads, Obstacle, QUADRATIC, StaticsError, newton_exponent,
+    AtRest, Equilibrium, LINEAR, LoadStep, Loads, Obstacle, QUADRATIC, StaticsError,
+    newton_exponent,
 };
 
 /// How many of so many numbers a thread takes at a time: four pieces for each thread, so that none waits long for the last, but not so few

@@ -64,6 +64,10 @@ pub struct Equilibrium {
 /// Newton's method converges quadratically where the exponent of the last residuals is at least this.
 pub const QUADRATIC: f64 = 1.8;
 
+/// Iterations converge no better than linearly where the exponent of the last residuals is at most this. Between this and [`QUADRATIC`] it
+/// cannot be told: residuals have not come to their last exponent, or the tangent is near the derivative.
+pub const LINEAR: f64 = 1.2;
+
 /// A load step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadStep {

@@ -96,7 +96,7 @@ pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};
 pub use mmsmith_galerkin::{
-    Composition, Coordinates, Layout, MassMatrix, QUADRATIC, newton_exponent,
+    Composition, Coordinates, LINEAR, Layout, MassMatrix, QUADRATIC, newton_exponent,
 };
 pub use mmsmith_laws::{ReturnMap, Volume};
 pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use csv::{ReaderBuilder, Trim};
-use mmsmith_verify::{QUADRATIC, newton_exponent};
+use mmsmith_verify::{LINEAR, QUADRATIC, newton_exponent};
 use serde::Serialize;
 use serde_json::json;
 
@@ -28,8 +28,6 @@ const ITERATIONS: [&str; 4] = ["iteration", "iter", "it", "newton_iteration"];
 const ROUNDING: f64 = 1e-14;
 /// Below this share of the largest residual one that does not halve the residual before it has come to rounding.
 const DEEP: f64 = 1e-8;
-/// Up to this exponent a method is linear.
-const LINEAR: f64 = 1.2;
 /// So many histories are shown; of others the number is told.
 const MOST_SHOWN: usize = 20;
 

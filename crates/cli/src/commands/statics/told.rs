@@ -1,7 +1,7 @@
 //! Reports on equilibria.
 
 use mmsmith_verify::{
-    Behaviour, Norm, OrderVerdict, QUADRATIC, StaticRow, StaticStep, StaticStudy,
+    Behaviour, LINEAR, Norm, OrderVerdict, QUADRATIC, StaticRow, StaticStep, StaticStudy,
 };
 use serde_json::{Map, json};
 
@@ -128,6 +128,10 @@ fn on_convergence(row: &StaticRow) -> String {
         Some(found) if found >= QUADRATIC => {
             format!("Newton's method converged quadratically: exponent {found:.2} of the last three residuals above rounding.\n")
         }
+        Some(found) if found > LINEAR => format!(
+            "Newton's method has the exponent {found:.2} by the last three residuals above rounding: too few to tell. More and shorter load \
+             steps (--load-steps) begin nearer to the equilibrium.\n"
+        ),
         Some(found) => format!(
             "NOT QUADRATIC: exponent {found:.2} of the last three residuals above rounding, where Newton's method has 2; a load step that is \
              cut shorter, or a kink of the law, shows so.\n"
