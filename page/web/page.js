@@ -9,7 +9,7 @@ const SYMBOLIC = 'mmsmith.wasm';
 const SOLVER = 'mmsmith-solver.wasm';
 const FIRST = 'swirl';
 /** A pause of the typist. */
-const PAUSE_MS = 180;
+const PAUSE_MS = 120;
 /** Seconds after which a worker is let go. */
 const LIMIT = { open: 10, formulas: 10, files: 120, motion: 120, checks: 120, orders: 300 };
 /** Grids of the solver. */
@@ -111,6 +111,8 @@ function edited() {
   now.text = by('text').value;
   mark(null);
   clearTimeout(typing);
+  // A motion that is still computed is not of this text, and holds a core.
+  desks.motion.cancel();
   typing = setTimeout(open, PAUSE_MS);
 }
 

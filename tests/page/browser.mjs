@@ -37,9 +37,15 @@ figures['first formula, s'] = (performance.now() - began) / 1000;
 // Each edit.
 let slowest = ['', 0];
 for (const own of library) {
+  const shown = () => page.evaluate(() => document.querySelector('#panel').dataset.shown);
+  const earlier = await shown();
   await page.selectOption('#library', own.file);
-  await page.waitForFunction((name) => document.title.startsWith(name), own.name);
-  const before = await page.evaluate(() => document.querySelector('#panel').dataset.shown);
+  // With its formulas, so that they are not taken for those of the edit.
+  await page.waitForFunction(([name, was]) => {
+    const panel = document.querySelector('#panel').dataset.shown;
+    return document.title.startsWith(name) && panel !== was && panel.startsWith('b ');
+  }, [own.name, earlier]);
+  const before = await shown();
   // From a key to the formulas, the pause of the typist included.
   const took = await page.evaluate(async (was) => {
     const text = document.querySelector('#text');
