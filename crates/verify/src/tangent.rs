@@ -340,18 +340,17 @@ where
     /// The law with other constants lambda and mu; none where it has others.
     fn with_constants(&self, change: fn(f64, f64) -> [f64; 2]) -> Option<Law<f64, D>> {
         let Law::Library(material) = &self.law else { return None };
-        let changed = |lambda, mu| change(lambda, mu);
         Some(Law::Library(match *material {
             Material::NeoHookean { lambda, mu } => {
-                let [lambda, mu] = changed(lambda, mu);
+                let [lambda, mu] = change(lambda, mu);
                 Material::NeoHookean { lambda, mu }
             }
             Material::StVenantKirchhoff { lambda, mu } => {
-                let [lambda, mu] = changed(lambda, mu);
+                let [lambda, mu] = change(lambda, mu);
                 Material::StVenantKirchhoff { lambda, mu }
             }
             Material::Hencky { lambda, mu } => {
-                let [lambda, mu] = changed(lambda, mu);
+                let [lambda, mu] = change(lambda, mu);
                 Material::Hencky { lambda, mu }
             }
             _ => return None,
@@ -422,11 +421,15 @@ where
     }
 }
 
+/// The indices `iJkL` of an entry, of which the last runs fastest; entries of further points follow.
+fn index<const D: usize>(entry: usize) -> [usize; 4] {
+    [3, 2, 1, 0].map(|place| entry / D.pow(place) % D)
+}
+
 /// The entries of tangents at all points, in the order of the samples.
 fn entries<const D: usize>(tangents: impl IntoIterator<Item = Tangent<D>>) -> Vec<f64> {
     let of = |A: Tangent<D>| -> Vec<f64> {
-        let index = |n: usize| [3, 2, 1, 0].map(|place| n / D.pow(place) % D);
-        (0..D.pow(4)).map(index).map(|[i, J, k, L]| A[k][L][(i, J)]).collect()
+        (0..D.pow(4)).map(index::<D>).map(|[i, J, k, L]| A[k][L][(i, J)]).collect()
     };
     tangents.into_iter().flat_map(of).collect()
 }
@@ -506,7 +509,7 @@ where
         worst.retain(|n| size(n).is_nan() || size(n) > RIGHT * largest);
         worst.sort_by(|one, other| size(other).total_cmp(&size(one)));
         let named = |n: usize| {
-            let [i, J, k, L] = [3, 2, 1, 0].map(|place| n / D.pow(place) % D + 1);
+            let [i, J, k, L] = index::<D>(n).map(|axis| axis + 1);
             WrongEntry {
                 point: n / square,
                 entry: format!("dP{i}{J}dF{k}{L}"),
