@@ -41,7 +41,6 @@ pub(super) struct Choice {
     scheme: Total,
     /// Reason why the updated formulation does not run it, in words; none where the user named the formulation and left its splines open.
     reason: Option<String>,
-    cfl_is_chosen: bool,
 }
 
 /// Usual case of a solution that the updated Lagrangian formulation models, with the given weights and integrator.
@@ -127,21 +126,22 @@ impl Settled {
             if reason.is_some() && is_solid {
                 settled.case.cells = USUAL_CELLS_OF_SOLIDS;
             }
-            let cfl_is_chosen = options.cfl.is_none();
             let speed = speed.or_else(|| verify::stiffest(exact).ok()).unwrap_or(CflSpeed::PWave);
             // What cannot be told from here is refused when the case is looked at.
-            if cfl_is_chosen && let Ok(cfl) = scheme.usual_cfl(exact, speed) {
+            if !settled.cfl_is_given
+                && let Ok(cfl) = scheme.usual_cfl(exact, speed)
+            {
                 (settled.case.cfl, settled.case.cfl_speed) = (cfl, speed);
                 settled.too_long = None;
             }
-            settled.chosen = Some(Choice { scheme, reason, cfl_is_chosen });
+            settled.chosen = Some(Choice { scheme, reason });
         }
         Ok(settled)
     }
 
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.
     pub(super) fn choice(&self) -> String {
-        let Some(Choice { scheme, reason, cfl_is_chosen }) = &self.chosen else {
+        let Some(Choice { scheme, reason }) = &self.chosen else {
             return self.loads() + &self.step();
         };
         let Case { cfl, cfl_speed, per_cell, .. } = self.case;
@@ -163,7 +163,7 @@ impl Settled {
         };
         let speed = waves(cfl_speed);
         let mut text = format!("total Lagrangian, {degree} splines on a {grid} grid, {layout}");
-        if *cfl_is_chosen {
+        if !self.cfl_is_given {
             text += &format!(", CFL {cfl} on {speed}");
         }
         if let Some(reason) = reason {
@@ -174,7 +174,7 @@ impl Settled {
         text += &format!(
             "\n  as with --formulation total-lagrangian --shape {shape} --grid {grid} --layout {layout} --ppc {per_cell}"
         );
-        if *cfl_is_chosen {
+        if !self.cfl_is_given {
             text += &format!(" --cfl {cfl} --cfl-speed {}", cfl_speed.name());
         }
         text + "\n" + &self.step()
