@@ -200,7 +200,7 @@ def hostile(client, folder):
     refused(client.call("gen", solution="bar", target="klingon"))
     refused(client.call("gen", solution="bar", target="c", set={"A": 1e308}))
     refused(client.call("score", solution="bar", files=["own.toml"]))
-    refused(client.call("score", solution="bar", files=["run-16/bar.pvd"], expect="--json=/tmp/x"))
+    refused(client.call("score", solution="bar", files=["run-16/bar.pvd"], expect="--json=/elsewhere.json"))
     assert client.ask("ping")["result"] == {}
 
 
