@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use mmsmith_laws::BlockWithMemory;
 use mmsmith_mpm::{Law, Particles, Stressed};
-use mmsmith_ranks::{gather, share};
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -12,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::homes::{GROUP, Holder, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
+use crate::tree::{joined, joined_over};
 
 /// Number of runs of particles that share the values which depend on the time alone.
 pub const RUNS: usize = 8;
@@ -110,7 +110,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
                 }
             }
         });
-        let [u, v, F, P] = over_homes(homes, &groups);
+        let [u, v, F, P] = over_homes(homes, groups);
         PerField { u, v, F, P }
     }
 
@@ -449,7 +449,7 @@ pub fn over_particles<R, const N: usize>(
     room: impl Fn() -> R + Sync,
     magnitudes: impl Fn(&mut R, usize, &mut [[Row<f64>; N]]) + Sync,
 ) -> [PerNorm<f64>; N] {
-    joined(tallies(count, room, magnitudes).iter()).map(|tally| tally.norms(count))
+    norms(joined(tallies(count, room, magnitudes)), count)
 }
 
 /// The norms of one magnitude of each particle; where there are several processes, `own` has those of the particles held here, and all
@@ -467,43 +467,21 @@ pub fn norms_of(homes: Option<&Homes>, own: &[f64]) -> PerNorm<f64> {
             },
         )
     };
-    let [norms] = match homes {
-        None => joined(tallies_of(own).iter()).map(|tally| tally.norms(own.len())),
-        Some(homes) => over_homes(homes, &tallies_of(&homes.bring(own))),
+    let [of_all] = match homes {
+        None => norms(joined(tallies_of(own)), own.len()),
+        Some(homes) => over_homes(homes, tallies_of(&homes.bring(own))),
     };
-    norms
+    of_all
 }
 
 /// The norms of magnitudes over the particles of all processes; `groups` has the tallies of the groups whose home is here. Collective.
-fn over_homes<const N: usize>(homes: &Homes, groups: &[[Tally; N]]) -> [PerNorm<f64>; N] {
-    let numbers: Vec<[f64; 4]> =
-        groups.iter().flatten().map(|tally: &Tally| tally.numbers()).collect();
-    let all = gather(homes.ranks(), numbers.as_flattened());
-    let all: Vec<Tally> = all
-        .chunks_exact(4)
-        .map(|numbers| Tally::of_numbers(std::array::from_fn(|k| numbers[k])))
-        .collect();
-    let groups: Vec<[Tally; N]> =
-        all.chunks_exact(N).map(|of_group| std::array::from_fn(|n| of_group[n])).collect();
-    let norms = joined(groups.iter()).map(|tally| tally.norms(homes.count()));
-    let mut numbers: Vec<f64> =
-        norms.iter().flat_map(|PerNorm { linf, l2, l1 }| [*linf, *l2, *l1]).collect();
-    share(homes.ranks(), 0, &mut numbers);
-    std::array::from_fn(|n| {
-        let [linf, l2, l1] = std::array::from_fn(|k| numbers[3 * n + k]);
-        PerNorm { linf, l2, l1 }
-    })
+fn over_homes<const N: usize>(homes: &Homes, groups: Vec<[Tally; N]>) -> [PerNorm<f64>; N] {
+    norms(joined_over(homes, GROUP, groups), homes.count())
 }
 
-/// The tally of all groups, joined in their order.
-fn joined<'a, const N: usize>(groups: impl Iterator<Item = &'a [Tally; N]>) -> [Tally; N] {
-    let mut total = [Tally::default(); N];
-    for group in groups {
-        for (total, tally) in total.iter_mut().zip(group) {
-            *total = total.join(tally);
-        }
-    }
-    total
+/// The norms of the tallies of `count` particles.
+fn norms<const N: usize>(tallies: Option<[Tally; N]>, count: usize) -> [PerNorm<f64>; N] {
+    tallies.unwrap_or([Tally::default(); N]).map(|tally| tally.norms(count))
 }
 
 /// The tallies of each group of particles; `magnitudes` as for [`over_particles`].

@@ -42,8 +42,7 @@ impl Homes {
     /// For a process that holds the particles `ids`, in ascending order. Collective.
     pub fn new(ranks: Arc<dyn Ranks>, ids: &[u64]) -> Self {
         let count = total(&*ranks, ids.len() as u64) as usize;
-        let groups = count.div_ceil(GROUP);
-        let first = |rank: usize| (groups * rank / ranks.count() * GROUP).min(count);
+        let first = |rank: usize| first_home(count, rank, ranks.count());
         let range = |rank: usize| first(rank)..first(rank + 1);
         let place = |number: usize| ids.partition_point(|&id| id < number as u64);
         let out: Vec<Range<usize>> = (0..ranks.count())
@@ -67,6 +66,12 @@ impl Homes {
     /// Number of particles of all processes.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// The number of the first particle whose home is a process, at the beginning of a group; the number of all particles for one process
+    /// more than there are.
+    pub(crate) fn first(&self, rank: usize) -> usize {
+        first_home(self.count, rank, self.ranks.count())
     }
 
     /// The numbers of the particles whose home is here.
@@ -107,6 +112,11 @@ impl Homes {
         };
         (0..self.here.len()).map(of).collect()
     }
+}
+
+/// The first of `count` particles whose home is the process `rank` of `ranks`.
+fn first_home(count: usize, rank: usize, ranks: usize) -> usize {
+    (count.div_ceil(GROUP) * rank / ranks * GROUP).min(count)
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 mod comparison;
 mod homes;
 pub mod norms;
+mod tree;
 
 pub use comparison::{Compared, Comparison, RUNS, Row, each_group, norms_of, over_particles};
 pub use homes::{Holder, Homes};
+pub use tree::{Sums, joined, joined_over};

@@ -2,12 +2,14 @@
 //!
 //! The differences between computed and exact fields are formed first and squared afterwards; their magnitudes
 //! are Euclidean norms of vectors and Frobenius norms of tensors. Partial sums belong to fixed groups of
-//! particles and are added in order, so the result does not depend on the number of threads.
+//! particles and are added in a tree of fixed shape, so the result does not depend on the number of threads.
 
 use serde::{Deserialize, Serialize};
 use std::array;
 use std::fmt;
 use std::ops::Index;
+
+use crate::tree::Sums;
 
 /// A field whose error is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -260,16 +262,6 @@ impl Tally {
         scale_of(self.max)
     }
 
-    /// The numbers of the tally, as they are sent to another process.
-    pub(crate) fn numbers(&self) -> [f64; 4] {
-        [self.max, self.square, self.sum, self.scale]
-    }
-
-    /// The tally with these [numbers](Self::numbers).
-    pub(crate) fn of_numbers([max, square, sum, scale]: [f64; 4]) -> Self {
-        Self { max, square, sum, scale }
-    }
-
     /// The norms over `count` particles.
     pub fn norms(&self, count: usize) -> PerNorm<f64> {
         let count = count as f64;
@@ -278,6 +270,27 @@ impl Tally {
             l2: self.scale * (self.square / count).sqrt(),
             l1: self.scale * (self.sum / count),
         }
+    }
+}
+
+impl<const N: usize> Sums for [Tally; N] {
+    const NUMBERS: usize = 4 * N;
+
+    fn join(&self, next: &Self) -> Self {
+        array::from_fn(|n| self[n].join(&next[n]))
+    }
+
+    fn write(&self, numbers: &mut Vec<f64>) {
+        for Tally { max, square, sum, scale } in self {
+            numbers.extend([max, square, sum, scale]);
+        }
+    }
+
+    fn read(numbers: &[f64]) -> Self {
+        array::from_fn(|n| {
+            let [max, square, sum, scale] = array::from_fn(|k| numbers[4 * n + k]);
+            Tally { max, square, sum, scale }
+        })
     }
 }
 

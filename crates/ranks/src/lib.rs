@@ -10,13 +10,15 @@
 mod directory;
 mod in_process;
 mod moves;
+mod pairs;
 mod traffic;
 
-use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, cast_slice_mut};
+use bytemuck::{AnyBitPattern, NoUninit, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 
 pub use directory::{Answers, Directory};
 pub use in_process::in_process;
 pub use moves::{Lists, Move};
+pub use pairs::Pairs;
 pub use traffic::{Sent, Traffic, counted};
 
 /// One of the processes of a run.
@@ -90,32 +92,69 @@ pub fn announce(ranks: &dyn Ranks, out: &[usize]) -> Vec<usize> {
 }
 
 /// The elements of all ranks, one after the other, at rank 0; nothing at other ranks. Collective.
+///
+/// Each rank hears of at most log2(count) others.
 pub fn gather<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, own: &[E]) -> Vec<E> {
-    let to_first = |count: usize| {
-        let mut counts = vec![0; ranks.count()];
-        counts[0] = count;
-        counts
-    };
-    let counts = announce(ranks, &to_first(own.len()));
-    let mut out = vec![Vec::new(); ranks.count()];
-    out[0] = own.to_vec();
-    exchange(ranks, &out, &counts)
+    gather_by(ranks, own.to_vec(), &|all, next| all.extend_from_slice(&next))
+}
+
+/// As [`gather`], where `join` makes one list of that of some ranks and that of the ranks that follow. Collective.
+pub fn gather_by<E: NoUninit + AnyBitPattern>(
+    ranks: &dyn Ranks,
+    mut own: Vec<E>,
+    join: &dyn Fn(&mut Vec<E>, Vec<E>),
+) -> Vec<E> {
+    let Pairs { heard, told } = Pairs::of(ranks);
+    for from in heard {
+        let mut count = 0_u64;
+        ranks.receive(from.start, bytes_of_mut(&mut count));
+        let mut next = vec![E::zeroed(); count as usize];
+        if count > 0 {
+            ranks.receive(from.start, cast_slice_mut(&mut next));
+        }
+        join(&mut own, next);
+    }
+    let Some(to) = told else { return own };
+    ranks.send(to, bytes_of(&(own.len() as u64)));
+    if !own.is_empty() {
+        ranks.send(to, cast_slice(&own));
+    }
+    Vec::new()
 }
 
 /// Copies the elements of the rank `from` to all ranks, which have the same number of elements. Collective.
+///
+/// Each rank tells at most log2(count) others.
 pub fn share<E: NoUninit + AnyBitPattern>(ranks: &dyn Ranks, from: usize, elements: &mut [E]) {
-    if ranks.rank() != from {
-        ranks.receive(from, cast_slice_mut(elements));
-        return;
+    let count = ranks.count();
+    // As if `from` were the first.
+    let Pairs { heard, told } = Pairs::new((ranks.rank() + count - from) % count, count);
+    if let Some(told) = told {
+        ranks.receive((told + from) % count, cast_slice_mut(elements));
     }
-    for to in (0..ranks.count()).filter(|to| *to != from) {
-        ranks.send(to, cast_slice(elements));
+    // The largest part of the ranks first, which has the longest way.
+    for part in heard.iter().rev() {
+        ranks.send((part.start + from) % count, cast_slice(elements));
+    }
+}
+
+/// Adds the numbers of all ranks, place by place, at rank 0; at other ranks the numbers are those of a part. Collective.
+pub fn add_to_first(ranks: &dyn Ranks, numbers: &mut [u64]) {
+    let Pairs { heard, told } = Pairs::of(ranks);
+    let mut next = vec![0; numbers.len()];
+    for from in heard {
+        ranks.receive(from.start, cast_slice_mut(&mut next));
+        numbers.iter_mut().zip(&next).for_each(|(number, next)| *number += next);
+    }
+    if let Some(to) = told {
+        ranks.send(to, cast_slice(numbers));
     }
 }
 
 /// The sum of the whole numbers of all ranks. Collective.
 pub fn total(ranks: &dyn Ranks, own: u64) -> u64 {
-    let mut total = [gather(ranks, &[own]).iter().sum()];
+    let mut total = [own];
+    add_to_first(ranks, &mut total);
     share(ranks, 0, &mut total);
     total[0]
 }
@@ -148,6 +187,9 @@ mod tests {
                 let mut shared = [all.len() as u64, own as u64];
                 share(ranks, count - 1, &mut shared);
                 assert_eq!(total(ranks, 1 + own as u64), (1..=count as u64).sum());
+                let largest = |all: &mut Vec<u64>, next: Vec<u64>| all[0] = all[0].max(next[0]);
+                let found = gather_by(ranks, vec![10 + own as u64], &largest);
+                assert_eq!(found, if own == 0 { vec![9 + count as u64] } else { Vec::new() });
                 (all, gathered, shared, ranks.largest(own as u64))
             });
             let expected = |own: usize| -> Vec<u64> {
@@ -179,5 +221,40 @@ mod tests {
             traffic.sent()
         });
         assert_eq!(found, [Sent { messages: 2, bytes: 4 }, Sent::default()]);
+    }
+
+    /// The first rank hears no more messages than log2(count), and of no list more than its length.
+    #[test]
+    fn nothing_but_what_is_asked_for_grows_with_the_number_of_ranks() {
+        for count in [1, 2, 3, 6, 8, 13, 32] {
+            let found = in_process(count, |ranks| {
+                let (ranks, traffic) = counted(ranks);
+                let sent = |work: &dyn Fn()| {
+                    let before = traffic.sent();
+                    work();
+                    traffic.sent() - before
+                };
+                let added = sent(&|| add_to_first(&*ranks, &mut [1; 5]));
+                let shared = sent(&|| share(&*ranks, count / 2, &mut [1_u64; 3]));
+                let gathered = sent(&|| drop(gather(&*ranks, &[1_u64])));
+                (added, shared, gathered, Pairs::of(&*ranks).heard.len() as u32)
+            });
+            let most = count.next_power_of_two().ilog2();
+            let others = count as u64 - 1;
+            let all = |of: &dyn Fn(usize) -> Sent| {
+                let add = |a: Sent, b: Sent| Sent {
+                    messages: a.messages + b.messages,
+                    bytes: a.bytes + b.bytes,
+                };
+                (0..count).map(of).fold(Sent::default(), add)
+            };
+            assert_eq!(all(&|n| found[n].0), Sent { messages: others, bytes: 40 * others });
+            assert_eq!(all(&|n| found[n].1), Sent { messages: others, bytes: 24 * others });
+            assert_eq!(all(&|n| found[n].2).messages, 2 * others);
+            for (added, shared, gathered, heard) in found {
+                assert!(added.messages <= 1 && gathered.messages <= 2 && heard <= most);
+                assert!(shared.messages <= most.into(), "{shared:?} of {count}");
+            }
+        }
     }
 }

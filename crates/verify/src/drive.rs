@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{AtTime, BodyForce, Load, SavedState, SavedStateError, Solver, StepError};
-use mmsmith_ranks::{Ranks, gather};
+use mmsmith_ranks::{Ranks, gather_by, total};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
@@ -128,17 +128,18 @@ impl<T: Real, const D: usize> Driven<'_, T, D> {
 
 /// Whether the particles of all processes make a [`Lattice`]; a call of all.
 fn is_lattice<T: Real, const D: usize>(ranks: &dyn Ranks, X: &[SVector<T, D>]) -> bool {
+    // More than any lattice has, without telling which.
+    let most = Lattice::<T, D>::most_layers(usize::MAX) + 1;
+    let some = |all: HashSet<u64>| all.into_iter().take(most).collect::<Vec<_>>();
     let mut layers = 0;
     for axis in 0..D {
-        let own: HashSet<u64> = X.iter().map(|X| X[axis].to_f64().to_bits()).collect();
-        // More than any lattice has, without telling which.
-        let own = own.into_iter().take(Lattice::<T, D>::most_layers(usize::MAX) + 1);
-        let all: HashSet<u64> = gather(ranks, &own.collect::<Vec<_>>()).into_iter().collect();
-        layers += all.len();
+        let own = some(X.iter().map(|X| X[axis].to_f64().to_bits()).collect());
+        let join =
+            |all: &mut Vec<u64>, next: Vec<u64>| *all = some(all.drain(..).chain(next).collect());
+        layers += gather_by(ranks, own, &join).len();
     }
-    let points: u64 = gather(ranks, &[X.len() as u64]).iter().sum();
-    // What the first one has counted.
-    let most = Lattice::<T, D>::most_layers(points as usize);
+    // The layers that the first one has counted.
+    let most = Lattice::<T, D>::most_layers(total(ranks, X.len() as u64) as usize);
     ranks.largest(u64::from(most > 0 && layers <= most && ranks.rank() == 0)) > 0
 }
 

@@ -5,9 +5,8 @@
 
 use bytemuck::Pod;
 use mmsmith_measure::norms::PerNorm;
-use mmsmith_measure::{Homes, each_group};
+use mmsmith_measure::{Homes, each_group, joined, joined_over};
 use mmsmith_mpm::{Law, Particles};
-use mmsmith_ranks::{gather, share};
 use mmsmith_runtime::{Real, Solution};
 use serde::Serialize;
 
@@ -126,7 +125,7 @@ impl<const D: usize> Totals<D> {
         f64: Precision<D>,
     {
         let groups = Self::of_groups(particles, law, exact, time, velocity_time);
-        Self::joined(groups)
+        joined(groups).unwrap_or_else(|| Self::of_none(0))
     }
 
     /// As [`of`](Self::of) for one of several processes, over the particles of all; a call of all.
@@ -153,34 +152,7 @@ impl<const D: usize> Totals<D> {
             ..Particles::default()
         };
         let groups = Self::of_groups(&here, law, exact, time, velocity_time);
-        let own: Vec<f64> = groups.iter().flat_map(Self::numbers).collect();
-        let all = gather(homes.ranks(), &own);
-        let groups = all.chunks_exact(Self::NUMBERS).map(Self::of_numbers).collect();
-        let mut numbers = Self::joined(groups).numbers();
-        share(homes.ranks(), 0, &mut numbers);
-        Self::of_numbers(&numbers)
-    }
-
-    /// Numbers that say the sums.
-    const NUMBERS: usize = 5 + 2 * D;
-
-    fn numbers(&self) -> Vec<f64> {
-        let mut numbers = vec![self.exact_momenta];
-        for motion in [&self.computed, &self.exact] {
-            numbers.extend([motion.kinetic, motion.strain]);
-            numbers.extend(motion.momentum);
-        }
-        numbers
-    }
-
-    fn of_numbers(numbers: &[f64]) -> Self {
-        let motion = |first: usize| Motion {
-            kinetic: numbers[first],
-            strain: numbers[first + 1],
-            momentum: std::array::from_fn(|a| numbers[first + 2 + a]),
-        };
-        let (computed, exact) = (motion(1), motion(3 + D));
-        Self { computed, exact, exact_momenta: numbers[0], ..Self::of_none(0) }
+        joined_over(homes, GROUP, groups).unwrap_or_else(|| Self::of_none(0))
     }
 
     /// The sums of each group of particles.
@@ -223,18 +195,38 @@ impl<const D: usize> Totals<D> {
         };
         each_group(particles.len().div_ceil(GROUP), &group)
     }
+}
 
-    fn joined(groups: Vec<Self>) -> Self {
-        let mut total = Self::of_none(0);
-        for next in groups {
-            if next.error > total.error || next.error.is_nan() {
-                (total.error, total.worst) = (next.error, next.worst);
-            }
-            total.computed.add(&next.computed);
-            total.exact.add(&next.exact);
-            total.exact_momenta += next.exact_momenta;
+impl<const D: usize> mmsmith_measure::Sums for Totals<D> {
+    const NUMBERS: usize = 5 + 2 * D;
+
+    fn join(&self, next: &Self) -> Self {
+        let is_worse = next.error > self.error || next.error.is_nan();
+        let Self { error, worst, .. } = *if is_worse { next } else { self };
+        let (mut computed, mut exact) = (self.computed, self.exact);
+        computed.add(&next.computed);
+        exact.add(&next.exact);
+        let exact_momenta = self.exact_momenta + next.exact_momenta;
+        Self { error, worst, computed, exact, exact_momenta }
+    }
+
+    /// The sums alone: no process asks another one for the largest error.
+    fn write(&self, numbers: &mut Vec<f64>) {
+        numbers.push(self.exact_momenta);
+        for motion in [&self.computed, &self.exact] {
+            numbers.extend([motion.kinetic, motion.strain]);
+            numbers.extend(motion.momentum);
         }
-        total
+    }
+
+    fn read(numbers: &[f64]) -> Self {
+        let motion = |first: usize| Motion {
+            kinetic: numbers[first],
+            strain: numbers[first + 1],
+            momentum: std::array::from_fn(|a| numbers[first + 2 + a]),
+        };
+        let (computed, exact) = (motion(1), motion(3 + D));
+        Self { computed, exact, exact_momenta: numbers[0], ..Self::of_none(0) }
     }
 }
 

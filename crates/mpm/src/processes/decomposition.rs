@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use mmsmith_ranks::{Move, Ranks, gather, share};
+use mmsmith_ranks::{Move, Ranks, add_to_first, share};
 use nalgebra::RealField;
 
 use crate::error::{SetupError, StepError};
@@ -71,13 +71,9 @@ impl LocalBody {
     /// this process holds from now on. A call of all.
     pub(crate) fn cut(&mut self, mut counts: Vec<u64>) -> Range<usize> {
         let Self { ranks, cuts: known, .. } = self;
-        let bins = counts.len();
-        let all = gather(&**ranks, &counts);
+        add_to_first(&**ranks, &mut counts);
         let mut new: Vec<u64> = vec![0; ranks.count() + 1];
         if ranks.rank() == 0 {
-            for (bin, count) in counts.iter_mut().enumerate() {
-                *count = all.iter().skip(bin).step_by(bins).sum();
-            }
             let cuts = match known.as_slice() {
                 [_, ..] if unevenness(&counts, known) <= UNEVEN => known.clone(),
                 _ => cuts(&counts, ranks.count()),

@@ -15,7 +15,7 @@ use crate::polygons::loaded;
 use crate::schemes::{self, noise};
 
 /// A column: walls at its foot and sides, long enough for several processes.
-fn grid<const D: usize>() -> Grid<f64, D> {
+pub(crate) fn grid<const D: usize>() -> Grid<f64, D> {
     let mut grid = Grid {
         lower: SVector::repeat(-0.25),
         spacing: 0.125,
@@ -28,7 +28,7 @@ fn grid<const D: usize>() -> Grid<f64, D> {
 }
 
 /// A deformed body of unequal masses that flies up from the foot, or in the middle of the column down.
-fn body<const D: usize>(speed: f64, is_uniform: bool) -> Body<f64, D> {
+pub(crate) fn body<const D: usize>(speed: f64, is_uniform: bool) -> Body<f64, D> {
     let (height, grid) = (if D == 1 { 120.0 } else { 4.0 }, grid::<D>());
     let foot = if speed < 0.0 { 2.0 } else { -0.25 };
     let inside = |X: &SVector<f64, D>| {
@@ -47,7 +47,7 @@ fn body<const D: usize>(speed: f64, is_uniform: bool) -> Body<f64, D> {
     body
 }
 
-fn law() -> Material<f64> {
+pub(crate) fn law() -> Material<f64> {
     Material::NeoHookean { lambda: 60.0, mu: 40.0 }
 }
 
@@ -73,7 +73,10 @@ impl<const D: usize> BodyForce<f64, D> for Forced {
 }
 
 /// The particles of `body` that a process begins with, and their numbers: some here, some there.
-fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D>, Vec<u64>) {
+pub(crate) fn share<const D: usize>(
+    body: &Body<f64, D>,
+    ranks: &dyn Ranks,
+) -> (Body<f64, D>, Vec<u64>) {
     let count = body.particles.len();
     let is_own = |p: &usize| p / 7 % ranks.count() == ranks.rank();
     let own: Vec<usize> = (0..count).filter(is_own).collect();
@@ -91,9 +94,9 @@ fn share<const D: usize>(body: &Body<f64, D>, ranks: &dyn Ranks) -> (Body<f64, D
 }
 
 /// State of a particle: number, position, velocity, deformation gradient.
-type Of<const D: usize> = (u64, SVector<f64, D>, SVector<f64, D>, SMatrix<f64, D, D>);
+pub(crate) type Of<const D: usize> = (u64, SVector<f64, D>, SVector<f64, D>, SMatrix<f64, D, D>);
 
-fn state<const D: usize>(simulation: &mut Simulation<f64, D>) -> Vec<Of<D>>
+pub(crate) fn state<const D: usize>(simulation: &mut Simulation<f64, D>) -> Vec<Of<D>>
 where
     f64: Scalar<D>,
 {
@@ -104,7 +107,7 @@ where
 }
 
 /// Steps that a body flies, with the particles of a process after them, and the error that ended them.
-fn fly<const D: usize>(
+pub(crate) fn fly<const D: usize>(
     simulation: &mut Simulation<f64, D>,
     steps: usize,
 ) -> (Vec<Of<D>>, Option<StepError>, u64)
@@ -159,7 +162,7 @@ fn agrees_on<const D: usize>(
     }
 }
 
-fn flying(settings: Settings<f64>) -> Settings<f64> {
+pub(crate) fn flying(settings: Settings<f64>) -> Settings<f64> {
     let halve = settings.integrator == Integrator::Cd;
     Settings { time_step: 1.0 / 256.0, halve_first_acceleration: halve, ..settings }
 }
@@ -417,9 +420,9 @@ where
         let left: u64 = (0..count).map(|n| of(n).2).sum();
         let mut expected = passes(&settings, is_first) * halo;
         if of(0).1 {
-            // The first process hears how many particles are in each bin, after how long that is, and tells the cuts; all tell each
-            // other how many particles they send.
-            let counts = others * count as u64 * 8 + others * bins * 8;
+            // The first process hears how many particles are in each bin, and tells the cuts, both in a tree; all tell each other how many
+            // particles they send.
+            let counts = others * bins * 8;
             let lengths = others * count as u64 * 8;
             expected += counts + others * (count as u64 + 1) * 8 + lengths;
             expected += left * record::<D>(&settings);
@@ -450,7 +453,7 @@ fn messages_have_the_bytes_that_the_formula_says() {
 }
 
 /// A high grid without walls, and a ring or a shell of polygons with loads that flies up in it, its lattice turned.
-fn polygons<const D: usize>(speed: f64) -> (Grid<f64, D>, Body<f64, D>)
+pub(crate) fn polygons<const D: usize>(speed: f64) -> (Grid<f64, D>, Body<f64, D>)
 where
     f64: Scalar<D>,
 {
@@ -480,7 +483,7 @@ where
 }
 
 /// Every integrator and transfer, with the shapes that polygons have.
-fn polygon_settings() -> impl Iterator<Item = Settings<f64>> {
+pub(crate) fn polygon_settings() -> impl Iterator<Item = Settings<f64>> {
     let shapes = [Shape::Cpdi2, Shape::Bspline2, Shape::Bspline3];
     let transfers = [Transfer::Flip, Transfer::Apic, Transfer::Xpic(3)];
     Integrator::ALL.into_iter().enumerate().flat_map(move |(n, integrator)| {
