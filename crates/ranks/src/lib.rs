@@ -5,12 +5,14 @@
 //!
 //! A function called *collective* is called by all processes, in the same order.
 //!
-//! [`in_process()`] gives ranks that are threads of one process, for tests. The crate `mmsmith-message-passing` gives those of MPI.
+//! [`in_process()`] gives ranks that are threads of one process, for tests, and [`simulated()`] those of a cluster whose messages come late
+//! and whose processes are killed. The crate `mmsmith-message-passing` gives those of MPI.
 
 mod directory;
 mod in_process;
 mod moves;
 mod pairs;
+mod simulated;
 mod traffic;
 
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
@@ -19,6 +21,7 @@ pub use directory::{Answers, Directory};
 pub use in_process::in_process;
 pub use moves::{Lists, Move};
 pub use pairs::Pairs;
+pub use simulated::{Failed, Schedule, Simulated, simulated};
 pub use traffic::{Sent, Traffic, counted};
 
 /// One of the processes of a run.

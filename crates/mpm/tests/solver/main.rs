@@ -1,5 +1,6 @@
 //! The solver as a library: what it keeps, its orders, and how it refuses. One program, so that its schemes are compiled once.
 
+mod cluster;
 mod failures;
 mod mechanics;
 mod memory;

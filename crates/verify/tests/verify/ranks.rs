@@ -11,7 +11,7 @@ use mmsmith_verify::{
 };
 
 /// A row without what differs from run to run.
-fn timeless(row: Row) -> Row {
+pub(crate) fn timeless(row: Row) -> Row {
     Row { wall_s: 0.0, cpu_s: 0.0, particle_steps_per_s: 0.0, ..row }
 }
 
