@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use mmsmith_ledger::{Claim, Ledger, LedgerError, Shard, ShardName};
+use mmsmith_rare_states::{RareState, met};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -209,6 +210,7 @@ impl Keep {
             },
             Store::Shard { shard, .. } => {
                 if let Some(value) = shard.value(&key) {
+                    met(RareState::ShardResumed);
                     return read(value);
                 }
                 let (started, before) = (Instant::now(), machine::waited_for_cores());

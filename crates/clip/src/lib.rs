@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 
 use mmsmith_lanes::tensor::real;
 use mmsmith_mpm::{Body, Grid, Mesh, Particles, SetupError};
+use mmsmith_rare_states::{RareState, met};
 use nalgebra::{RealField, SMatrix, SVector};
 
 /// A clipped box with less than this share of its whole volume is a sliver.
@@ -181,6 +182,7 @@ fn join(volumes: &[f64], whole: f64, contacts: impl Fn(usize) -> Vec<Contact>) -
         }
         let most = common.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)));
         let Some((&to, _)) = most else { continue };
+        met(RareState::SliverJoined);
         let Group { members, volume } =
             std::mem::replace(&mut groups[own], Group { members: Vec::new(), volume: 0.0 });
         members.iter().for_each(|member| group_of[*member] = to);

@@ -6,6 +6,7 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::{determinant, real};
 use mmsmith_laws::fault::Fault;
 use mmsmith_laws::{Law, Stressed};
+use mmsmith_rare_states::{RareState, met_if};
 use nalgebra::RealField;
 
 use crate::domain::corner_exchange::invalidity_of_corner;
@@ -183,7 +184,11 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         let scale = if halved { real(0.5) } else { T::one() };
         let end = self.settings.time_step * real((self.steps_done + 1) as f64);
         let times = StepTimes { start: self.time(), end, scale };
+        let before = self.state.part.as_ref().map(|part| part.ids.clone());
         let outcome = self.state.step(self.settings.integrator, body_force, times);
+        met_if(RareState::ParticleMigrated, || {
+            self.state.part.as_ref().map(|part| &part.ids) != before.as_ref()
+        });
         if let Some((invalid, particle)) = outcome.failure {
             let step = self.steps_done + 1;
             let time = self.settings.time_step * real(step as f64);

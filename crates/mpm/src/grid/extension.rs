@@ -19,6 +19,7 @@ use std::ops::Range;
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 use mmsmith_ranks::Ranks;
+use mmsmith_rare_states::{RareState, met_if};
 use rayon::prelude::*;
 
 use crate::grid::Layout;
@@ -164,6 +165,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
             );
             light.push(Light { node, inner: start..inner.len() });
         }
+        met_if(RareState::LightNode, || !light.is_empty());
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 use mmsmith_ranks::{Move, Ranks, add_to_first, share};
+use mmsmith_rare_states::{RareState, met};
 use nalgebra::RealField;
 
 use crate::error::{SetupError, StepError};
@@ -78,6 +79,9 @@ impl LocalBody {
                 [_, ..] if unevenness(&counts, known) <= UNEVEN => known.clone(),
                 _ => cuts(&counts, ranks.count()),
             };
+            if !known.is_empty() && *known != cuts {
+                met(RareState::CutMoved);
+            }
             new = cuts.into_iter().map(|cut| cut as u64).collect();
         }
         share(&**ranks, 0, &mut new);
