@@ -1,8 +1,8 @@
 //! Text that users hand in: from a file, or from standard input where they say `-`.
 
 use std::fmt;
-use std::fs::File;
-use std::io::{self, Read};
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -47,6 +47,22 @@ impl<'a> Source<'a> {
             bail!("cannot read {self}: it is longer than {most} bytes");
         }
         Ok(bytes)
+    }
+}
+
+/// The kind of what has a path; none where nothing has. Where the system cannot tell, nothing is taken for granted: another file of the
+/// name would be taken, or a file be replaced.
+pub(crate) fn kind_of(path: &Path) -> Result<Option<Metadata>> {
+    match fs::metadata(path) {
+        Ok(found) => Ok(Some(found)),
+        Err(error) => match error.kind() {
+            ErrorKind::NotFound
+            | ErrorKind::NotADirectory
+            | ErrorKind::PermissionDenied
+            | ErrorKind::InvalidInput
+            | ErrorKind::InvalidFilename => Ok(None),
+            _ => Err(error).with_context(|| format!("cannot look at {}", path.display())),
+        },
     }
 }
 

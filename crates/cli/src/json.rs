@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_verify::WholeFile;
 use serde::Serialize;
 
+use crate::input;
 use crate::processes;
 use crate::terminal;
 
@@ -53,14 +54,22 @@ impl Output {
             return Ok(Self::at(Place::Standard));
         }
         // A link stays a link; what it points to is replaced.
-        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let path = match input::kind_of(path)? {
+            None => path.to_owned(),
+            Some(kind) => {
+                let shown = path.display();
+                if kind.is_dir() {
+                    bail!("cannot write {shown}: it is a folder");
+                }
+                let real =
+                    fs::canonicalize(path).with_context(|| format!("cannot write {shown}"))?;
+                if !kind.is_file() {
+                    return Ok(Self::at(Place::Device(real)));
+                }
+                real
+            }
+        };
         let shown = path.display();
-        if path.is_dir() {
-            bail!("cannot write {shown}: it is a folder");
-        }
-        if path.exists() && !path.is_file() {
-            return Ok(Self::at(Place::Device(path)));
-        }
         WholeFile::sweep(&path);
         let file = WholeFile::create(&path).with_context(|| format!("cannot write {shown}"))?;
         Ok(Self::at(Place::File { path, file }))

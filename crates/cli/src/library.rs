@@ -172,7 +172,12 @@ pub(crate) fn locate(name: &str) -> Result<Origin> {
     }
     let built_in = CATALOGUE.iter().copied().find(|known| known.name == name);
     let file = format!("{name}.toml");
-    let found = folders().into_iter().map(|folder| folder.join(&file)).find(|path| path.is_file());
+    let mut found = None;
+    for path in candidates().into_iter().map(|folder| folder.join(&file)) {
+        if found.is_none() && input::kind_of(&path)?.is_some_and(|kind| kind.is_file()) {
+            found = Some(path);
+        }
+    }
     let origin = match (found, built_in) {
         (None, Some(description)) => Origin::BuiltIn(description),
         (None, None) => match texts().find(|(known, _)| *known == name) {
@@ -208,9 +213,15 @@ pub(crate) fn forget_folders() {
     HAS_NO_FOLDERS.store(true, Ordering::Relaxed);
 }
 
-/// The folders that names are looked for in, in their order, whether they exist or not; those above the working folder
-/// only where they exist.
+/// The folders that names are looked for in, as messages tell them: those above the working folder only where they exist.
 fn folders() -> Vec<PathBuf> {
+    let mut folders = candidates();
+    folders.retain(|folder| !folder.starts_with("..") || folder.is_dir());
+    folders
+}
+
+/// The folders that names are looked for in, in their order, whether they exist or not.
+fn candidates() -> Vec<PathBuf> {
     if HAS_NO_FOLDERS.load(Ordering::Relaxed) {
         return Vec::new();
     }
@@ -223,8 +234,6 @@ fn folders() -> Vec<PathBuf> {
         up.push("..");
         folders.push(up.join(FOLDER));
     }
-    let own = Path::new(FOLDER);
-    folders.retain(|folder| folder == own || folder.is_dir());
     if let Some(list) = env::var_os(VARIABLE) {
         folders.extend(env::split_paths(&list).filter(|folder| !folder.as_os_str().is_empty()));
     }

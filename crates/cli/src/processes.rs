@@ -161,7 +161,8 @@ pub(crate) fn tell_last_checkpoint() {
         if ranks.rank() > 0 && lock.is_none() {
             return;
         }
-        let (shown, reached) = (folder.display(), CheckpointFolder::reached(&folder));
+        let (shown, reached) =
+            (folder.display(), CheckpointFolder::reached(&folder).ok().flatten());
         let from = reached.map_or_else(
             || format!("no checkpoint is in {shown} yet: delete it and start the run anew"),
             |step| format!("its last whole checkpoint is of step {step}: mms resume {shown} goes on from there, on any number of processes"),

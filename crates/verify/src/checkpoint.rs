@@ -67,14 +67,23 @@ impl CheckpointFolder {
         Self { path: folder.to_owned(), _lock: None }
     }
 
-    /// The step after which the last checkpoint of a folder was written, as far as its beginning tells.
-    #[must_use]
-    pub fn reached(folder: &Path) -> Option<u64> {
-        let mut file = File::open(folder.join(FILE)).ok()?;
+    /// The step after which the last checkpoint of a folder was written, as far as its beginning tells; none without a checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// Where there is one that cannot be read.
+    pub fn reached(folder: &Path) -> Result<Option<u64>, CheckpointError> {
+        let path = folder.join(FILE);
         // How it begins, what run it is of, two counts, and the step.
         let mut head = [0; MAGIC.len() + 32 + 3 * 8];
-        file.read_exact(&mut head).ok()?;
-        head.last_chunk().map(|step| u64::from_le_bytes(*step))
+        match File::open(&path).and_then(|mut file| file.read_exact(&mut head)) {
+            Ok(()) => Ok(head.last_chunk().map(|step| u64::from_le_bytes(*step))),
+            Err(cause) => match cause.kind() {
+                // Whoever goes on with a part of one is told then.
+                io::ErrorKind::NotFound | io::ErrorKind::UnexpectedEof => Ok(None),
+                _ => Err(CheckpointError::FileSystem { action: "read", path, cause }),
+            },
+        }
     }
 
     /// Where it is.
@@ -540,14 +549,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let checkpoints = checkpoints(folder.path());
         assert!(checkpoints.read(None).unwrap().is_none());
-        assert_eq!(CheckpointFolder::reached(folder.path()), None);
+        assert_eq!(CheckpointFolder::reached(folder.path()).unwrap(), None);
         for history in [vec![], history(1), history(3)] {
             checkpoints.write(None, &reached(), &history, &[&[1, 2, 3], &[]]).unwrap();
             let found = checkpoints.read(None).unwrap().unwrap();
             assert_eq!(found.reached.numbers(), reached().numbers());
             assert_eq!(numbers_of_history(&found.history), numbers_of_history(&history));
             assert_eq!(found.parts, [[vec![1, 2, 3], vec![]]]);
-            assert_eq!(CheckpointFolder::reached(folder.path()), Some(12));
+            assert_eq!(CheckpointFolder::reached(folder.path()).unwrap(), Some(12));
         }
     }
 

@@ -125,11 +125,11 @@ impl FrameWriter {
     }
 
     /// Goes on after `step` of a run with steps of `dt`, whose earlier frames are on the disk.
-    pub(crate) fn take_up(&mut self, step: u64, dt: f64) {
+    pub(crate) fn take_up(&mut self, step: u64, dt: f64) -> Result<(), Error> {
         let steps = (0..self.count).map(|frame| step_of_frame(frame, self.count, self.steps));
         let times: Vec<f64> = steps.take_while(|&s| s <= step).map(|s| s as f64 * dt).collect();
         self.next = times.len() as u64;
-        self.series.take_up(&times);
+        self.series.take_up(&times)
     }
 
     /// Writes the state after `step` if it is one of those wanted: where several processes hold the particles, a piece each, and a

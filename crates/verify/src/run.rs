@@ -445,21 +445,22 @@ where
             until: *until,
         };
         match resumed {
-            Some((reached, history)) => watch.resume(reached, history, driven.dt),
+            Some((reached, history)) => watch.resume(reached, history, driven.dt)?,
             None => watch.start(driven.solver.as_mut())?,
         }
         let begun = watch.reached.step;
         Ok((watch, begun))
     }
 
-    fn resume(&mut self, reached: Reached, history: Vec<Moment>, dt: f64) {
+    fn resume(&mut self, reached: Reached, history: Vec<Moment>, dt: f64) -> Result<(), CaseError> {
         if let Some(recorder) = &mut self.recorder {
             recorder.take_up(history);
         }
         if let Some(frames) = &mut self.frames {
-            frames.take_up(reached.step, dt);
+            frames.take_up(reached.step, dt)?;
         }
         self.reached = reached;
+        Ok(())
     }
 
     fn start(&mut self, solver: &mut (dyn Solver<T, D> + '_)) -> Result<(), CaseError> {

@@ -75,7 +75,11 @@ impl WholeFile {
     pub fn finish(self) -> io::Result<()> {
         // Some file systems report a full disk only here.
         self.temporary.as_file().sync_all()?;
-        self.temporary.persist(&self.path).map(drop).map_err(|failed| failed.error)
+        // The file is locked until it has its name.
+        let (_locked, temporary) = self.temporary.into_parts();
+        fs::rename(&temporary, &self.path)?;
+        // It is a temporary one no longer, which no file system can refuse.
+        temporary.keep().map(drop).map_err(|failed| failed.error)
     }
 
     /// Removes what killed writers of the file `path` have left beside it. What cannot be looked at or removed stays.

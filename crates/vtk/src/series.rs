@@ -58,12 +58,23 @@ impl Series {
 
     /// Adds the frames that an earlier run wrote to this folder to the list, a frame for each time; the next frame comes after them.
     /// Such frames were written whole before the state from which the run goes on, by one process or by several.
-    pub fn take_up(&mut self, times: &[f64]) {
+    ///
+    /// # Errors
+    ///
+    /// Where the file system does not tell which of them wrote a frame.
+    pub fn take_up(&mut self, times: &[f64]) -> Result<(), Error> {
         let written = |n: usize| {
             let joined = self.joined(n);
-            if self.folder.join(&joined).exists() { joined } else { self.file(n) }
+            let path = self.folder.join(&joined);
+            match path.try_exists() {
+                Ok(true) => Ok(joined),
+                Ok(false) => Ok(self.file(n)),
+                Err(cause) => Err(Error::FileSystem { action: "look at", path, cause }),
+            }
         };
-        self.listed = times.iter().enumerate().map(|(n, &time)| (time, written(n))).collect();
+        let listed = times.iter().enumerate().map(|(n, &time)| Ok((time, written(n)?)));
+        self.listed = listed.collect::<Result<_, _>>()?;
+        Ok(())
     }
 
     fn file(&self, number: usize) -> String {

@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::arguments::RunOptions;
 use crate::checksum::sha256;
+use crate::input;
 use crate::json::{self, Output};
 use crate::keep;
 use crate::processes;
@@ -89,7 +90,7 @@ pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
         return Ok(Place { folder: CheckpointFolder::of_first(folder), resume: false });
     }
     let path = folder.join(FILE);
-    if path.exists() {
+    if input::kind_of(&path).context("--checkpoint")?.is_some() {
         let shown = folder.display();
         bail!(
             "--checkpoint: {shown} holds a run already; mms resume {shown} goes on with it, and without the folder's \
@@ -100,7 +101,7 @@ pub(super) fn remember(folder: &Path, line: &[OsString]) -> Result<Place> {
         .with_context(|| format!("--checkpoint: cannot create {}", folder.display()))?;
     let locked = CheckpointFolder::lock(folder).context("--checkpoint")?;
     // Another run may have come and gone since.
-    if path.exists() {
+    if input::kind_of(&path).context("--checkpoint")?.is_some() {
         bail!("--checkpoint: {} holds a run already", folder.display());
     }
     let arguments = line.iter().skip(1).map(|argument| {

@@ -16,7 +16,9 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
     let start = recall(&options.folder)?;
     let path = options.folder.join(FILE);
     let shown = path.display();
-    let folder = take(&fs::canonicalize(&options.folder)?)?;
+    let given = options.folder.display();
+    let real = fs::canonicalize(&options.folder);
+    let folder = take(&real.with_context(|| format!("cannot enter {given}"))?)?;
     let line = ["mms".to_owned()].into_iter().chain(start.arguments);
     let arguments = Arguments::try_parse_from(line).map_err(|refusal| {
         let refusal = refusal.to_string();
@@ -30,8 +32,7 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
         format!("cannot enter {}, where the run was started", start.folder.display())
     })?;
     run.scheme.threads = options.threads.or(run.scheme.threads);
-    let given = options.folder.display();
-    match CheckpointFolder::reached(folder.path()) {
+    match CheckpointFolder::reached(folder.path())? {
         Some(step) => terminal::note(format_args!("{given}: the run goes on after step {step}")),
         None => terminal::note(format_args!("{given}: no checkpoint yet, the run begins anew")),
     }

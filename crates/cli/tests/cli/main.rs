@@ -5,6 +5,7 @@ mod command;
 mod conditions;
 mod conventions;
 mod diagnose;
+mod failing_files;
 mod fields;
 mod free_faces;
 mod generate;

@@ -110,7 +110,7 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
                 let call = 1 + below(calls[count - 2][rank]);
                 let kill = (attempt < 2).then_some((rank, call));
                 let schedule = Schedule { seed: below(1 << 30), kill };
-                let begun = CheckpointFolder::reached(folder.path());
+                let begun = CheckpointFolder::reached(folder.path()).expect("it can be read");
                 let found = simulated(count, schedule, |ranks| problem.part(folder.path(), ranks));
                 let what =
                     format!("seed {seed}, attempt {attempt}, {count} processes, {schedule:?}");

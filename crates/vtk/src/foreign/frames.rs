@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -110,8 +111,13 @@ fn folder(path: &Path) -> Result<Vec<FrameFile>, ReadError> {
     let mut files = vec![];
     for entry in fs::read_dir(path).map_err(fail)? {
         let file = entry.map_err(fail)?.path();
-        if file.is_file() {
-            files.push(file);
+        match fs::metadata(&file) {
+            Ok(kind) if kind.is_file() => files.push(file),
+            Ok(_) => {}
+            // A link that leads nowhere, or a file that has gone since.
+            Err(cause) if cause.kind() == ErrorKind::NotFound => {}
+            // Without it the recording would be another one.
+            Err(cause) => return Err(ReadError::FileSystem { path: file, cause }),
         }
     }
     files.sort_by_cached_key(|file| natural(&file.to_string_lossy()));

@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 use super::growth::Warnings;
 use crate::arguments::DiagnoseOptions;
 use crate::expect;
+use crate::input;
 use crate::json::Output;
 use crate::library::{Selection, locate};
 use crate::number;
@@ -107,12 +108,12 @@ fn expected(options: &DiagnoseOptions) -> Result<Expected> {
 
 /// An empty folder. Fields of an earlier search would be taken for those of this one.
 fn fresh(folder: &PathBuf) -> Result<PathBuf> {
-    if folder.exists() {
+    if input::kind_of(folder).context("--out")?.is_some() {
         bail!("--out: {} is there already; name another folder", folder.display());
     }
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     // Commands may change to another folder.
-    Ok(fs::canonicalize(folder)?)
+    fs::canonicalize(folder).with_context(|| folder.display().to_string())
 }
 
 /// The mistakes as a table or as JSON.

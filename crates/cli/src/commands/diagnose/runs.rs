@@ -15,6 +15,7 @@ use mmsmith_stage::Staged;
 use mmsmith_verify::{Input, Quantity, Resolution, ScoreOptions as Reading, score};
 
 use crate::commands::tabulated;
+use crate::input;
 
 /// Errors of a run: the largest at any point, by field.
 pub(super) type Errors = BTreeMap<Quantity, f64>;
@@ -131,7 +132,7 @@ impl Solver<'_> {
         };
         let out = folder.join(format!("cells-{cells}"));
         fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
-        if !fields.exists() {
+        if input::kind_of(&fields)?.is_none() {
             fs::create_dir_all(&fields).with_context(|| fields.display().to_string())?;
             for (name, text) in self.files(trial, cells)? {
                 let path = fields.join(name);
