@@ -127,6 +127,24 @@ impl Pattern {
         if self.unknowns() == 0 {
             return Ok(Factors::Cholesky);
         }
+        // Cholesky's factors are roots, whose rounding changes with the unit of the entries by odd powers of two: the largest entry is
+        // brought between one and two.
+        let unit = power_of_two(values);
+        let values: Vec<f64> = values.iter().map(|value| value / unit).collect();
+        let factors = self.solve_in_unit(&values, is_symmetric, x)?;
+        x.iter_mut().for_each(|value| *value /= unit);
+        match x.iter().all(|value| value.is_finite()) {
+            true => Ok(factors),
+            false => Err(SparseError::Singular),
+        }
+    }
+
+    fn solve_in_unit(
+        &mut self,
+        values: &[f64],
+        is_symmetric: bool,
+        x: &mut [f64],
+    ) -> Result<Factors, SparseError> {
         if is_symmetric && self.by_cholesky(values, x)? {
             return Ok(Factors::Cholesky);
         }
@@ -140,10 +158,7 @@ impl Pattern {
         let factors =
             Lu::try_new_with_symbolic(symbolic, matrix).map_err(|_| SparseError::Singular)?;
         factors.solve_in_place(MatMut::from_column_major_slice_mut(x, columns.ncols(), 1));
-        match x.iter().all(|value| value.is_finite()) {
-            true => Ok(Factors::Elimination),
-            false => Err(SparseError::Singular),
-        }
+        Ok(Factors::Elimination)
     }
 
     /// Whether Cholesky's factors exist; the solution is in `x` then.
@@ -170,9 +185,39 @@ impl Pattern {
     }
 }
 
+/// The power of two of the largest magnitude; one where there is none.
+fn power_of_two(values: &[f64]) -> f64 {
+    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    // Its sign and exponent alone.
+    let power = f64::from_bits(largest.to_bits() & f64::INFINITY.to_bits());
+    if power.is_normal() { power } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn solutions_scale_with_the_unit_of_the_matrix_to_the_bit() {
+        let mut pattern = chain(30);
+        let spring = |i: usize, j: usize| if i == j { 2.3 + i as f64 } else { -1.1 };
+        let drift = |i: usize, j: usize| spring(i, j) + if i < j { 0.3 } else { 0.0 };
+        for (entry, is_symmetric) in
+            [(&spring as &dyn Fn(usize, usize) -> f64, true), (&drift, false)]
+        {
+            let mut solve = |power: i32| {
+                let unit = 2.0_f64.powi(power);
+                let values = values(&pattern, |i, j| unit * entry(i, j));
+                let mut x: Vec<f64> = (0..30).map(|i| f64::from(i) * 0.7 - 5.1).collect();
+                let factors = pattern.solve(&values, is_symmetric, &mut x).unwrap();
+                (factors, x.iter().map(|x| (x * unit).to_bits()).collect::<Vec<_>>())
+            };
+            let usual = solve(0);
+            for power in [-301, -7, 1, 4, 33] {
+                assert_eq!(solve(power), usual, "2^{power}");
+            }
+        }
+    }
 
     /// A chain of springs, each node with the next; the first held.
     fn chain(size: usize) -> Pattern {

@@ -23,5 +23,7 @@ mod revolution;
 mod staged;
 mod statics;
 mod structure;
+mod symmetries;
 mod tangents;
+mod units;
 mod updated_frame;
