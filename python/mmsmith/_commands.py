@@ -11,7 +11,7 @@ from mmsmith._invoke import Named, Progress, invoke, named
 from mmsmith._results import Check, Convergence, Result, Run, Score, Stability, Tradeoff
 
 #: The commands that write JSON.
-WITH_JSON = frozenset({"list", "explain", "coverage", "check", "eval", "run", "converge", "stability", "tradeoff", "score", "diagnose"})
+WITH_JSON = frozenset({"list", "explain", "coverage", "check", "eval", "run", "converge", "stability", "tradeoff", "score", "diagnose", "doctor"})
 
 #: The commands that take values of parameters.
 WITH_SET = frozenset({"check", "gen", "eval", "run", "converge", "stability", "tradeoff", "score", "diagnose"})

@@ -6,6 +6,7 @@ mod check;
 mod converge;
 mod coverage;
 mod diagnose;
+mod doctor;
 mod eval;
 mod explain;
 mod generate;
@@ -38,6 +39,7 @@ pub(crate) use check::CheckOptions;
 pub(crate) use converge::ConvergeOptions;
 pub(crate) use coverage::CoverageOptions;
 pub(crate) use diagnose::DiagnoseOptions;
+pub(crate) use doctor::DoctorOptions;
 pub(crate) use eval::EvalOptions;
 pub(crate) use explain::ExplainOptions;
 pub(crate) use generate::GenerateOptions;
@@ -142,6 +144,8 @@ pub(crate) enum Command {
     Batch(BatchOptions),
     /// Repeat the study of Wallstedt and Guilkey on both of its problems, with a report, tables, data and particle files
     Reproduce(ReproduceOptions),
+    /// Look whether this machine gives the published bits of small runs, and what makes runs slow here
+    Doctor(DoctorOptions),
     /// Serve programs that speak the model context protocol: list, explain, check, derive, gen, score and diagnose as tools
     Serve(ServeOptions),
     /// Write the script that completes commands, options and names of solutions in a shell

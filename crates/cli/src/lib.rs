@@ -165,6 +165,7 @@ fn perform(arguments: &Arguments, given: &[OsString]) -> anyhow::Result<bool> {
         Command::Diagnose(options) => commands::diagnose(options),
         Command::Tradeoff(options) => commands::tradeoff(options),
         Command::Reproduce(options) => commands::reproduce(options),
+        Command::Doctor(options) => commands::doctor(options),
         Command::Serve(options) => commands::serve(options),
         Command::Completions(options) => commands::completions(options),
         Command::Man(options) => commands::man(options),

@@ -25,7 +25,8 @@ pub(crate) fn available() -> f64 {
     told().unwrap_or(UNKNOWN)
 }
 
-fn told() -> Option<f64> {
+/// Bytes that can be had without swapping, where the system tells.
+pub(crate) fn told() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

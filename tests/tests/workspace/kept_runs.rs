@@ -5,7 +5,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+use mmsmith_digest::{kept as lines, published, repeat};
 use mmsmith_tests::{mms, outcome, workspace};
+use mmsmith_verify::Registers;
 use serde_json::{Value, json};
 use std::fs;
 
@@ -42,4 +44,25 @@ fn runs_of_every_kind_keep_their_errors_to_the_bit() {
         .map(|(expected, found)| format!("expected {expected}\n   found {found}"))
         .collect();
     assert!(differing.is_empty(), "{}", differing.join("\n"));
+}
+
+/// Every run that `mms doctor` repeats: with the widest registers on one thread, and with none on three.
+#[test]
+fn small_runs_have_the_published_bits_with_all_registers_and_threads() {
+    let widest = *Registers::present().last().unwrap();
+    let found = [(widest, 1), (Registers::Scalar, 3)].map(|(registers, threads)| {
+        registers.use_at_most();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let found = pool.install(|| repeat(&mut |_, _| ())).unwrap();
+        Registers::Avx2.use_at_most();
+        found
+    });
+    assert_eq!(found[0], found[1]);
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(workspace().join("crates/digest/src/kept.txt"), lines(&found[0])).unwrap();
+        return;
+    }
+    let differing: Vec<_> = found[0].iter().filter(|run| !run.is_same()).collect();
+    assert!(differing.is_empty(), "{differing:?}");
+    assert_eq!(published().count(), found[0].len());
 }

@@ -14,14 +14,14 @@ const GROUPS: [(&str, &[&str]); 5] = [
         "Simulate with the material point solver",
         &["run", "resume", "converge", "stability", "tradeoff", "reproduce"],
     ),
-    ("Other", &["batch", "serve", "completions", "man", "help"]),
+    ("Other", &["batch", "doctor", "serve", "completions", "man", "help"]),
 ];
 
 /// A command line, and the purpose it serves.
 type Example = (&'static str, &'static str);
 
 /// Examples of each command.
-const EXAMPLES: [(&str, &[Example]); 19] = [
+const EXAMPLES: [(&str, &[Example]); 20] = [
     (
         "list",
         &[
@@ -132,6 +132,13 @@ const EXAMPLES: [(&str, &[Example]); 19] = [
         ],
     ),
     ("reproduce", &[("mms reproduce --out study", "everything, in minutes")]),
+    (
+        "doctor",
+        &[
+            ("mms doctor", "five seconds after an installation"),
+            ("mms doctor --folder /scratch/study", "a folder for studies on several machines"),
+        ],
+    ),
     (
         "serve",
         &[

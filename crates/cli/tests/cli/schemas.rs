@@ -128,6 +128,7 @@ fn every_command_keeps_to_its_schema() {
         ("coverage ring bar", 0),
         ("eval axis-aligned-1d --points points.json", 0),
         ("list", 0),
+        ("doctor", 0),
         ("diagnose --list", 0),
     ] {
         let called = mms(at, &format!("{call} --json made.json"));
