@@ -332,8 +332,10 @@ impl Ledger {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(source) => return Err(error("open", &path)(source)),
             };
-            if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
-                return Ok(false);
+            match file.try_lock_shared() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Ok(false),
+                Err(TryLockError::Error(source)) => return Err(error("lock", &path)(source)),
             }
         }
         Ok(true)
