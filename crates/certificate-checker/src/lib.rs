@@ -64,9 +64,16 @@ pub enum Refusal {
     },
 }
 
+/// The form of certificates that this version reads.
+const SCHEMA: &str = "mmsmith.certificate/1";
+
+#[derive(Deserialize)]
+struct Form {
+    schema: String,
+}
+
 #[derive(Deserialize)]
 struct Certificate {
-    schema: String,
     solution: String,
     factor: f64,
     remainder: f64,
@@ -111,9 +118,15 @@ fn claim(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), Refusal>
 ///
 /// [`Refusal`] with the first fault.
 pub fn check(text: &str) -> Result<Checked, Refusal> {
-    let stated: Certificate =
-        serde_json::from_str(text).map_err(|error| Refusal::Form(error.to_string()))?;
-    claim(stated.schema == "mmsmith.certificate/1", || "its schema is another".into())?;
+    let refused = |error: serde_json::Error| Refusal::Form(error.to_string());
+    let Form { schema } = serde_json::from_str(text).map_err(refused)?;
+    claim(schema == SCHEMA, || match schema.starts_with("mmsmith.certificate/") {
+        true => {
+            format!("its form is '{schema}', of a later version of mms; this one knows '{SCHEMA}'")
+        }
+        false => "its schema is another".into(),
+    })?;
+    let stated: Certificate = serde_json::from_str(text).map_err(refused)?;
     claim(stated.steps_of_factor == STEPS, || "its letters mean other factors".into())?;
     claim((0.0..=LARGEST_REMAINDER).contains(&stated.remainder), || {
         format!("its remainder is above {LARGEST_REMAINDER:e}")

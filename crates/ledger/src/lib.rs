@@ -12,6 +12,9 @@
 //!   that the folder may lie on a file system of many machines. Its lines are read when a ledger or a shard is opened. Damaged lines
 //!   are reported, and stay.
 //!
+//! A line of another form begins with `{"format":` and its number. No version writes one yet; a folder that has some is refused as one of a
+//! later version, and nothing in it is changed.
+//!
 //! A process that is killed loses the cases that it had claimed and not finished, and no others: its locks vanish with
 //! it, and a line that it had not written whole is set aside. Lines are handed to the system one by one and not forced
 //! onto the disk, so a power failure may cost the last few.
@@ -117,6 +120,15 @@ pub enum LedgerError {
         path: PathBuf,
         /// Why it failed.
         cause: io::Error,
+    },
+    /// A later version wrote lines in a form that this one does not know. Nothing is changed then.
+    #[error(
+        "{} was written by a later version of mmsmith, in a form that this one does not know: use that version, or another folder",
+        path.display()
+    )]
+    LaterVersion {
+        /// The file.
+        path: PathBuf,
     },
     /// The cases of a shard have another origin, so that their results may differ.
     #[error("{} has cases of another origin: {found}, not {expected}", path.display())]
@@ -264,6 +276,7 @@ impl Ledger {
                 Ok(Some((key, value))) => {
                     state.values.entry(key).or_insert(value);
                 }
+                Err(line::LATER) => return Err(LedgerError::LaterVersion { path }),
                 Err(problem) => {
                     let moved_to = Some(self.damaged_file());
                     let damage = Damage { file: path.clone(), line: number, problem, moved_to };

@@ -11,6 +11,9 @@ const DIGITS: usize = 16;
 
 /// The last line has no end: its writer was killed, or the disk was full.
 pub(crate) const TORN: &str = "the line is cut short";
+/// The line has another form, which it names: `{"format":2,...`. Lines of this version have none.
+pub(crate) const LATER: &str = "the line has the form of a later version";
+const LATER_BEGINS: &[u8] = b"{\"format\":";
 const NO_CASE: &str = "this is not the line of a case: it does not start with a checksum";
 const WRONG_SUM: &str = "the checksum does not fit the line";
 const NO_KEY: &str = "the line has no key or no value";
@@ -23,6 +26,9 @@ pub(crate) fn write(key: &str, value: &Value) -> String {
 
 /// Key and value of a line without its end, or the fault of the line.
 pub(crate) fn read(line: &[u8]) -> Result<(String, Value), &'static str> {
+    if line.starts_with(LATER_BEGINS) {
+        return Err(LATER);
+    }
     let rest = line.strip_prefix(BEFORE.as_bytes()).ok_or(NO_CASE)?;
     let (found, rest) = rest.split_at_checked(DIGITS).ok_or(NO_CASE)?;
     let content = rest.strip_prefix(AFTER.as_bytes()).ok_or(NO_CASE)?;

@@ -102,9 +102,15 @@ impl Shard {
         match fs::read(&cases) {
             // The ledger itself reports its damaged lines.
             Ok(bytes) => {
-                lines(&bytes).filter_map(|(_, line)| line.ok()).for_each(|(key, value)| {
-                    found.values.entry(key).or_insert(value);
-                })
+                for (_, outcome) in lines(&bytes) {
+                    match outcome {
+                        Ok((key, value)) => {
+                            found.values.entry(key).or_insert(value);
+                        }
+                        Err(line::LATER) => return Err(LedgerError::LaterVersion { path: cases }),
+                        Err(_) => {}
+                    }
+                }
             }
             Err(cause) if cause.kind() == ErrorKind::NotFound => {}
             Err(cause) => return Err(error("read", &cases)(cause)),
@@ -207,6 +213,7 @@ pub(crate) fn read_all(folder: &Path, origin: &Value) -> Result<Found, LedgerErr
                 }
                 // The shard may be writing this line now, or was killed while it wrote.
                 Err(line::TORN) => {}
+                Err(line::LATER) => return Err(LedgerError::LaterVersion { path }),
                 Err(problem) => found.damaged.push(Damage {
                     file: path.clone(),
                     line: number,
@@ -317,6 +324,26 @@ mod tests {
                 (path.file_name().unwrap(), found),
                 ("cases-1-of-2.jsonl".as_ref(), &json!("one"))
             );
+        }
+    }
+
+    #[test]
+    fn lines_of_a_later_version_are_refused_and_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let later = "{\"format\":2,\"case\":[1,2]}\n";
+        for name in [CASES, "cases-2-of-2.jsonl"] {
+            let path = folder.path().join(name);
+            fs::write(&path, later).unwrap();
+            let name = ShardName::new(1, 2).unwrap();
+            for error in [
+                crate::Ledger::open(folder.path(), &json!("one")).unwrap_err(),
+                Shard::open(folder.path(), name, &json!("one")).unwrap_err(),
+            ] {
+                assert!(error.to_string().contains("a later version of mmsmith"), "{error}");
+            }
+            assert_eq!(fs::read_to_string(&path).unwrap(), later);
+            assert!(!folder.path().join("damaged.jsonl").exists());
+            fs::remove_file(&path).unwrap();
         }
     }
 

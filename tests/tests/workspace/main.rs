@@ -7,6 +7,7 @@ mod claims;
 mod high_order;
 mod hostile_text;
 mod kept_runs;
+mod lasting_files;
 mod laws;
 mod library;
 mod memory;

@@ -61,12 +61,17 @@ pub(super) fn recall(folder: &Path) -> Result<Start> {
              anew"
         );
     };
-    let start: Start = serde_json::from_str(&text)
-        .with_context(|| format!("{shown} is not what mms run --checkpoint writes"))?;
-    if start.schema != SCHEMA {
-        bail!("{shown} is of the form '{}', not '{SCHEMA}'", start.schema);
+    let other = || format!("{shown} is not what mms run --checkpoint writes");
+    let value: Value = serde_json::from_str(&text).with_context(other)?;
+    match value["schema"].as_str() {
+        Some(SCHEMA) => serde_json::from_value(value).with_context(other),
+        Some(later) if later.starts_with("mmsmith.checkpoint/") => {
+            bail!(
+                "{shown} is of the form '{later}', of a later version of mms: resume with that one"
+            )
+        }
+        _ => bail!("{}", other()),
     }
-    Ok(start)
 }
 
 /// The folder, for this run alone: the first of its processes locks it.

@@ -142,3 +142,30 @@ fn every_command_keeps_to_its_schema() {
         assert!(found.is_empty(), "mms {call}:\n{}", found.join("\n"));
     }
 }
+
+/// A schema that asks for no key: keys were added since.
+fn without_required(schema: &Value) -> Value {
+    match schema {
+        Value::Object(all) => {
+            let kept = all.iter().filter(|(key, value)| *key != "required" || !value.is_array());
+            kept.map(|(key, value)| (key.clone(), without_required(value))).collect()
+        }
+        Value::Array(all) => all.iter().map(without_required).collect(),
+        other => other.clone(),
+    }
+}
+
+#[test]
+fn documents_of_earlier_versions_have_no_keys_that_this_one_lacks() {
+    let kept = committed().join("../../../../tests/data/kept");
+    for version in std::fs::read_dir(kept).unwrap() {
+        let documents = version.unwrap().path().join("documents");
+        for name in command::names(&documents) {
+            let document = read_json(&documents.join(&name));
+            let schema = without_required(&read_json(&committed().join(&name)));
+            let mut found = Vec::new();
+            problems(&document, (&schema, &schema), "$", &mut found);
+            assert!(found.is_empty(), "{}/{name}:\n{}", documents.display(), found.join("\n"));
+        }
+    }
+}
