@@ -5,7 +5,7 @@
 //!
 //! Source: L. N. Trefethen, "Approximation Theory and Approximation Practice", SIAM (2013), chapters 3 to 8.
 
-use std::f64::consts::PI;
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ pub struct Grid<const D: usize> {
 
 /// Roots of the Chebyshev polynomial of degree `n`, ascending, from -1 to 1.
 pub(crate) fn roots(n: usize) -> Vec<f64> {
-    (0..n).map(|k| -(PI * (k as f64 + 0.5) / n as f64).cos()).collect()
+    (0..n).map(|k| -((k as f64 + 0.5) / n as f64).cos_pi()).collect()
 }
 
 /// The Chebyshev polynomials at a place between -1 and 1.
@@ -59,8 +59,8 @@ impl Transform {
         let entry = |k: usize, j: usize| {
             // The roots ascend, their angles descend. Whole turns are left out before there is any rounding.
             let quarters = k * (2 * (n - 1 - j) + 1) % (4 * n);
-            let angle = PI * quarters as f64 / (2 * n) as f64;
-            angle.cos() * if k == 0 { 1.0 } else { 2.0 } / n as f64
+            let cosine = (quarters as f64 / (2 * n) as f64).cos_pi();
+            cosine * if k == 0 { 1.0 } else { 2.0 } / n as f64
         };
         let matrix = (0..n * n).map(|place| entry(place / n, place % n)).collect();
         Self { n, matrix }
@@ -492,7 +492,7 @@ fn outwards<const D: usize>(range: &[[f64; 2]; D], X: [f64; D]) -> [f64; D] {
     std::array::from_fn(|axis| {
         let [low, high] = range[axis];
         let share = (X[axis] - low) / (high - low);
-        low + (high - low) * 0.5 * (1.0 - (PI * share).cos())
+        low + (high - low) * 0.5 * (1.0 - share.cos_pi())
     })
 }
 
