@@ -19,6 +19,7 @@ mod list;
 mod picture;
 mod predict;
 mod problem;
+mod profile;
 mod python;
 mod remedy;
 mod reproduce;

@@ -164,6 +164,7 @@ mod step;
 pub use domain::Shape;
 pub use error::{SetupError, StepError};
 pub use grid::Grid;
+pub use grid::division::Division;
 pub use mmsmith_lanes::simd::Registers;
 #[doc(hidden)]
 pub use mmsmith_laws::fault;
@@ -182,3 +183,4 @@ pub use scheme::{Integrator, Settings, Transfer};
 pub use simulation::{Simulated, Simulation};
 pub use solver::{Scalar, Solver};
 pub use step::body_force::{AtTime, BodyForce, NoBodyForce};
+pub use step::passes::{Pass, PassTime, Profile};

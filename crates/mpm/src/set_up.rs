@@ -6,6 +6,7 @@ use mmsmith_laws::{AnyLaw, Law, Material, NeoHookean, NeoHookeanNoLog};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::domain::corners::Corners;
+use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::SharedCorners;
 use crate::domain::{self, Shape};
 use crate::error::SetupError;
@@ -13,6 +14,7 @@ use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::grid::state::GridState;
+use crate::grid::tiles::Tiles;
 use crate::grid::{Grid, Layout};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
@@ -24,6 +26,7 @@ use crate::particles::mesh::Interpolation;
 use crate::processes::decomposition::{LocalBody, Share, admit};
 use crate::scheme::{Settings, VelocityUpdate};
 use crate::step::is_fused;
+use crate::step::passes::Passes;
 use crate::step::state::{EarlyState, State};
 
 /// A value for error messages, of any scalar type.
@@ -208,11 +211,14 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
     let mut layout = Layout::new(grid, bytes_per_node)?;
     let points = corners.as_ref().map_or(count, SharedCorners::count);
-    let mut bins = Bins::new(&layout, points);
+    let most_nodes = match &corners {
+        Some(corners) => Domain::<T, D>::most_nodes(&corners.at_corner),
+        None => domain.most_nodes(),
+    };
+    let tiles = Tiles::new(&layout, &grid.cells, most_nodes);
     let part = share.map(LocalBody::new);
     if let Some(part) = &part {
-        admit(part.ranks.count(), &layout, bins.rows())?;
-        bins.share_out(part.ranks.clone());
+        admit(part.ranks.count(), &layout, &tiles)?;
         // The first sort tells which rows this process holds.
         layout.hold(0..1);
     }
@@ -224,6 +230,10 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     };
     let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
     let means = nodes(projects)?;
+    let mut bins = Bins::new(tiles, points);
+    if let Some(part) = &part {
+        bins.share_out(part.ranks.clone());
+    }
     let Particles { mass, volume, .. } = &particles;
     let least = |numbers: &mut dyn Iterator<Item = T>| {
         let least = numbers.reduce(|least, number| least.min(number));
@@ -241,7 +251,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
     });
     let grid = GridState {
-        constants: Constants::new(grid, &layout, &bins, settings.time_step, least_mass),
+        constants: Constants::new(grid, &layout, &tiles, settings.time_step, least_mass),
         nodes: now,
         reprojected,
         next,
@@ -271,6 +281,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         early,
         buffers,
         of_time,
+        passes: Passes::default(),
     })
 }
 

@@ -25,6 +25,7 @@ use crate::shape::one_axis::HALF_SIZE_LIMIT;
 use crate::step::StepTimes;
 use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome};
+use crate::step::passes::Profile;
 use crate::step::state::State;
 
 /// A running simulation.
@@ -198,6 +199,17 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         self.steps_done += 1;
         Ok(())
+    }
+
+    /// Takes the times of passes from now on.
+    pub(crate) fn take_times(&mut self) {
+        self.state.passes.begin();
+    }
+
+    /// Where the time of steps went, and how many threads they keep busy.
+    pub(crate) fn profile(&self) -> Profile {
+        let GridState { bins, layout, .. } = &self.state.grid;
+        Profile { passes: self.state.passes.times(), division: bins.division(layout) }
     }
 
     /// The particles at the current time; their velocities lag by [`velocity_lag`](Self::velocity_lag). With shared corners and several

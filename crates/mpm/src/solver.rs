@@ -14,6 +14,7 @@ use crate::processes::saved_state::{SavedState, SavedStateError};
 use crate::scheme::Settings;
 use crate::simulation::{Simulated, Simulation};
 use crate::step::body_force::BodyForce;
+use crate::step::passes::Profile;
 
 /// A solver that can be stepped and looked at.
 pub trait Solver<T, const D: usize> {
@@ -35,6 +36,14 @@ pub trait Solver<T, const D: usize> {
 
     /// How far velocities lag behind positions, a time.
     fn velocity_lag(&self) -> T;
+
+    /// Takes the times of passes from now on, where the solver has such. Default: it has none.
+    fn take_times(&mut self) {}
+
+    /// Where the time of steps went since then. Default: nothing is known.
+    fn profile(&self) -> Profile {
+        Profile::default()
+    }
 
     /// The state between two steps, see [`Simulation::state`].
     fn state(&self) -> Vec<&[u8]>;
@@ -66,6 +75,14 @@ impl<T: Scalar<D>, const D: usize> Solver<T, D> for Simulation<T, D> {
 
     fn velocity_lag(&self) -> T {
         Simulation::velocity_lag(self)
+    }
+
+    fn take_times(&mut self) {
+        Simulation::take_times(self);
+    }
+
+    fn profile(&self) -> Profile {
+        Simulation::profile(self)
     }
 
     fn state(&self) -> Vec<&[u8]> {

@@ -93,11 +93,6 @@ enum Next {
     Done,
 }
 
-/// The number of segments of `segment_length` in `length`, and so of bands; the last segment has the remainder as well.
-pub fn count(length: usize, segment_length: usize) -> usize {
-    (length / segment_length.max(1)).max(1)
-}
-
 /// Whether a band comes after its neighbours. The band of the last segment has the first colour, so that the band before it
 /// completes both.
 fn is_second_color(segments: usize, segment: usize) -> bool {
@@ -197,8 +192,8 @@ pub struct ColoredBands<'a, N> {
     schedule: Mutex<&'a mut Schedule>,
     of: Held,
     first: *mut N,
-    length: usize,
-    segment_length: usize,
+    /// The index of the first element of each segment here, and the number of elements.
+    starts: Vec<usize>,
     borrowed: PhantomData<&'a mut [N]>,
 }
 
@@ -207,26 +202,24 @@ pub struct ColoredBands<'a, N> {
 unsafe impl<N: Send> Sync for ColoredBands<'_, N> {}
 
 impl<'a, N> ColoredBands<'a, N> {
-    /// The bands `of` of an array, for segments of `segment_length` elements; the last one of all has the remainder as well. `array`
-    /// are the segments that they cover. `schedule` is a buffer; its contents do not matter.
+    /// The bands `of` of an array, for segments of any lengths. `array` are the segments that they cover, and `starts` the index of the
+    /// first element of each of these, with the number of elements at the end. `schedule` is a buffer; its contents do not matter.
     ///
     /// # Panics
     ///
     /// Where `array` does not have the elements of those segments.
     pub fn new(
         array: &'a mut [N],
-        segment_length: usize,
+        starts: Vec<usize>,
         of: Held,
         schedule: &'a mut Schedule,
     ) -> Self {
         // What the unsafe code relies on.
-        let least = of.segments().len() * segment_length;
-        let is_open = of.segments().end < of.all;
-        assert!(if is_open { array.len() == least } else { of.all == 1 || array.len() >= least });
+        assert!(starts.is_sorted() && starts.len() == of.segments().len() + 1);
+        assert!(starts.first() == Some(&0) && starts.last() == Some(&array.len()));
         schedule.start(&of);
-        let (first, length) = (array.as_mut_ptr(), array.len());
-        let schedule = Mutex::new(schedule);
-        Self { schedule, of, first, length, segment_length, borrowed: PhantomData }
+        let (first, schedule) = (array.as_mut_ptr(), Mutex::new(schedule));
+        Self { schedule, of, first, starts, borrowed: PhantomData }
     }
 
     /// The segments that bands of other processes cover as well.
@@ -237,7 +230,7 @@ impl<'a, N> ColoredBands<'a, N> {
     /// All elements, while no thread holds a band.
     pub fn all(&mut self) -> &mut [N] {
         // SAFETY: the array is borrowed for 'a, and bands that are held borrow `self`, which is exclusive here.
-        unsafe { slice::from_raw_parts_mut(self.first, self.length) }
+        unsafe { slice::from_raw_parts_mut(self.first, self.range(self.of.segments()).len()) }
     }
 
     /// Lets `fill` put the sums of another process in place, whose band comes first in a shared segment; that band has released the
@@ -292,11 +285,8 @@ impl<'a, N> ColoredBands<'a, N> {
 
     /// The indices of the elements in some segments, of those here.
     fn range(&self, segments: Range<usize>) -> Range<usize> {
-        let Range { start, end } = self.of.segments();
-        let index = |segment| {
-            if segment < end { (segment - start) * self.segment_length } else { self.length }
-        };
-        index(segments.start)..index(segments.end)
+        let first = self.of.segments().start;
+        self.starts[segments.start - first]..self.starts[segments.end - first]
     }
 }
 
@@ -316,8 +306,8 @@ impl<N> Band<'_, '_, N> {
     pub fn elements(&mut self) -> (&mut [N], usize) {
         let Self { bands, segment } = *self;
         let range = bands.range(covered(bands.of.all, segment));
-        // SAFETY: the range lies in the array, which is borrowed for 'a: segments ascend to at most the last one here, and with them
-        // `ColoredBands::range` to the length of the array, which `ColoredBands::new` has compared with their number. A band is handed out once (`taken`), and a segment is covered
+        // SAFETY: the range lies in the array, which is borrowed for 'a: `starts` ascends from 0 to the
+        // length of the array, which `ColoredBands::new` has checked. A band is handed out once (`taken`), and a segment is covered
         // by two bands at most, neighbours, of which one has the first colour and one the second. The second is handed out
         // after the first has released all that both cover (`is_ready`), which it does when it is dropped. So no two bands
         // that are held overlap. Writes of one are visible to the next: both pass through the mutex. `&mut self` lets one
@@ -373,6 +363,13 @@ mod tests {
     /// Lengths of segments and of arrays: one segment, a last one with more than the others, an even and an odd number.
     const ARRAYS: [(usize, usize); 6] = [(3, 1), (3, 3), (3, 8), (3, 9), (2, 11), (4, 22)];
 
+    /// Where segments of a length start, of which the last one has the remainder as well.
+    fn starts(segment_length: usize, length: usize) -> Vec<usize> {
+        let count = (length / segment_length).max(1);
+        let starts = (0..count).map(|segment| segment * segment_length);
+        starts.chain([length]).collect()
+    }
+
     /// The bands as one of some threads takes them, alone.
     fn alone(segments: usize, thread: (usize, usize)) -> Vec<usize> {
         let mut schedule = Schedule::default();
@@ -409,7 +406,7 @@ mod tests {
         let mut schedule = Schedule::default();
         // Bands 1 and 3 are of the second colour.
         let held = Held { bands: 1..4, all: 7 };
-        let mut bands = ColoredBands::new(&mut array, 2, held, &mut schedule);
+        let mut bands = ColoredBands::new(&mut array, starts(2, 8), held, &mut schedule);
         let shared: Vec<Shared> = bands.shared().collect();
         assert_eq!(shared.iter().map(|shared| shared.segment).collect::<Vec<_>>(), [1, 4]);
         let next = |bands: &ColoredBands<'_, i32>| {
@@ -484,12 +481,9 @@ mod tests {
                 // Contents left over from an earlier run do not matter.
                 let mut array: Vec<_> = (7..7 + length as u64).collect();
                 let completed = Mutex::new(vec![0; length]);
-                let bands = ColoredBands::new(
-                    &mut array,
-                    segment_length,
-                    Held::whole(count(length, segment_length)),
-                    &mut schedule,
-                );
+                let starts = starts(segment_length, length);
+                let held = Held::whole(starts.len() - 1);
+                let bands = ColoredBands::new(&mut array, starts, held, &mut schedule);
                 std::thread::scope(|scope| {
                     for thread in 0..threads {
                         let (bands, completed) = (&bands, &completed);
@@ -532,7 +526,7 @@ mod tests {
     #[test]
     fn a_thread_that_holds_a_band_itself_is_not_kept_waiting_for_ever() {
         let (mut array, mut schedule) = ([0; 6], Schedule::default());
-        let bands = ColoredBands::new(&mut array, 2, Held::whole(3), &mut schedule);
+        let bands = ColoredBands::new(&mut array, starts(2, 6), Held::whole(3), &mut schedule);
         let first = bands.take((0, 1)).unwrap();
         let third = bands.take((0, 1)).unwrap();
         assert_eq!((first.segment(), third.segment()), (0, 2));
@@ -545,7 +539,7 @@ mod tests {
     #[test]
     fn a_panic_releases_a_band() {
         let (mut array, mut schedule) = ([0; 4], Schedule::default());
-        let bands = ColoredBands::new(&mut array, 2, Held::whole(2), &mut schedule);
+        let bands = ColoredBands::new(&mut array, starts(2, 4), Held::whole(2), &mut schedule);
         let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let band = bands.take((0, 1)).unwrap();
             panic!("{}", band.segment());

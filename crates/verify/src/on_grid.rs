@@ -1,6 +1,7 @@
 //! A case on its grid, in its dimension and the precision of its solver.
 
 use mmsmith_measure::norms::PerField;
+use mmsmith_mpm::Division;
 use mmsmith_runtime::Solution;
 
 use crate::case::{Case, CflSpeed, Extent, law_of_body};
@@ -25,6 +26,8 @@ pub struct Plan {
     /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size,
     /// or of its largest coordinate, at each step, added up as a random walk.
     pub round_off: f64,
+    /// How many threads a step keeps busy, of a body that fills its grid; in the updated formulation.
+    pub division: Option<Division>,
 }
 
 impl Plan {
@@ -90,7 +93,12 @@ where
             }
         };
         let round_off = self.rounding() * (steps.count as f64).sqrt();
-        Ok(Plan { steps: steps.count, particles, bytes, extent: scene.extent(), round_off })
+        let division = match &case.scheme {
+            Scheme::Updated(_) => Some(Division::of_lattice(&scene.grid::<f64>(), per_cell)?),
+            Scheme::Total(_) => None,
+        };
+        let (steps, extent) = (steps.count, scene.extent());
+        Ok(Plan { steps, particles, bytes, extent, round_off, division })
     }
 
     /// The rounding error of a position, a length: half a unit in the last place.

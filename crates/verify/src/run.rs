@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mmsmith_measure::norms::{Field, PerField, PerNorm, magnitude};
-use mmsmith_mpm::{Solver, StepError};
+use mmsmith_mpm::{Profile, Solver, StepError};
 use mmsmith_ranks::{Ranks, Sent, Traffic, counted};
 use mmsmith_runtime::Solution;
 use serde::ser::SerializeStruct;
@@ -56,6 +56,8 @@ pub struct Outputs<'a> {
     pub ranks: Option<Arc<dyn Ranks>>,
     /// Where it is said what this process sent to the others, if that is wanted.
     pub traffic: Option<&'a mut RunTraffic>,
+    /// Where it is said how long the passes of steps took, and how many threads they keep busy, if that is wanted.
+    pub profile: Option<&'a mut Profile>,
     /// When to give up: a run that is still under way then ends after its step with [`Status::Cut`].
     pub until: Option<Instant>,
 }
@@ -71,6 +73,7 @@ impl<'a> Outputs<'a> {
             history: None,
             ranks: None,
             traffic: None,
+            profile: None,
             until: None,
         }
     }
@@ -299,7 +302,10 @@ where
     }
     let mut driven = Driven::set_up(on_grid, steps.dt, of_steps.as_ref())?;
     let end = steps.count as f64 * driven.dt;
-    let traffic = outputs.traffic.take();
+    let (traffic, profile) = (outputs.traffic.take(), outputs.profile.take());
+    if profile.is_some() {
+        driven.solver.take_times();
+    }
     let (mut watch, begun) = Watch::begin(on_grid, &mut driven, outputs)?;
     let before = counters.as_ref().map(|counters| counters.until(begun));
     let outcome = driven.advance(begun + 1..=steps.count, &mut |stepped| watch.look(stepped))?;
@@ -307,6 +313,9 @@ where
         *traffic = counters.until(watch.reached.step) - before;
     }
     let mut row = watch.row(driven.dt, outcome);
+    if let Some(profile) = profile {
+        *profile = driven.solver.profile();
+    }
     if row.status == Status::Ok {
         let rounding = Rounding { of_position: on_grid.rounding(), steps: steps.count };
         row.status = judged(exact, &row.errors, end, rounding);

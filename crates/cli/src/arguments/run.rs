@@ -37,6 +37,9 @@ pub(crate) struct RunOptions {
     /// to 1000 evenly spread steps; --json then has them too
     #[arg(long, value_name = "FILE")]
     pub(crate) history: Option<PathBuf>,
+    /// Say how long each pass of the steps took, and how many threads the tiles of particles keep busy
+    #[arg(long)]
+    pub(crate) profile: bool,
     /// Draw the difference of the energy from the exact one over time to this SVG file
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::coverage::{POINTS, THRESHOLD};
 use super::growth::{MOST_GROWTH_WORK, Told};
 use super::problem::Problem;
-use super::{blind, predict};
+use super::{blind, predict, profile};
 use crate::arguments::{ExplainOptions, SchemeOptions};
 use crate::json::Output;
 use crate::library::{Selection, Subject, specification};
@@ -229,7 +229,7 @@ fn runs(predicted: &Predicted, choice: &str) -> String {
         Ok(rows) => rows,
         Err(reason) => return format!("\nnot simulated with the default scheme: {reason}\n"),
     };
-    let header = ["cells", "particles", "steps", "stepping", "in all", "memory"];
+    let header = ["cells", "particles", "steps", "stepping", "in all", "memory", "threads of use"];
     let mut table = Table::new(0, header);
     for (cells, plan, cost) in rows {
         table.row([
@@ -239,6 +239,7 @@ fn runs(predicted: &Predicted, choice: &str) -> String {
             predict::duration(cost.steps_s),
             predict::duration(cost.total_s),
             predict::amount(plan.bytes),
+            plan.division.map_or_else(String::new, |of| number::rounded(of.cores, 2)),
         ]);
     }
     format!(
@@ -288,6 +289,7 @@ fn document(
                 "steps_s": cost.steps_s,
                 "total_s": cost.total_s,
                 "bytes": plan.bytes,
+                "division": plan.division.as_ref().map(profile::division_document),
             })
         };
         rows.iter().map(row).collect::<Vec<_>>()

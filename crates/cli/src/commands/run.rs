@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Row, RunTraffic, Scheme, Status,
-    energy_drift,
+    Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Profile, Row, RunTraffic, Scheme,
+    Status, energy_drift,
 };
 use serde_json::{Map, Value, json};
 
@@ -15,7 +15,7 @@ use super::picture::Picture;
 use super::predict::announce;
 use super::problem::{Model, Problem};
 use super::remedy::{Advice, Given};
-use super::{checkpoint_folder, inversion, statics};
+use super::{checkpoint_folder, inversion, profile, statics};
 use crate::arguments::RunOptions;
 use crate::interruption::is_interrupted;
 use crate::json::{Output, prepare_folder};
@@ -105,6 +105,8 @@ struct Ran {
     row: Row,
     /// Where a history is kept.
     moments: Option<Vec<Moment>>,
+    /// Where the time went, if that is asked.
+    profile: Option<Profile>,
 }
 
 /// Simulates a case.
@@ -124,6 +126,7 @@ fn simulate(
         provenance: Some(problem.selection.provenance()),
     });
     let mut traffic = RunTraffic::default();
+    let mut profile = options.profile.then(Profile::default);
     let row = {
         let expected = announce(std::slice::from_ref(case));
         let bar = Bar::expecting("starting", expected.map(|seconds| seconds.iter().sum()));
@@ -136,6 +139,7 @@ fn simulate(
             snapshot: picture.map(Picture::snapshot),
             ranks: processes::ranks(),
             traffic: Some(&mut traffic),
+            profile: profile.as_mut(),
             ..Outputs::new(show)
         };
         let row = case.run(&mut outputs).map_err(anyhow::Error::new);
@@ -148,7 +152,7 @@ fn simulate(
         }
     };
     processes::tell_traffic(&traffic);
-    Ok(Ran { row, moments })
+    Ok(Ran { row, moments, profile })
 }
 
 impl Ran {
@@ -163,7 +167,7 @@ impl Ran {
         case: &Discretized<'_>,
     ) -> Result<Report> {
         let Problem { selection, model, settled } = problem;
-        let Self { row, moments } = self;
+        let Self { row, moments, profile } = self;
         let passed = row.status.passed();
         let mut said = text(row, Units::of(selection));
         let inverted = match passed {
@@ -189,6 +193,10 @@ impl Ran {
         if let Some(folder) = &options.vtk {
             let list = folder.join(format!("{}.pvd", selection.name()));
             said += &format!("particle files: {}\n", list.display());
+        }
+        if let Some(profile) = profile {
+            said += &profile::text(profile, row.particles);
+            results.insert("profile".into(), profile::document(profile));
         }
         if let Some(moments) = moments {
             results.insert("history".into(), history_document(moments));

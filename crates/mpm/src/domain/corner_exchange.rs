@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::corner_values::{AlongAxes, CornerValues};
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::{CHUNK, Chunk, SharedCorners};
-use crate::grid::bins::Bins;
+use crate::grid::bins::{Band, Bins};
 use crate::grid::extension::Extension;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
@@ -119,12 +119,12 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         &mut self,
         update: &GridUpdate<'_, T, S, D>,
         corners: &SharedCorners<T, D>,
-        bins: &mut Bins,
+        bins: &mut Bins<D>,
         nodes: &mut [Node<T, D>],
     ) {
         let mut extension = self.extension.take();
-        let add = |band: &mut [_], first: usize, ids: &[u32]| {
-            self.to_grid(update.c, corners, (band, first), ids);
+        let add = |band: Band<'_, _, D>, ids: &[u32]| {
+            self.to_grid(&update.c.in_band(&band), corners, (band.nodes, band.first), ids);
         };
         match &mut extension {
             Some(extension) => extension.p2g(update, bins, nodes, &add),
@@ -260,11 +260,11 @@ pub(crate) fn invalidity_of_corner<T: Lanes, const D: usize>(
     Some((invalid, corners.particle_at(corner)))
 }
 
-/// Checks that every corner that this process sorts is where the grid has nodes for it, and in its bin.
+/// Checks that every corner that this process sorts is where the grid has nodes for it, and in its tile.
 pub(crate) fn check<T: Lanes, const D: usize>(
     c: &Constants<T, D>,
     corners: &SharedCorners<T, D>,
-    bin_of: &[u32],
+    keys: &[u32],
 ) -> Outcome {
     let found = SharedOutcome::default();
     each((0..corners.own()).step_by(CHUNK).collect(), &|chunk: usize| {
@@ -272,21 +272,21 @@ pub(crate) fn check<T: Lanes, const D: usize>(
         for first in (chunk..corners.own().min(chunk + CHUNK)).step_by(BLOCK) {
             let count = BLOCK.min(corners.own() - first);
             let ids = &successive(first)[..count];
-            let mut bins = [0; BLOCK];
-            bins[..count].copy_from_slice(&bin_of[first..first + count]);
+            let mut tiles = [0; BLOCK];
+            tiles[..count].copy_from_slice(&keys[first..first + count]);
             for (x, &corner) in copies.x.iter_mut().zip(ids) {
                 *x = corners.at(corner as usize);
             }
             let kinematics = copies.kinematics();
-            if corners.at_corner.are_valid(OfBlock { c, ids, bins: &bins, kinematics }) {
+            if corners.at_corner.are_valid(OfBlock { c, ids, tiles: &tiles, kinematics }) {
                 continue;
             }
-            for (k, bin) in bins[..count].iter().enumerate() {
+            for (k, tile) in tiles[..count].iter().enumerate() {
                 let (corner, at) = (first + k, &copies.x[k]);
                 let failure = invalidity_of_corner(c, corners, corner);
                 let no_stretch = SMatrix::identity();
                 let is_inside = failure.is_some()
-                    || corners.at_corner.is_in_bin(c, corner, *bin, at, &no_stretch);
+                    || corners.at_corner.is_in_tile(c, corner, *tile, at, &no_stretch);
                 outcome = outcome.merge(Outcome { failure, resort: !is_inside });
             }
         }

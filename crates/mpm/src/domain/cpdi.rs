@@ -7,8 +7,9 @@ use mmsmith_lanes::simd::{Eight, Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::{product, real};
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::of_particles::{Domain, OfBlock, Rows};
+use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
+use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::cpdi::ParallelogramWeights;
@@ -46,25 +47,27 @@ impl<T: Lanes, const D: usize> Domain<T, D> for Parallelograms<T, D> {
             * c.inverse_spacing
     }
 
-    fn rows(
+    fn reached(
         &self,
         c: &Constants<T, D>,
         p: usize,
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
         _: &SVector<T, D>,
-    ) -> Rows<T> {
-        // The last component of the corners, in the operations of `deformed` and `corner_of_parallelogram`.
-        let (own, last, height) = (self.half_edges.of(p), D - 1, c.in_cells(x)[D - 1]);
-        let edges: [T; D] = array::from_fn(|j| {
-            let term = |l: usize| F[(last, l)] * c.inverse_spacing * own[(l, j)];
-            (1..D).fold(term(0), |sum, l| sum + term(l))
-        });
-        Rows::between((0..1_usize << D).map(|corner| {
-            edges.iter().enumerate().fold(height, |sum, (a, &edge)| {
-                if corner >> a & 1 == 1 { sum + edge } else { sum - edge }
-            })
-        }))
+    ) -> [Reached<T>; D] {
+        // The components of the corners, in the operations of `deformed` and `corner_of_parallelogram`.
+        let (own, xi) = (self.half_edges.of(p), c.in_cells(x));
+        array::from_fn(|along| {
+            let edges: [T; D] = array::from_fn(|j| {
+                let term = |l: usize| F[(along, l)] * c.inverse_spacing * own[(l, j)];
+                (1..D).fold(term(0), |sum, l| sum + term(l))
+            });
+            Reached::between((0..1_usize << D).map(|corner| {
+                edges.iter().enumerate().fold(xi[along], |sum, (a, &edge)| {
+                    if corner >> a & 1 == 1 { sum + edge } else { sum - edge }
+                })
+            }))
+        })
     }
 
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
@@ -107,7 +110,7 @@ impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
 }
 
 /// Whether all particles of a group are valid: inside the grid, with small domains between these corners, in cells, and in
-/// their bins.
+/// their tiles.
 #[inline(always)]
 fn are_valid<T: Lanes, V: Vectors, const D: usize>(
     vectors: V,
@@ -115,7 +118,7 @@ fn are_valid<T: Lanes, V: Vectors, const D: usize>(
     group: usize,
     corners: &[[Eight<T, V>; D]; MOST_CORNERS],
 ) -> bool {
-    let OfBlock { c, ids, bins, kinematics: Kinematics { x, F } } = of_block;
+    let OfBlock { c, ids, tiles, kinematics: Kinematics { x, F } } = of_block;
     let constant = |value: T| Eight { lanes: vectors.splat8(value), vectors };
     // The sign of a difference is exact: none of these may be negative.
     let mut slack = constant(T::one()).lanes;
@@ -142,17 +145,21 @@ fn are_valid<T: Lanes, V: Vectors, const D: usize>(
         }
     }
     let J = cells::determinant(&lanes_of_F).lanes;
-    let (low, high) = (low[D - 1].lanes, high[D - 1].lanes);
     let mut all = true;
+    let (mut tile, mut range) = (None, [(0.0, 0.0); D]);
     for n in 0..GROUP {
         let k = group * GROUP + n;
-        let (first, end) = c.bins.range(bins[k], REACHED);
-        let rows = node_below(high.0[n]).0 - node_below(low.0[n]).0;
-        let is_valid = (J.0[n] > T::zero())
-            & (slack.0[n] >= T::zero())
-            & (rows <= (REACHED - 2) as f64)
-            & (low.0[n] >= real(first))
-            & (low.0[n] < real(end));
+        if tile != Some(tiles[k]) {
+            (tile, range) = (Some(tiles[k]), c.tiles.range(tiles[k], REACHED));
+        }
+        let mut is_valid = (J.0[n] > T::zero()) & (slack.0[n] >= T::zero());
+        for a in first_cut_axis::<D>()..D {
+            let (low, high) = (low[a].lanes.0[n], high[a].lanes.0[n]);
+            let nodes = node_below(high).0 - node_below(low).0;
+            is_valid &= (nodes <= (REACHED - 2) as f64)
+                & (low >= real(range[a].0))
+                & (low < real(range[a].1));
+        }
         all &= is_valid | (k >= ids.len());
     }
     all

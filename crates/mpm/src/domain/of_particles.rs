@@ -10,10 +10,11 @@ use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::grid::geometry::Constants;
+use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::shape::cells::REACHED;
-use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, first_layer, node_below};
+use crate::shape::one_axis::{EXTENDED, HALF_SIZE_LIMIT, node_below};
 use crate::step::health::{Invalid, Outcome};
 use mmsmith_ranks::Move;
 
@@ -30,35 +31,38 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
         0.0
     }
 
-    /// The rows of nodes that a particle with these half-sizes reaches.
-    fn rows(
+    /// The most nodes along an axis that a particle reaches.
+    fn most_nodes(&self) -> usize {
+        EXTENDED
+    }
+
+    /// The nodes along each axis that a particle with these half-sizes reaches.
+    fn reached(
         &self,
         c: &Constants<T, D>,
         p: usize,
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
         l: &SVector<T, D>,
-    ) -> Rows<T>;
+    ) -> [Reached<T>; D];
 
-    /// Whether all particles of a block are valid, each in its own bin. Nearly all are, and this tells it sooner than
+    /// Whether all particles of a block are valid, each in its own tile. Nearly all are, and this tells it sooner than
     /// [`diagnose`](Self::diagnose), which has to tell for the others.
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool;
 
     /// Data of each of the `before` particles here move with them to other processes; collective. Default: there are none.
     fn follow(&mut self, _moved: &Move, _before: usize) {}
 
-    /// The first node that a particle reaches along the last axis, and about the first one along the others.
-    fn first_node(
+    /// The lower edges of a particle's domain along all axes, in cells from the lower corner of the grid.
+    fn edges(
         &self,
         c: &Constants<T, D>,
         p: usize,
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
-    ) -> usize {
-        let (xi, l) = (c.in_cells(x), self.half_size(c, p, F));
-        let row = first_layer(self.rows(c, p, x, F, &l).edge, T::zero());
-        (0..D - 1).map(|a| first_layer(xi[a], l[a]) * c.strides[a]).sum::<usize>()
-            + row * c.strides[D - 1]
+    ) -> [f64; D] {
+        let reached = self.reached(c, p, x, F, &self.half_size(c, p, F));
+        reached.map(|Reached { edge, .. }| nalgebra::try_convert(edge).unwrap_or(f64::NAN))
     }
 
     /// The reason why a particle is invalid, if it is.
@@ -74,34 +78,37 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
             .or_else(|| axis_too_large(&self.half_size(c, p, F)).map(|_| Invalid::TooLarge))
     }
 
-    /// Diagnoses a particle that may be invalid or outside its bin.
+    /// Diagnoses a particle that may be invalid or outside its tile.
     fn diagnose(
         &self,
         c: &Constants<T, D>,
         p: usize,
-        bin: u32,
+        tile: u32,
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
     ) -> Outcome {
         match self.invalidity(c, p, x, F) {
             Some(invalid) => Outcome { failure: Some((invalid, p)), resort: false },
-            None => Outcome { failure: None, resort: !self.is_in_bin(c, p, bin, x, F) },
+            None => Outcome { failure: None, resort: !self.is_in_tile(c, p, tile, x, F) },
         }
     }
 
-    /// Whether a particle is in a bin.
-    fn is_in_bin(
+    /// Whether a particle reaches nodes of a tile's window alone.
+    fn is_in_tile(
         &self,
         c: &Constants<T, D>,
         p: usize,
-        bin: u32,
+        tile: u32,
         x: &SVector<T, D>,
         F: &SMatrix<T, D, D>,
     ) -> bool {
         let l = self.half_size(c, p, F);
-        let Rows { edge, width } = self.rows(c, p, x, F, &l);
-        let (first, end) = c.bins.range(bin, width);
-        edge >= real(first) && edge < real(end)
+        let reached = self.reached(c, p, x, F, &l);
+        (first_cut_axis::<D>()..D).all(|a| {
+            let Reached { edge, width } = reached[a];
+            let (first, end) = c.tiles.range(tile, width)[a];
+            edge >= real(first) && edge < real(end)
+        })
     }
 }
 
@@ -111,8 +118,8 @@ pub(crate) struct OfBlock<'a, T, const D: usize> {
     pub(crate) c: &'a Constants<T, D>,
     /// The particles, no more than a block.
     pub(crate) ids: &'a [u32],
-    /// The bin of each.
-    pub(crate) bins: &'a [u32; BLOCK],
+    /// The tile of each.
+    pub(crate) tiles: &'a [u32; BLOCK],
     pub(crate) kinematics: Kinematics<'a, T, D>,
 }
 
@@ -123,26 +130,26 @@ pub(crate) fn axis_too_large<T: RealField + Copy, const D: usize>(
     (0..D).find(|&a| l[a] > real(HALF_SIZE_LIMIT))
 }
 
-/// The rows of nodes that a particle reaches.
+/// The nodes that a particle reaches along an axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<T> {
-    /// The lower edge of its domain, in cells from the lower corner of the grid: the first row is the one below.
+pub(crate) struct Reached<T> {
+    /// The lower edge of its domain, in cells from the lower corner of the grid: the first node is the one below.
     pub(crate) edge: T,
-    /// How many rows at most.
+    /// How many nodes at most.
     pub(crate) width: usize,
 }
 
-impl<T: RealField + Copy> Rows<T> {
-    /// Around corners at these heights, in cells; computed as kernels compute them, so that both have the same first row.
+impl<T: RealField + Copy> Reached<T> {
+    /// Around corners at these places, in cells; computed as kernels compute them, so that both have the same first node.
     #[inline(always)]
-    pub(crate) fn between(heights: impl Iterator<Item = T>) -> Self {
+    pub(crate) fn between(places: impl Iterator<Item = T>) -> Self {
         let (mut low, mut high) = (T::max_value().unwrap_or(T::one()), -T::one());
-        for height in heights {
-            low = if height < low { height } else { low };
-            high = if height > high { height } else { high };
+        for place in places {
+            low = if place < low { place } else { low };
+            high = if place > high { place } else { high };
         }
-        let rows = node_below(high).0 - node_below(low).0 + 2.0;
+        let nodes = node_below(high).0 - node_below(low).0 + 2.0;
         // Small domains have a patch of so many nodes, reached or not.
-        Self { edge: low, width: (rows as usize).clamp(REACHED, EXTENDED) }
+        Self { edge: low, width: (nodes as usize).clamp(REACHED, EXTENDED) }
     }
 }

@@ -4,8 +4,9 @@ use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::{determinant, real};
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::of_particles::{Domain, OfBlock, Rows};
+use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
+use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::product::ProductWeights;
@@ -24,17 +25,24 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
         self.on_axis.beyond_box()
     }
 
-    fn rows(
+    fn most_nodes(&self) -> usize {
+        let may_be_extended =
+            self.on_axis.stretches() || self.l.iter().any(|&l| l > self.extended_above());
+        if may_be_extended { EXTENDED } else { self.width() }
+    }
+
+    fn reached(
         &self,
         c: &Constants<T, D>,
         _: usize,
         x: &SVector<T, D>,
         _: &SMatrix<T, D, D>,
         l: &SVector<T, D>,
-    ) -> Rows<T> {
+    ) -> [Reached<T>; D] {
         let is_extended = l.iter().any(|&l| l > self.extended_above());
         let width = if is_extended { EXTENDED } else { self.width() };
-        Rows { edge: c.in_cells(x)[D - 1] - l[D - 1], width }
+        let xi = c.in_cells(x);
+        std::array::from_fn(|a| Reached { edge: xi[a] - l[a], width })
     }
 
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
@@ -61,26 +69,27 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
-        let OfBlock { c, ids, bins, kinematics: Kinematics { x, F } } = of_block;
+        let OfBlock { c, ids, tiles, kinematics: Kinematics { x, F } } = of_block;
         let (width, above) = (shape.width(), shape.extended_above());
-        let more_rows: T = real((EXTENDED - width) as f64);
+        let more_nodes: T = real((EXTENDED - width) as f64);
         let beyond: T = real(shape.on_axis.beyond_box());
         let half_size =
             |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]) + beyond;
-        // The lower edge, and the same where it would be for the last row of a box with extended support.
-        let edges = |k: usize, is_extended: bool| {
-            let a = D - 1;
-            let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - half_size(k, a);
-            (edge, if is_extended { edge + more_rows } else { edge })
+        // By the lower edges, and the same where they would be for the last node of a box with extended support.
+        let is_inside = |k: usize, range: &[(f64, f64); D], is_extended: bool| {
+            let mut is_inside = true;
+            for a in first_cut_axis::<D>()..D {
+                let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - half_size(k, a);
+                let last = if is_extended { edge + more_nodes } else { edge };
+                is_inside &= (edge >= real(range[a].0)) & (last < real(range[a].1));
+            }
+            is_inside
         };
-        let is_inside = |(first, end): (f64, f64), (low, high): (T, T)| {
-            (low >= real(first)) & (high < real(end))
-        };
-        let bins = &bins[..ids.len().min(BLOCK)];
-        let Some((&bin, others)) = bins.split_first() else { return };
-        let range = c.bins.range(bin, width);
+        let tiles = &tiles[..ids.len().min(BLOCK)];
+        let Some((&tile, others)) = tiles.split_first() else { return };
+        let range = c.tiles.range(tile, width);
         let (mut all, mut all_inside) = (true, true);
-        for k in 0..bins.len() {
+        for k in 0..tiles.len() {
             let mut valid = determinant(&F[k]) > T::zero();
             let mut is_extended = false;
             for a in 0..D {
@@ -89,13 +98,13 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
                 is_extended |= l > above;
             }
             all &= valid;
-            all_inside &= is_inside(range, edges(k, is_extended));
+            all_inside &= is_inside(k, &range, is_extended);
         }
-        // Blocks with particles of several bins are rare.
-        if others.iter().any(|other| *other != bin) {
-            all_inside = bins.iter().enumerate().all(|(k, &bin)| {
+        // Blocks with particles of several tiles are rare.
+        if others.iter().any(|other| *other != tile) {
+            all_inside = tiles.iter().enumerate().all(|(k, &tile)| {
                 let is_extended = (0..D).any(|a| half_size(k, a) > above);
-                is_inside(c.bins.range(bin, width), edges(k, is_extended))
+                is_inside(k, &c.tiles.range(tile, width), is_extended)
             });
         }
         *all_valid = all && all_inside;

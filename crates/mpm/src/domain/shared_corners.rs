@@ -297,9 +297,9 @@ impl<T: Lanes, const D: usize> SharedCorners<T, D> {
         (!volume.is_finite()).then_some(Invalid::NotFinite)
     }
 
-    /// The first node that a corner reaches.
-    pub(crate) fn first_node(&self, c: &Constants<T, D>, corner: usize) -> usize {
-        self.at_corner.first_node(c, corner, &self.at(corner), &SMatrix::identity())
+    /// The lower edges of what a corner reaches along all axes, in cells.
+    pub(crate) fn edges(&self, c: &Constants<T, D>, corner: usize) -> [f64; D] {
+        self.at_corner.edges(c, corner, &self.at(corner), &SMatrix::identity())
     }
 
     /// Number of corners.

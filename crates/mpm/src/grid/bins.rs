@@ -1,14 +1,15 @@
-//! Bins of particles: P2G in parallel with sums in a fixed order.
+//! Particles sorted by tiles: P2G in parallel with sums in a fixed order.
 //!
-//! A row is all nodes that share an index along the last axis. Bins divide the rows: each bin owns a fixed number of them,
-//! which depends on the dimension alone. Each particle belongs to one bin. A bin writes to its band: its own rows and the rows
-//! of the next bin. Only the bands of neighbours overlap, and a two-colour schedule keeps those apart in time
-//! ([`coloring`](mmsmith_threads::coloring)). Particles of a bin come in a fixed order. No sum depends on the number of
-//! threads. The grid update of a row follows its last contribution, while the row lies in the cache.
+//! A row is all nodes that share an index along the last axis. Layers of [tiles](crate::grid::tiles) divide the rows. Each particle belongs
+//! to one tile, and particles of a tile come in a fixed order. No sum depends on the number of threads.
 //!
-//! A band has more rows than a bin and its stencils need. Particles may thus drift for some steps before the next sort. The
-//! order of the last sort decides the order of all sums. It follows from the sub-bin that each particle was in then, which belongs
-//! to the state of a run: a run that continues to the same bits restores it.
+//! On a line and in the plane a layer is one tile, which adds to its band: its own rows and the rows of the next layer. Only the bands of
+//! neighbours overlap, and a two-colour schedule keeps those apart in time ([`coloring`](mmsmith_threads::coloring)). The grid update of a row
+//! follows its last contribution, while the row lies in the cache. In space a tile sums in a buffer of its own, which is added to the grid
+//! in its turn ([`windows`](mmsmith_threads::windows)), so that many more threads find work; the rows are updated when all is added.
+//!
+//! Particles may drift for some steps before the next sort. The order of the last sort decides the order of all sums. It follows from the
+//! tile that each particle was in then, which belongs to the state of a run: a run that continues to the same bits restores it.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,105 +18,55 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
-use crate::grid::{BIN_ROWS, Layout, PAD_BELOW};
-use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared, count};
+use crate::grid::division::Division;
+use crate::grid::tiles::Tiles;
+use crate::grid::{Layout, NODES_AT_ONCE};
+use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared};
 use mmsmith_threads::disjoint::Partition;
-use mmsmith_threads::on_all_threads;
+use mmsmith_threads::windows::{AddLine, TileLattice, TileSums};
+use mmsmith_threads::{each_chunk, on_all_threads};
 
-/// Rows in a bin, in two and three dimensions.
-const BIN_HEIGHT: usize = 8;
-
-/// Rows by which a particle may sink below its bin before the next sort.
-const SLACK: usize = 3;
-
-/// In three dimensions a bin is divided into sub-bins of this many lines of nodes along axis 0: the nodes that a sub-bin
-/// reaches stay in the cache. In fewer dimensions a bin is one sub-bin.
-const SUB_BIN_LINES: usize = 8;
-
-/// The rows of each bin.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BinRows {
-    /// Rows in a bin; the last one has the remainder as well.
-    height: usize,
-    /// Number of bins.
-    bins: usize,
-}
-
-impl BinRows {
-    pub(crate) fn new<const D: usize>(layout: &Layout<D>) -> Self {
-        // A row is one node in 1D; bins below some hundred particles would cost more to hand out than to compute.
-        let height = if D == 1 { BIN_ROWS } else { BIN_HEIGHT };
-        Self { height, bins: count(layout.dims[D - 1], height) }
-    }
-
-    /// The bin of a particle at a sort, by the first row of its stencil.
-    pub(crate) fn bin_of(self, row: usize) -> usize {
-        (row.saturating_sub(SLACK) / self.height).min(self.bins - 1)
-    }
-
-    /// Number of bins.
-    pub(crate) fn count(self) -> usize {
-        self.bins
-    }
-
-    /// The first row of a bin's band.
-    pub(crate) fn first_row(self, bin: usize) -> usize {
-        bin * self.height
-    }
-
-    /// The rows of the bands of these bins, on a grid of so many.
-    pub(crate) fn rows_of(self, held: &Held, all: usize) -> Range<usize> {
-        let Range { start, end } = held.segments();
-        start * self.height..if end < self.bins { end * self.height } else { all }
-    }
-
-    /// Range of the lower edge of a particle's box along the last axis within which the particle stays in `bin`, for a
-    /// stencil of `width` rows: from the first value on and below the second, in cells from the lower corner of the grid.
-    #[inline(always)]
-    pub(crate) fn range(self, bin: u32, width: usize) -> (f64, f64) {
-        let Self { height, bins } = self;
-        let first = f64::from(bin) * height as f64 - PAD_BELOW as f64;
-        // Bands that reach the end of the grid hold all stencils up to there.
-        let end = if bin as usize + 2 < bins {
-            first + (2 * height + 1 - width) as f64
-        } else {
-            f64::INFINITY
-        };
-        (first, end)
-    }
-}
-
-/// Particles sorted by bin, within each bin by sub-bin, within each sub-bin by id.
+/// Particles sorted by tile, within each tile by id.
 ///
 /// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
 /// kernels use them in place.
-pub(crate) struct Bins {
-    rows: BinRows,
-    /// The bins that this process holds.
+pub(crate) struct Bins<const D: usize> {
+    tiles: Tiles<D>,
+    /// The layers of tiles that this process holds.
     held: Held,
+    /// The windows of these tiles, where they sum in buffers.
+    lattice: Option<TileLattice<D>>,
     /// The processes that hold all of them, where those are several.
     ranks: Option<Arc<dyn Ranks>>,
-    /// Bin of every particle, among those of the whole grid.
-    bin_of: Vec<u32>,
-    /// Particle numbers, bin after bin.
+    /// Particle numbers, tile after tile.
     order: Partition,
     /// Buffer of the two-colour schedule.
     schedule: Schedule,
-    /// Sub-bins in a bin.
-    sub_bins: usize,
-    /// Buffer of the sort: particles in each sub-bin, later the place of the next of them.
+    /// Buffer of the sort: particles in each tile, later the place of the next of them.
     counts: Vec<u32>,
-    /// Sub-bin of every particle at the last sort, among those of the whole grid.
+    /// Tile of every particle at the last sort, among those of the whole grid.
     keys: Vec<u32>,
 }
 
-/// Adds the particles of one bin to the nodes: `add(band, first, ids)`, with the band of the node array, the index of its first
-/// node, and the particles in order.
-pub(crate) type AddToBand<'a, N> = dyn Fn(&mut [N], usize, &[u32]) + Sync + 'a;
+/// Nodes to which the particles of a tile add.
+pub(crate) struct Band<'a, N, const D: usize> {
+    pub(crate) nodes: &'a mut [N],
+    /// The index of the first of these nodes.
+    pub(crate) first: usize,
+    /// The tile, among those of the whole grid.
+    pub(crate) tile: u32,
+    /// Distance between neighbouring nodes along each axis, and the nodes of the grid before the one of index zero, a whole number.
+    pub(crate) strides: [usize; D],
+    pub(crate) nodes_before: f64,
+}
 
-/// As [`AddToBand`] for kernels that change particles: `add(band, first, bin, divided, part)`, with the bin's number, the particles divided
-/// among bins, and the part that is this bin's.
-pub(crate) type UpdateAndAdd<'a, N, P> = dyn Fn(&mut [N], usize, u32, &P, usize) + Sync + 'a;
+/// Adds the particles of a tile to nodes: `add(band, ids)`, with the particles in order.
+pub(crate) type AddToBand<'a, N, const D: usize> = dyn Fn(Band<'_, N, D>, &[u32]) + Sync + 'a;
+
+/// As [`AddToBand`] for kernels that change particles: `add(band, divided, part)`, with the particles divided among tiles, and the part that
+/// is this tile's.
+pub(crate) type UpdateAndAdd<'a, N, P, const D: usize> =
+    dyn Fn(Band<'_, N, D>, &P, usize) + Sync + 'a;
 
 /// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
 #[derive(Clone, Copy)]
@@ -124,11 +75,14 @@ pub(crate) struct NodeHooks<'a, N> {
     pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
     /// After the last contribution; the second argument is the index of the first node.
     pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
-    /// The exchange with processes that hold other bins, where there are such.
+    /// A node without contributions, and the sum of nodes and others.
+    pub(crate) zero: N,
+    pub(crate) add: &'a AddLine<'a, N>,
+    /// The exchange with processes that hold other tiles, where there are such.
     pub(crate) halo: Option<Halo<'a, N>>,
 }
 
-/// Messages with the processes of the bands below and above.
+/// Messages with the processes of the layers below and above.
 #[derive(Clone, Copy)]
 pub(crate) struct Halo<'a, N> {
     /// Sends the nodes of a segment that is shared.
@@ -143,111 +97,99 @@ pub(crate) struct Halo<'a, N> {
     pub(crate) finish: &'a (dyn Fn(&mut [N]) + Sync),
 }
 
-impl Bins {
+impl<const D: usize> Bins<D> {
     /// Allocates for `particles` particles on the grid; `sort_as` has to follow.
-    pub(crate) fn new<const D: usize>(layout: &Layout<D>, particles: usize) -> Self {
-        let rows = BinRows::new(layout);
-        let bins = rows.bins;
-        let sub_bins = if D == 3 { layout.dims[1].div_ceil(SUB_BIN_LINES) } else { 1 };
-        Self {
-            rows,
-            held: Held::whole(bins),
+    pub(crate) fn new(tiles: Tiles<D>, particles: usize) -> Self {
+        let mut own = Self {
+            tiles,
+            held: Held::default(),
+            lattice: None,
             ranks: None,
-            bin_of: vec![0; particles],
-            order: Partition::new(particles, bins),
+            order: Partition::new(0, 0),
             schedule: Schedule::default(),
-            sub_bins,
-            counts: vec![0; bins * sub_bins + 1],
+            counts: Vec::new(),
             keys: vec![0; particles],
-        }
+        };
+        own.hold(Held::whole(tiles.layers()), particles);
+        own
     }
 
-    /// The rows of each bin.
-    pub(crate) fn rows(&self) -> BinRows {
-        self.rows
+    /// The tiles of the whole grid.
+    pub(crate) fn tiles(&self) -> &Tiles<D> {
+        &self.tiles
     }
 
-    /// Makes room for so many particles in the bins `held`; `sort_as` has to follow.
+    /// Makes room for so many particles in the layers `held`; `sort_as` has to follow.
     pub(crate) fn hold(&mut self, held: Held, particles: usize) {
-        self.counts.resize(held.bands.len() * self.sub_bins + 1, 0);
-        self.order = Partition::new(particles, held.bands.len());
+        let tiles = held.bands.len() * self.tiles.in_a_layer();
+        self.counts.resize(tiles + 1, 0);
+        self.order = Partition::new(particles, tiles);
+        if held != self.held {
+            self.lattice = self.tiles.lattice(&held);
+        }
         self.held = held;
     }
 
-    /// Shares the bins out among processes; [`hold`](Self::hold) has to follow.
+    /// Shares the layers out among processes; [`hold`](Self::hold) has to follow.
     pub(crate) fn share_out(&mut self, ranks: Arc<dyn Ranks>) {
         self.ranks = Some(ranks);
     }
 
-    /// The processes that hold all bins, where those are several.
+    /// The processes that hold all layers, where those are several.
     pub(crate) fn ranks(&self) -> Option<Arc<dyn Ranks>> {
         self.ranks.clone()
     }
 
-    /// Whether other processes hold rows below and above those that this one holds.
-    pub(crate) fn are_others(&self) -> [bool; 2] {
+    /// The rows that other processes hold as well, at the lower and at the upper end of those here.
+    pub(crate) fn shared_rows(&self) -> [Option<Range<usize>>; 2] {
         let segments = self.held.segments();
-        [segments.start > 0, segments.end < self.held.all]
+        let rows = |segment| self.tiles.first_row(segment)..self.tiles.first_row(segment + 1);
+        [
+            (segments.start > 0).then(|| rows(segments.start)),
+            (segments.end < self.held.all).then(|| rows(segments.end - 1)),
+        ]
     }
 
-    /// Bin of every particle.
-    pub(crate) fn bin_of(&self) -> &[u32] {
-        &self.bin_of
-    }
-
-    /// The result of the last sort: the sub-bin of every particle.
+    /// The result of the last sort: the tile of every particle.
     pub(crate) fn keys(&self) -> &[u32] {
         &self.keys
     }
 
-    /// Whether the grid has this sub-bin.
-    pub(crate) fn has_key(&self, key: u32) -> bool {
-        self.bin_of_key(key) < self.rows.bins
-    }
-
-    /// The bin of a sub-bin.
-    pub(crate) fn bin_of_key(&self, key: u32) -> usize {
-        key as usize / self.sub_bins
-    }
-
-    /// The sub-bin of each of `count` particles, by the first node of its stencil, in the numbers of the whole grid.
-    pub(crate) fn keys_of<const D: usize>(
+    /// The tile of each of `count` particles, by the lower edges of their boxes in cells, in the numbers of the whole grid.
+    pub(crate) fn keys_of(
         &self,
-        layout: &Layout<D>,
         count: usize,
-        first_node: &(dyn Fn(usize) -> usize + Sync),
+        edges: &(dyn Fn(usize) -> [f64; D] + Sync),
     ) -> Vec<u32> {
-        let (rows, row, line) = (self.rows, layout.row(), layout.dims[0]);
-        let key = |p: usize| {
-            let node = first_node(p);
-            let sub_bin = if D == 3 { node % row / line / SUB_BIN_LINES } else { 0 };
-            (rows.bin_of(node / row) * self.sub_bins + sub_bin) as u32
-        };
-        (0..count).into_par_iter().map(key).collect()
+        (0..count).into_par_iter().map(|p| self.tiles.tile_of(&edges(p))).collect()
     }
 
-    /// Sorts all particles by their sub-bins, of bins that are held here.
+    /// How many threads the particles keep busy as they were at the last sort; none where other processes hold some of them.
+    pub(crate) fn division(&self, layout: &Layout<D>) -> Option<Division> {
+        let tiles = self.tiles.layers() * self.tiles.in_a_layer();
+        let of_tile = |tile| self.order.part(tile).map_or(0, <[u32]>::len);
+        let particles: Vec<usize> = (0..tiles).map(of_tile).collect();
+        self.ranks.is_none().then(|| Division::new(&self.tiles, layout, &particles))
+    }
+
+    /// The number of the first tile here.
+    fn first_tile(&self) -> usize {
+        self.held.bands.start * self.tiles.in_a_layer()
+    }
+
+    /// Sorts all particles by their tiles, of layers that are held here.
     pub(crate) fn sort_as(&mut self, keys: Vec<u32>) {
-        let per_bin = self.sub_bins as u32;
-        self.bin_of.clear();
-        self.bin_of.extend(keys.iter().map(|key| key / per_bin));
         self.keys = keys;
-        self.arrange();
-    }
-
-    /// Brings the particles into the order of their sub-bins.
-    fn arrange(&mut self) {
-        let Self { sub_bins, ref held, .. } = *self;
-        let first = held.bands.start * sub_bins;
+        let first = self.first_tile();
         self.counts.fill(0);
         for &key in &self.keys {
             self.counts[key as usize - first + 1] += 1;
         }
-        for sub_bin in 1..self.counts.len() {
-            self.counts[sub_bin] += self.counts[sub_bin - 1];
+        for tile in 1..self.counts.len() {
+            self.counts[tile] += self.counts[tile - 1];
         }
         let (order, starts) = self.order.arrange();
-        for (start, first) in starts.iter_mut().zip(self.counts.iter().step_by(sub_bins)) {
+        for (start, first) in starts.iter_mut().zip(&self.counts) {
             *start = *first as usize;
         }
         for (p, &key) in self.keys.iter().enumerate() {
@@ -257,189 +199,262 @@ impl Bins {
         }
     }
 
-    /// Calls `add` for every bin here, in parallel where bands do not overlap.
-    pub(crate) fn for_each<N: Send, const D: usize>(
+    /// Calls `add` for every tile here, in parallel.
+    pub(crate) fn for_each<N: Copy + Send + Sync>(
         &mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
         hooks: NodeHooks<'_, N>,
-        add: &AddToBand<'_, N>,
+        add: &AddToBand<'_, N, D>,
     ) {
-        let Self { rows, held, order, schedule, .. } = self;
-        let start = held.bands.start;
-        let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
-        for_each_band(*rows, bands, hooks, &|band, first, bin| {
-            if let Some(particles) = order.part(bin - start) {
-                add(band, first, particles);
-            }
-        });
+        self.for_each_mut(
+            layout,
+            nodes,
+            hooks,
+            |order| &*order,
+            &|band, order: &&Partition, part| {
+                if let Some(particles) = order.part(part) {
+                    add(band, particles);
+                }
+            },
+        );
     }
 
-    /// As [`for_each`](Self::for_each) for kernels that change the bin's particles: `divide(partition)` divides them among bins, and
-    /// `add(band, first, bin, divided, part)` finds those of the bin there.
-    pub(crate) fn for_each_mut<'a, N: Send, P: Sync, const D: usize>(
+    /// As [`for_each`](Self::for_each) for kernels that change the tile's particles: `divide(partition)` divides them among tiles, and
+    /// `add(band, divided, part)` finds those of the tile there.
+    pub(crate) fn for_each_mut<'a, N: Copy + Send + Sync, P: Sync>(
         &'a mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
         hooks: NodeHooks<'_, N>,
         divide: impl FnOnce(&'a mut Partition) -> P,
-        add: &UpdateAndAdd<'_, N, P>,
+        add: &UpdateAndAdd<'_, N, P, D>,
     ) {
-        let Self { rows, held, order, schedule, .. } = self;
-        let start = held.bands.start;
+        let first_tile = self.first_tile();
+        let Self { tiles, held, order, schedule, lattice, .. } = self;
+        let grid = Sums { tiles, held, layout, hooks };
+        let has_particles: Vec<bool> = match lattice {
+            Some(lattice) => {
+                (0..lattice.count()).map(|part| order.part(part) != Some(&[])).collect()
+            }
+            None => Vec::new(),
+        };
         let divided = divide(order);
-        let bands = ColoredBands::new(nodes, rows.height * layout.row(), held.clone(), schedule);
-        for_each_band(*rows, bands, hooks, &|band, first, bin| {
-            add(band, first, bin as u32, &divided, bin - start);
-        });
+        let add = |band: Band<'_, N, D>, part: usize| add(band, &divided, part);
+        match lattice {
+            Some(lattice) => grid.in_windows(lattice, first_tile, nodes, &has_particles, &add),
+            None => grid.in_bands(schedule, nodes, &add),
+        }
     }
 }
 
-/// Calls `add(band, first, bin)` for each bin here, and the hooks around it.
-///
-/// A segment that two processes share belongs to the first band of one of them. That process sends its sums, which the other one adds to as soon as they
-/// have come, and gets the updated nodes back.
-fn for_each_band<N: Send>(
-    rows: BinRows,
-    mut bands: ColoredBands<'_, N>,
-    hooks: NodeHooks<'_, N>,
-    add: &(dyn Fn(&mut [N], usize, usize) + Sync),
-) {
-    let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
-        bands.shared().partition(|shared| shared.is_first_here);
-    let returned: Vec<AtomicBool> = borrowed.iter().map(|_| AtomicBool::new(false)).collect();
-    // What a band that is done sends at once.
-    let send = |Halo { send, is_updated, .. }: &Halo<'_, N>, segment: usize, nodes: &[N]| {
-        for shared in lent.iter().filter(|shared| shared.segment == segment) {
-            send(*shared, nodes);
+/// The nodes to which tiles add.
+struct Sums<'a, N, const D: usize> {
+    tiles: &'a Tiles<D>,
+    held: &'a Held,
+    layout: &'a Layout<D>,
+    hooks: NodeHooks<'a, N>,
+}
+
+impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
+    /// The nodes of a segment, the rows of a layer, by their indices here.
+    fn of_segment(&self, segment: usize) -> Range<usize> {
+        let index = |row: usize| (row - self.layout.first_row) * self.layout.row();
+        index(self.tiles.first_row(segment))..index(self.tiles.first_row(segment + 1))
+    }
+
+    /// Calls `add(band, part)` for each tile here, which sums in a buffer, and the hooks around it.
+    fn in_windows(
+        &self,
+        lattice: &TileLattice<D>,
+        first_tile: usize,
+        nodes: &mut [N],
+        has_particles: &[bool],
+        add: &(dyn Fn(Band<'_, N, D>, usize) + Sync),
+    ) {
+        let Self { held, layout, hooks, .. } = self;
+        let row = layout.row();
+        let rows = (NODES_AT_ONCE / row).max(1) * row;
+        each_chunk(nodes, rows, &|_, rows| (hooks.before)(rows));
+        let mut sums = TileSums::new(nodes, (layout.strides, layout.first_row * row), lattice);
+        let fill = |tile: usize, buffer: &mut dyn FnMut() -> Vec<N>| {
+            if !has_particles[tile] {
+                return None;
+            }
+            let mut nodes = buffer();
+            let window = lattice.window(tile);
+            let (mut strides, mut before) = ([1; D], 0);
+            for a in 0..D {
+                if a > 0 {
+                    strides[a] = strides[a - 1] * window[a - 1].len();
+                }
+                before += window[a].start * strides[a];
+            }
+            let (number, nodes_before) = ((first_tile + tile) as u32, before as f64);
+            add(Band { nodes: &mut nodes, first: 0, tile: number, strides, nodes_before }, tile);
+            Some(nodes)
+        };
+        sums.fill_and_add(hooks.zero, &fill, hooks.add);
+        // A segment that two processes share is completed by the one whose turn comes last.
+        let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
+            held.shared().partition(|shared| shared.is_first_here);
+        if let Some(Halo { send, receive, .. }) = hooks.halo {
+            for &shared in &lent {
+                send(shared, &sums.all()[self.of_segment(shared.segment)]);
+            }
+            for &shared in &borrowed {
+                receive(shared, &mut sums.all()[self.of_segment(shared.segment)]);
+            }
+            sums.add_rest(hooks.add);
         }
-        for (shared, is_returned) in borrowed.iter().zip(&returned) {
-            let rows = rows.first_row(segment)..rows.first_row(segment + 1);
-            if shared.segment == segment && is_updated(rows) {
-                send(*shared, nodes);
-                is_returned.store(true, Ordering::Relaxed);
+        let mut segments = held.segments();
+        for &shared in &lent {
+            match shared.is_below {
+                true => segments.start += 1,
+                false => segments.end -= 1,
             }
         }
-    };
-    let pass = |bands: &ColoredBands<'_, N>| {
-        on_all_threads(&|thread| {
-            loop {
-                for &shared in &borrowed {
-                    if let Some(Halo { receive, has_arrived, .. }) = &hooks.halo
-                        && bands.is_awaited(shared)
-                        && has_arrived(shared)
-                    {
-                        bands.fill(shared, |nodes| receive(shared, nodes));
+        let first = self.of_segment(segments.start).start;
+        let end = self.of_segment(segments.end - 1).end;
+        each_chunk(&mut nodes[first..end], rows, &|number, nodes| {
+            (hooks.after)(nodes, first + number * rows);
+        });
+        if let Some(Halo { send, receive, finish, .. }) = hooks.halo {
+            finish(nodes);
+            for &shared in &borrowed {
+                send(shared, &nodes[self.of_segment(shared.segment)]);
+            }
+            for &shared in &lent {
+                receive(shared, &mut nodes[self.of_segment(shared.segment)]);
+            }
+        }
+    }
+
+    /// Calls `add(band, part)` for each layer here, which is one tile, and the hooks around it.
+    ///
+    /// A segment that two processes share belongs to the first band of one of them. That process sends its sums, which the other one adds to as soon as they
+    /// have come, and gets the updated nodes back.
+    fn in_bands(
+        &self,
+        schedule: &mut Schedule,
+        nodes: &mut [N],
+        add: &(dyn Fn(Band<'_, N, D>, usize) + Sync),
+    ) {
+        let Self { tiles, held, layout, hooks } = self;
+        let segments = held.segments();
+        let start = |segment: usize| self.of_segment(segment).start;
+        let starts = segments.clone().map(start).chain([nodes.len()]).collect();
+        let mut bands = ColoredBands::new(nodes, starts, (*held).clone(), schedule);
+        let nodes_before = (layout.first_row * layout.row()) as f64;
+        let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
+            bands.shared().partition(|shared| shared.is_first_here);
+        let returned: Vec<AtomicBool> = borrowed.iter().map(|_| AtomicBool::new(false)).collect();
+        // What a band that is done sends at once.
+        let send = |Halo { send, is_updated, .. }: &Halo<'_, N>, segment: usize, nodes: &[N]| {
+            for shared in lent.iter().filter(|shared| shared.segment == segment) {
+                send(*shared, nodes);
+            }
+            for (shared, is_returned) in borrowed.iter().zip(&returned) {
+                let rows = tiles.first_row(segment)..tiles.first_row(segment + 1);
+                if shared.segment == segment && is_updated(rows) {
+                    send(*shared, nodes);
+                    is_returned.store(true, Ordering::Relaxed);
+                }
+            }
+        };
+        let pass = |bands: &ColoredBands<'_, N>| {
+            on_all_threads(&|thread| {
+                loop {
+                    for &shared in &borrowed {
+                        if let Some(Halo { receive, has_arrived, .. }) = &hooks.halo
+                            && bands.is_awaited(shared)
+                            && has_arrived(shared)
+                        {
+                            bands.fill(shared, |nodes| receive(shared, nodes));
+                        }
+                    }
+                    let Some(mut band) = bands.take(thread) else { break };
+                    (hooks.before)(band.first_touched().0);
+                    let (layer, strides) = (band.segment(), layout.strides);
+                    let (nodes, first) = band.elements();
+                    let tile = layer as u32;
+                    add(
+                        Band { nodes, first, tile, strides, nodes_before },
+                        layer - held.bands.start,
+                    );
+                    let (completed, first) = band.completed();
+                    if !completed.is_empty() {
+                        (hooks.after)(completed, first);
+                    }
+                    if let Some(halo) = &hooks.halo {
+                        band.segments().for_each(|(segment, nodes)| send(halo, segment, nodes));
                     }
                 }
-                let Some(mut band) = bands.take(thread) else { break };
-                (hooks.before)(band.first_touched().0);
-                let bin = band.segment();
-                let (elements, first) = band.elements();
-                add(elements, first, bin);
-                let (completed, first) = band.completed();
-                if !completed.is_empty() {
-                    (hooks.after)(completed, first);
-                }
-                if let Some(halo) = &hooks.halo {
-                    band.segments().for_each(|(segment, nodes)| send(halo, segment, nodes));
-                }
-            }
-        });
-    };
-    pass(&bands);
-    let Some(Halo { send, receive, finish, .. }) = &hooks.halo else { return };
-    let filled = borrowed.iter().map(|&shared| bands.fill(shared, |nodes| receive(shared, nodes)));
-    if filled.fold(false, |any, filled| any | filled) {
+            });
+        };
         pass(&bands);
-    }
-    finish(bands.all());
-    for (&shared, is_returned) in borrowed.iter().zip(&returned) {
-        if !is_returned.load(Ordering::Relaxed) {
-            send(shared, bands.of_shared(shared));
+        let Some(Halo { send, receive, finish, .. }) = &hooks.halo else { return };
+        let filled =
+            borrowed.iter().map(|&shared| bands.fill(shared, |nodes| receive(shared, nodes)));
+        if filled.fold(false, |any, filled| any | filled) {
+            pass(&bands);
         }
-    }
-    for &shared in &lent {
-        receive(shared, bands.of_shared(shared));
+        finish(bands.all());
+        for (&shared, is_returned) in borrowed.iter().zip(&returned) {
+            if !is_returned.load(Ordering::Relaxed) {
+                send(shared, bands.of_shared(shared));
+            }
+        }
+        for &shared in &lent {
+            receive(shared, bands.of_shared(shared));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
+    use crate::grid::{Grid, PAD_BELOW};
     use nalgebra::SVector;
 
-    #[test]
-    fn a_bin_keeps_particles_whose_stencils_lie_in_its_band_and_no_others() {
-        for height in [8, BIN_ROWS] {
-            let cut = BinRows { height, bins: 10 };
-            for width in [2, 3, 6] {
-                for bin in [0, 1, 2, 7] {
-                    let (first, end) = cut.range(bin, width);
-                    // Rows of the stencil from the bin's first row on; a band has those of two bins.
-                    let rows = |edge: f64| {
-                        let row = edge.floor() + PAD_BELOW as f64 - (bin as usize * height) as f64;
-                        (row, row + width as f64)
-                    };
-                    let fits =
-                        |edge: f64| rows(edge).0 >= 0.0 && rows(edge).1 <= 2.0 * height as f64;
-                    for (edge, is_kept) in [
-                        (first, true),
-                        (first.next_down(), false),
-                        (end, false),
-                        (end.next_down(), true),
-                        (f64::midpoint(first, end), true),
-                    ] {
-                        assert_eq!(fits(edge), is_kept, "{height} {width} {bin}");
-                    }
-                }
-                // The last two bands reach to the end of the grid.
-                for bin in [8, 9] {
-                    let first = (bin as usize * height) as f64 - PAD_BELOW as f64;
-                    assert_eq!(cut.range(bin, width), (first, f64::INFINITY));
-                }
-            }
-        }
+    fn bins<const D: usize>(cells: [usize; D], particles: usize) -> (Layout<D>, Bins<D>) {
+        let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let tiles = Tiles::new(&layout, &cells, 6);
+        (layout, Bins::new(tiles, particles))
     }
 
-    /// Nodes at which stencils may begin, by a lattice of particles and with some layers left out.
-    fn first_nodes<const D: usize>(layout: &Layout<D>) -> Vec<usize> {
-        let row = layout.row();
-        let last = layout.dims[D - 1] - 6;
-        // Numbered from the far end on, so that numbers and places differ in order.
-        (0..last * row).rev().filter(|node| node % 3 != 1).collect()
+    /// Lower edges of boxes, numbered from the far end on, so that numbers and places differ in order.
+    fn edges<const D: usize>(cells: [usize; D]) -> Vec<[f64; D]> {
+        let count: usize = cells.iter().map(|cells| 2 * cells).product();
+        let place = |p: usize| {
+            let mut rest = count - 1 - p;
+            std::array::from_fn(|a| {
+                let place = rest % (2 * cells[a]);
+                rest /= 2 * cells[a];
+                place as f64 / 2.0
+            })
+        };
+        (0..count).filter(|p| p % 3 != 1).map(place).collect()
     }
 
     #[test]
-    fn particles_are_sorted_into_bins_with_room_to_drift_both_ways() {
+    fn particles_are_sorted_by_tile_and_then_by_id() {
         fn check<const D: usize>(cells: [usize; D]) {
-            let grid =
-                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
-            let layout = Layout::new(&grid, 8).unwrap();
-            let nodes = first_nodes(&layout);
-            let mut bins = Bins::new(&layout, nodes.len());
-            assert!(!bins.order.is_whole());
-            bins.sort_as(bins.keys_of(&layout, nodes.len(), &|p| nodes[p]));
+            let edges = edges(cells);
+            let (_, mut bins) = bins(cells, edges.len());
+            assert!(edges.is_empty() || !bins.order.is_whole());
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]));
             assert!(bins.order.is_whole());
-            let mut met = vec![0; nodes.len()];
-            let count = bins.rows.bins;
-            for bin in 0..count {
-                let particles = bins.order.part(bin).unwrap();
-                let (first, end) = bins.rows.range(bin as u32, 3);
-                let sub_bin = |p: u32| match D {
-                    3 => nodes[p as usize] / layout.dims[0] % layout.dims[1] / SUB_BIN_LINES,
-                    _ => 0,
-                };
-                let place = |&p: &u32| (sub_bin(p), p);
-                assert!(particles.is_sorted_by_key(place), "by sub-bin, then by id");
+            let mut met = vec![0; edges.len()];
+            let count = bins.tiles.layers() * bins.tiles.in_a_layer();
+            for tile in 0..count {
+                let particles = bins.order.part(tile).unwrap();
+                assert!(particles.is_sorted());
                 for &p in particles {
                     met[p as usize] += 1;
-                    assert_eq!(bins.bin_of()[p as usize] as usize, bin);
-                    let edge = (nodes[p as usize] / layout.row()) as f64 - PAD_BELOW as f64;
-                    // At the lower end of the grid particles cannot drift further.
-                    assert!(bin == 0 || edge - SLACK as f64 >= first, "{edge} {first}");
-                    assert!(edge + SLACK as f64 + 1.0 <= end, "{edge} {end}");
+                    assert_eq!(bins.keys()[p as usize] as usize, tile);
+                    assert_eq!(bins.tiles.tile_of(&edges[p as usize]) as usize, tile);
                 }
             }
             assert!(bins.order.part(count).is_none());
@@ -450,44 +465,53 @@ mod tests {
         check([4, 30, 25]);
     }
 
-    /// Each bin adds to every node of its band, which is its own rows and as many above; the last one's, and the band of the
-    /// one before, end with the grid.
+    /// Each tile adds to every node of its window: the update comes after the last contribution to a node, and the nodes are zero before.
     #[test]
-    fn bands_are_the_rows_of_a_bin_and_of_the_next() {
+    fn every_node_is_cleared_summed_and_updated() {
         fn check<const D: usize>(cells: [usize; D]) {
-            let grid =
-                Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
-            let layout = Layout::new(&grid, 8).unwrap();
-            let mut bins = Bins::new(&layout, 0);
-            bins.sort_as(Vec::new());
-            let (BinRows { height, bins: count }, row) = (bins.rows, layout.row());
-            assert_eq!(count, (layout.dims[D - 1] / height).max(1));
-            let mut nodes = vec![9; layout.nodes];
+            let edges = edges(cells);
+            let (layout, mut bins) = bins(cells, edges.len());
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]));
+            let row = layout.row();
             let hooks = NodeHooks {
-                before: &|nodes: &mut [i32]| nodes.fill(0),
-                after: &|nodes: &mut [i32], first| {
+                before: &|nodes: &mut [i64]| nodes.fill(0),
+                after: &|nodes: &mut [i64], first| {
                     assert_eq!(first % row, 0);
-                    nodes.iter_mut().for_each(|node| *node += 100);
+                    nodes.iter_mut().for_each(|node| *node += 1_000_000);
+                },
+                zero: 0,
+                add: &|nodes: &mut [i64], others: &[i64]| {
+                    nodes.iter_mut().zip(others).for_each(|(node, other)| *node += other);
                 },
                 halo: None,
             };
-            bins.for_each(&layout, &mut nodes, hooks, &|band, first, _| {
-                assert_eq!(first % (height * row), 0);
-                assert!(band.len() == 2 * height * row || first + band.len() == layout.nodes);
-                band.iter_mut().for_each(|node| *node += 1);
-            });
-            for (node, &sum) in nodes.iter().enumerate() {
-                // The lowest bin's rows belong to no other one.
-                let lowest = count == 1 || node < height * row;
-                assert_eq!(sum, if lowest { 101 } else { 102 }, "{node}");
-            }
-            let mut seen = vec![0; layout.nodes];
-            let add = |band: &mut [i32], first: usize, bin: u32, (): &(), _: usize| {
-                assert_eq!(first, bin as usize * height * row);
-                assert!((bin as usize) < count);
-                band.iter_mut().for_each(|node| *node += 1);
+            // The first node of each particle, by indices as they are in its band.
+            let add = |band: Band<'_, i64, D>, ids: &[u32]| {
+                for &p in ids {
+                    let first: usize = (0..D)
+                        .map(|a| {
+                            let place = edges[p as usize][a].floor() as usize + PAD_BELOW;
+                            place * band.strides[a]
+                        })
+                        .sum();
+                    band.nodes[first - band.nodes_before as usize - band.first] += 1;
+                }
             };
-            bins.for_each_mut(&layout, &mut seen, hooks, |_| (), &add);
+            let mut nodes = vec![9; layout.nodes];
+            bins.for_each(&layout, &mut nodes, hooks, &add);
+            let mut expected = vec![1_000_000; layout.nodes];
+            for edges in &edges {
+                let at = |a: usize| (edges[a].floor() as usize + PAD_BELOW) * layout.strides[a];
+                expected[(0..D).map(at).sum::<usize>()] += 1;
+            }
+            assert_eq!(nodes, expected);
+            let mut seen = vec![9; layout.nodes];
+            let divide = |order: &mut Partition| {
+                (0..).map_while(|part| order.part(part).map(<[u32]>::to_vec)).collect::<Vec<_>>()
+            };
+            bins.for_each_mut(&layout, &mut seen, hooks, divide, &|band, divided, part| {
+                add(band, &divided[part]);
+            });
             assert_eq!(seen, nodes);
         }
         check([1100]);
@@ -495,5 +519,6 @@ mod tests {
         check([5, 40]);
         check([5, 1]);
         check([4, 3, 25]);
+        check([4, 13, 9]);
     }
 }

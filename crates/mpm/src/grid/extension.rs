@@ -39,6 +39,9 @@ const LIGHT: f64 = 0.01;
 const NODES: usize = 4096;
 const ROWS: usize = 8;
 
+/// Rows of other processes that light nodes here may continue, or have in common with light nodes there; a layer of tiles has as many.
+const ROWS_AROUND: usize = 8;
+
 /// Offsets along an axis from a light node to the first node of a pair that it may continue.
 const OFFSETS: Range<isize> = -2..2;
 
@@ -74,25 +77,24 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
         Self { least_mass, light: Vec::new(), inner: Vec::new(), padded: Vec::new() }
     }
 
-    /// Calls `add` for every bin, as [`GridUpdate::p2g`], and updates the nodes, light ones last.
+    /// Calls `add` for every tile, as [`GridUpdate::p2g`], and updates the nodes, light ones last.
     pub(crate) fn p2g<S: NodeUpdate<T, D>>(
         &mut self,
         grid: &GridUpdate<'_, T, S, D>,
-        bins: &mut Bins,
+        bins: &mut Bins<D>,
         nodes: &mut [Node<T, D>],
-        add: &AddToBand<'_, Node<T, D>>,
+        add: &AddToBand<'_, Node<T, D>, D>,
     ) {
         grid.sums().p2g(bins, nodes, add);
         let (layout, ranks) = (grid.layout, bins.ranks());
         let Some(ranks) = ranks.as_deref() else {
             return self.update(grid, layout.first_row, nodes);
         };
-        let rows = bins.rows().first_row(1);
-        let [below, above] = bins.are_others();
-        let mut padded = std::mem::take(&mut self.padded);
-        let first_row = layout.first_row - if below { rows } else { 0 };
         let row = layout.row();
-        pad((ranks, [below, above]), rows * row, nodes, &mut padded);
+        let shared = bins.shared_rows().map(|rows| rows.map(|rows| rows.len() * row));
+        let mut padded = std::mem::take(&mut self.padded);
+        let first_row = layout.first_row - if shared[0].is_some() { ROWS_AROUND } else { 0 };
+        pad((ranks, shared), ROWS_AROUND * row, nodes, &mut padded);
         self.update(grid, first_row, &mut padded);
         let own = (layout.first_row - first_row) * row;
         nodes.copy_from_slice(&padded[own..own + nodes.len()]);
@@ -169,32 +171,33 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
     }
 }
 
-/// Puts `nodes` between so many nodes of the processes below and above, where there are such.
+/// Puts `nodes` between `count` nodes of the processes below and above, where there are such, with which so many of the first and of the
+/// last nodes are `shared`.
 fn pad<T: Lanes, const D: usize>(
-    (ranks, [below, above]): (&dyn Ranks, [bool; 2]),
+    (ranks, shared): (&dyn Ranks, [Option<usize>; 2]),
     count: usize,
     nodes: &[Node<T, D>],
     padded: &mut Vec<Node<T, D>>,
 ) {
-    let (low, high) = (if below { count } else { 0 }, if above { count } else { 0 });
+    let [below, above] = shared;
+    let [low, high] = shared.map(|shared| if shared.is_some() { count } else { 0 });
     padded.clear();
     padded.resize(low, Node::zero());
     padded.extend_from_slice(nodes);
     padded.resize(low + nodes.len() + high, Node::zero());
-    // Neighbours have the first rows here and the last ones, too, so that what they lack comes next. A process has the rows of two bins
-    // at least.
+    // Neighbours have the shared rows, too, so that what they lack comes next. A process has the rows of two layers at least.
     let rank = ranks.rank();
-    if below {
-        send_nodes(ranks, rank - 1, &nodes[count..2 * count]);
+    if let Some(shared) = below {
+        send_nodes(ranks, rank - 1, &nodes[shared..shared + count]);
     }
-    if above {
-        let end = nodes.len() - count;
+    if let Some(shared) = above {
+        let end = nodes.len() - shared;
         send_nodes(ranks, rank + 1, &nodes[end - count..end]);
     }
-    if below {
+    if below.is_some() {
         receive_nodes(ranks, rank - 1, &mut padded[..low]);
     }
-    if above {
+    if above.is_some() {
         receive_nodes(ranks, rank + 1, &mut padded[low + nodes.len()..]);
     }
 }

@@ -6,12 +6,13 @@ use mmsmith_lanes::tensor::{product, real};
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{RealField, SMatrix, SVector};
 
-use crate::grid::bins::{BinRows, Bins};
+use crate::grid::bins::Band;
 use crate::grid::node::Node;
+use crate::grid::tiles::Tiles;
 use crate::grid::{Grid, Layout};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 
-/// Constants of a run: the grid's geometry, the rows of each bin, the time step.
+/// Constants of a run: the grid's geometry, its tiles, the time step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Constants<T, const D: usize> {
     pub(crate) lower: SVector<T, D>,
@@ -23,7 +24,7 @@ pub(crate) struct Constants<T, const D: usize> {
     pub(crate) strides: [usize; D],
     /// The nodes of the grid before the first one that this process holds, a whole number.
     pub(crate) nodes_before: f64,
-    pub(crate) bins: BinRows,
+    pub(crate) tiles: Tiles<D>,
     pub(crate) time_step: T,
     /// Nodes with less mass than this count as empty.
     least_mass: T,
@@ -34,7 +35,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     pub(crate) fn new(
         grid: &Grid<T, D>,
         layout: &Layout<D>,
-        bins: &Bins,
+        tiles: &Tiles<D>,
         time_step: T,
         least_particle_mass: T,
     ) -> Self {
@@ -45,12 +46,17 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             inverse_spacing: grid.spacing.recip(),
             strides: layout.strides,
             nodes_before: (layout.first_row * layout.row()) as f64,
-            bins: bins.rows(),
+            tiles: *tiles,
             time_step,
             // Weights below the square of the rounding error only come about by rounding.
             least_mass: least_particle_mass * T::default_epsilon() * T::default_epsilon(),
             planted: Planted::here(),
         }
+    }
+
+    /// The same with the indices of nodes as they are in a band.
+    pub(crate) fn in_band<N>(&self, band: &Band<'_, N, D>) -> Self {
+        Self { strides: band.strides, nodes_before: band.nodes_before, ..*self }
     }
 
     /// Position in cells, from the lower corner.

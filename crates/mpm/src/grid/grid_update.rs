@@ -11,13 +11,14 @@ use bytemuck::{Pod, cast_slice, cast_slice_mut};
 use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
-use crate::grid::Layout;
 use crate::grid::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
+use crate::grid::{Layout, NODES_AT_ONCE};
 use crate::scheme::{Transfer, VelocityUpdate};
 use mmsmith_threads::coloring::Shared;
 use mmsmith_threads::disjoint::Partition;
+use mmsmith_threads::each_chunk;
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
@@ -265,12 +266,12 @@ where
         GridUpdate::new(self.layout, self.c, Sums(self.update))
     }
 
-    /// Calls `add` for every bin, as [`Bins::for_each`], and updates the nodes.
+    /// Calls `add` for every tile, as [`Bins::for_each`], and updates the nodes.
     pub(crate) fn p2g(
         &self,
-        bins: &mut Bins,
+        bins: &mut Bins<D>,
         nodes: &mut [Node<T, D>],
-        add: &AddToBand<'_, Node<T, D>>,
+        add: &AddToBand<'_, Node<T, D>, D>,
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
@@ -278,13 +279,13 @@ where
         });
     }
 
-    /// Calls `add` for every bin, as [`Bins::for_each_mut`], and updates the nodes.
+    /// Calls `add` for every tile, as [`Bins::for_each_mut`], and updates the nodes.
     pub(crate) fn g2p2g<'b, P: Sync>(
         &self,
-        bins: &'b mut Bins,
+        bins: &'b mut Bins<D>,
         nodes: &mut [Node<T, D>],
         divide: impl FnOnce(&'b mut Partition) -> P,
-        add: &UpdateAndAdd<'_, Node<T, D>, P>,
+        add: &UpdateAndAdd<'_, Node<T, D>, P, D>,
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
@@ -303,8 +304,12 @@ where
             |nodes: &mut [_]| self.update.clear(nodes),
             |nodes: &mut [_], first| self.rows(nodes, first),
         );
+        let (zero, sum) = (Node::zero(), |nodes: &mut [Node<T, D>], others: &[Node<T, D>]| {
+            nodes.iter_mut().zip(others).for_each(|(node, other)| node.add(other));
+        });
+        let hooks = NodeHooks { before: &before, after: &after, zero, add: &sum, halo: None };
         let Some(ranks) = ranks else {
-            add(nodes, NodeHooks { before: &before, after: &after, halo: None });
+            add(nodes, hooks);
             self.finish(nodes);
             return;
         };
@@ -328,7 +333,7 @@ where
             is_updated: &is_updated,
             finish: &finish,
         });
-        add(nodes, NodeHooks { before: &before, after: &after, halo });
+        add(nodes, NodeHooks { halo, ..hooks });
     }
 
     /// Updates whole rows, from the node of index `first` on, after their last contribution; rows of an edge only where all
@@ -367,7 +372,10 @@ where
         for edge in here.filter(|edge| !edge.is_updated.load(Ordering::Relaxed)) {
             self.fold_edge(edge, nodes, rows.start);
             let (start, end) = (edge.rows.start - rows.start, edge.rows.end - rows.start);
-            self.complete(&mut nodes[start * row..end * row], edge.rows.start);
+            let at_once = (NODES_AT_ONCE / row).max(1);
+            each_chunk(&mut nodes[start * row..end * row], at_once * row, &|number, nodes| {
+                self.complete(nodes, edge.rows.start + number * at_once);
+            });
             self.layout.unfold_edge(&edge.rows, rows.start, nodes, &|n: Node<T, D>, a| {
                 self.update.flipped(n, a)
             });
@@ -431,6 +439,7 @@ pub(crate) fn receive_nodes<T: RealField + Pod, const D: usize>(
 mod tests {
     use super::*;
     use crate::grid::Grid;
+    use crate::grid::tiles::Tiles;
     use nalgebra::SVector;
 
     /// Nodes with distinct values, some without mass.
@@ -474,8 +483,8 @@ mod tests {
     fn check_all<const D: usize>(cells: [usize; D], walls: [[bool; 2]; D]) {
         let grid = Grid { lower: SVector::zeros(), spacing: 0.5, cells, walls };
         let layout = Layout::new(&grid, 8).unwrap();
-        let bins = Bins::new(&layout, 1);
-        let c = &Constants::new(&grid, &layout, &bins, 0.1, 1.0);
+        let tiles = Tiles::new(&layout, &cells, 3);
+        let c = &Constants::new(&grid, &layout, &tiles, 0.1, 1.0);
         check(&layout, c, Velocity);
         for vectors in [
             NodeVectors::VelocityAndAcceleration,

@@ -1,16 +1,19 @@
 //! The background grid: its cells and walls, and the layout of its nodes in memory with ghost nodes beyond walls.
 
 pub(crate) mod bins;
+pub(crate) mod division;
 pub(crate) mod extension;
 pub(crate) mod geometry;
 pub(crate) mod grid_update;
 pub(crate) mod node;
 pub(crate) mod state;
+pub(crate) mod tiles;
 
 use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
+use rayon::prelude::*;
 
 use crate::error::SetupError;
 
@@ -35,12 +38,13 @@ impl<T: RealField + Copy, const D: usize> Grid<T, D> {
     }
 }
 
-/// Rows in a bin in one dimension, the largest number in any dimension.
-pub(crate) const BIN_ROWS: usize = 256;
 /// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may need one more.
 pub(crate) const PAD_BELOW: usize = 3;
 /// Node layers above the last cell, for the extended support of a particle on the upper face.
 const PAD_ABOVE: usize = 5;
+
+/// Nodes that a thread updates at a time, where there are many.
+pub(crate) const NODES_AT_ONCE: usize = 4096;
 
 /// Node indices along an axis are formed in 32 bits.
 const MAX_LAYERS: usize = i32::MAX as usize;
@@ -126,10 +130,10 @@ impl<const D: usize> Layout<D> {
                 }
             }
         }
-        // One bin of slack keeps the arithmetic on rows from overflowing.
+        // Some layers of slack keep the arithmetic on rows from overflowing.
         let addressable =
             layout.nodes.checked_mul(bytes_per_node).map(|b| b <= isize::MAX as usize);
-        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * BIN_ROWS) {
+        if addressable != Some(true) || layout.nodes > usize::MAX / (2 * tiles::LAYER_OF_NODES) {
             return Err(too_large());
         }
         Ok(layout)
@@ -151,6 +155,11 @@ impl<const D: usize> Layout<D> {
         self.strides[D - 1]
     }
 
+    /// Rows of ghost nodes beyond walls across the last axis.
+    pub(crate) fn ghost_rows(&self) -> usize {
+        self.ghosts.iter().filter(|ghost| ghost.axis == D - 1).count()
+    }
+
     /// Calls `visit` with the index of every node in a layer across an axis, of `nodes` nodes from the beginning of a row on.
     fn for_layer(&self, nodes: usize, (axis, layer): (usize, usize), mut visit: impl FnMut(usize)) {
         let (stride, slab) = (self.strides[axis], self.strides[axis] * self.dims[axis]);
@@ -162,14 +171,22 @@ impl<const D: usize> Layout<D> {
     /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, Some(axis))`, where the component along
     /// `axis` changes its sign.
     #[cfg(test)]
-    pub(crate) fn fold<N: Copy>(&self, nodes: &mut [N], add: impl Fn(&mut N, N, Option<usize>)) {
+    pub(crate) fn fold<N: Copy + Send>(
+        &self,
+        nodes: &mut [N],
+        add: impl Fn(&mut N, N, Option<usize>) + Sync,
+    ) {
         self.fold_rows(nodes, &add);
         self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
     }
 
     /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, Some(axis))`, with the axis as in `fold`.
     #[cfg(test)]
-    pub(crate) fn unfold<N: Copy>(&self, nodes: &mut [N], mirror: impl Fn(N, Option<usize>) -> N) {
+    pub(crate) fn unfold<N: Copy + Send>(
+        &self,
+        nodes: &mut [N],
+        mirror: impl Fn(N, Option<usize>) -> N + Sync,
+    ) {
         self.unfold_rows(nodes, &mirror);
         self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);
     }
@@ -199,29 +216,26 @@ impl<const D: usize> Layout<D> {
 
     /// The part of [`fold`](Self::fold) that goes from row to row, which comes after that within rows: for one of the
     /// [edges](Self::edges), among the rows from row `first` on.
-    pub(crate) fn fold_edge<N: Copy>(
+    pub(crate) fn fold_edge<N: Copy + Send>(
         &self,
         edge: &Range<usize>,
         first: usize,
         rows: &mut [N],
-        add: &impl Fn(&mut N, N, Option<usize>),
+        add: &(impl Fn(&mut N, N, Option<usize>) + Sync),
     ) {
-        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
-            let ghost = rows[ghost];
-            add(&mut rows[image], ghost, flip);
-        });
+        self.for_ghosts_of_edge(edge, first, rows, |ghost, image, flip| add(image, *ghost, flip));
     }
 
     /// The part of [`unfold`](Self::unfold) that goes from row to row, as [`fold_edge`](Self::fold_edge).
-    pub(crate) fn unfold_edge<N: Copy>(
+    pub(crate) fn unfold_edge<N: Copy + Send>(
         &self,
         edge: &Range<usize>,
         first: usize,
         rows: &mut [N],
-        mirror: &impl Fn(N, Option<usize>) -> N,
+        mirror: &(impl Fn(N, Option<usize>) -> N + Sync),
     ) {
-        self.for_ghosts_of_edge(edge, first, |ghost, image, flip| {
-            rows[ghost] = mirror(rows[image], flip);
+        self.for_ghosts_of_edge(edge, first, rows, |ghost, image, flip| {
+            *ghost = mirror(*image, flip);
         });
     }
 
@@ -237,19 +251,37 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// As [`for_ghosts_in_rows`](Self::for_ghosts_in_rows) for ghost nodes with mirror images in other rows, both at one edge;
-    /// indices count from the beginning of row `first`.
+    /// Calls `visit(ghost, image, flip)` for ghost nodes with mirror images in other rows, both at one edge, among `rows` from row `first` on;
+    /// in parallel, which pays in space.
     #[inline(always)]
-    fn for_ghosts_of_edge(
+    fn for_ghosts_of_edge<N: Send>(
         &self,
         edge: &Range<usize>,
         first: usize,
-        mut visit: impl FnMut(usize, usize, Option<usize>),
+        rows: &mut [N],
+        visit: impl Fn(&mut N, &mut N, Option<usize>) + Sync,
     ) {
         let row = self.row();
         for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
-            let (ghost, image) = ((g.layer - first) * row, (g.image - first) * row);
-            (0..row).for_each(|node| visit(ghost + node, image + node, g.flip()));
+            let [lower, upper] =
+                if g.layer < g.image { [g.layer, g.image] } else { [g.image, g.layer] };
+            let (below, above) = rows.split_at_mut((upper - first) * row);
+            let (lower, upper) = (&mut below[(lower - first) * row..][..row], &mut above[..row]);
+            let (ghosts, images) = if g.layer < g.image { (lower, upper) } else { (upper, lower) };
+            let visit_all = |ghosts: &mut [N], images: &mut [N]| {
+                ghosts
+                    .iter_mut()
+                    .zip(images)
+                    .for_each(|(ghost, image)| visit(ghost, image, g.flip()));
+            };
+            if row <= NODES_AT_ONCE {
+                visit_all(ghosts, images);
+                continue;
+            }
+            let ghosts = ghosts.par_chunks_mut(NODES_AT_ONCE);
+            ghosts
+                .zip(images.par_chunks_mut(NODES_AT_ONCE))
+                .for_each(|(ghosts, images)| visit_all(ghosts, images));
         }
     }
 

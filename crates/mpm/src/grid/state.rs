@@ -1,4 +1,4 @@
-//! The grid of a running simulation: its nodes, and the bins of particles above them.
+//! The grid of a running simulation: its nodes, and the particles above them sorted by tile.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::grid::node::Node;
 pub(crate) struct GridState<T, const D: usize> {
     pub(crate) constants: Constants<T, D>,
     pub(crate) layout: Layout<D>,
-    pub(crate) bins: Bins,
+    pub(crate) bins: Bins<D>,
     pub(crate) nodes: Vec<Node<T, D>>,
     /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
     pub(crate) reprojected: Vec<Node<T, D>>,
@@ -30,12 +30,11 @@ pub(crate) struct GridState<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> GridState<T, D> {
-    /// Makes room for the bins `own`, with so many particles or corners, and for the rows that those reach.
+    /// Makes room for the layers of tiles `own`, with so many particles or corners, and for the rows that those reach.
     pub(crate) fn hold(&mut self, own: Range<usize>, points: usize) {
         let Self { constants, layout, bins, .. } = self;
-        let rows = bins.rows();
-        let held = Held { bands: own, all: rows.count() };
-        let rows: Range<usize> = rows.rows_of(&held, layout.dims[D - 1]);
+        let held = Held { bands: own, all: bins.tiles().layers() };
+        let rows: Range<usize> = bins.tiles().rows_of(&held);
         bins.hold(held, points);
         if rows == layout.rows() {
             return;

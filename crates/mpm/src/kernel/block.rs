@@ -275,15 +275,15 @@ pub(super) mod tests {
 
     use crate::Grid;
     use crate::grid::Layout;
-    use crate::grid::bins::Bins;
+    use crate::grid::tiles::Tiles;
     use mmsmith_laws::NeoHookean;
 
     pub(in crate::kernel) fn constants<const D: usize>() -> (Constants<f64, D>, usize) {
         let grid =
             Grid { lower: SVector::zeros(), spacing: 0.5, cells: [8; D], walls: [[false; 2]; D] };
         let layout = Layout::new(&grid, 8).unwrap();
-        let bins = Bins::new(&layout, 1);
-        (Constants::new(&grid, &layout, &bins, 0.1, 1.0), layout.nodes)
+        let tiles = Tiles::new(&layout, &grid.cells, 6);
+        (Constants::new(&grid, &layout, &tiles, 0.1, 1.0), layout.nodes)
     }
 
     pub(in crate::kernel) fn noise(seed: usize) -> f64 {

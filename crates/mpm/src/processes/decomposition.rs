@@ -1,7 +1,7 @@
-//! Domain decomposition: each process holds some successive bins, their particles, and the rows of the grid that those reach.
+//! Domain decomposition: each process holds some successive layers of tiles, their particles, and the rows of the grid that those reach.
 //!
-//! Bins are what sums go by, whoever holds them, so results have the same bits for any number of processes. A sort gives each
-//! particle to the process of its bin. Bins are cut where their particles are many, by whole bins.
+//! Tiles are what sums go by, whoever holds them, so results have the same bits for any number of processes. A sort gives each
+//! particle to the process of its layer. Cuts go between layers, so that processes have much the same number of particles.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use nalgebra::RealField;
 
 use crate::error::{SetupError, StepError};
 use crate::grid::Layout;
-use crate::grid::bins::BinRows;
+use crate::grid::tiles::Tiles;
 use crate::particles::columns::EachColumn;
 use crate::step::health::{Invalid, Outcome};
 
@@ -140,10 +140,10 @@ impl LocalBody {
 }
 
 /// The largest number of processes that the rows of a grid keep busy.
-pub(crate) fn most_ranks<const D: usize>(layout: &Layout<D>, rows: BinRows) -> usize {
-    // Rows next to a wall across the last axis are updated together, by one process; those at the upper end may be of two bins.
+pub(crate) fn most_ranks<const D: usize>(layout: &Layout<D>, tiles: &Tiles<D>) -> usize {
+    // Rows next to a wall across the last axis are updated together, by one process; those at the upper end may be of two layers.
     let [low, _] = layout.edges();
-    if low.end > rows.first_row(1) { 1 } else { rows.count().saturating_sub(1).max(1) }
+    if low.end > tiles.first_row(1) { 1 } else { tiles.layers().saturating_sub(1).max(1) }
 }
 
 /// The first bin of each of `ranks` processes, and the number of bins: each has one at least, the last one two, and otherwise as
@@ -186,9 +186,9 @@ impl EachColumn for &Move {
 pub(crate) fn admit<const D: usize>(
     ranks: usize,
     layout: &Layout<D>,
-    rows: BinRows,
+    tiles: &Tiles<D>,
 ) -> Result<(), SetupError> {
-    let most = most_ranks(layout, rows);
+    let most = most_ranks(layout, tiles);
     if ranks > most { Err(SetupError::TooManyRanks { ranks, most }) } else { Ok(()) }
 }
 

@@ -82,7 +82,7 @@ struct Saved<T, const D: usize> {
     kind: Kind,
     steps_done: usize,
     ids: Vec<u64>,
-    /// The sub-bin of each at the last sort.
+    /// The tile of each at the last sort.
     keys: Vec<u32>,
     columns: MovingColumns<T, D>,
     /// Shared corners: the numbers of those that have the keys.
@@ -220,7 +220,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn take_up(&mut self, parts: Vec<SavedState>) -> Result<usize, SavedStateError> {
         let kind = Kind { shares: self.shares, has_corners: self.corners.is_some() };
         let saved = self.agreed(Saved::of_parts(parts, kind))?;
-        let is_grid = saved.keys.iter().all(|&key| self.grid.bins.has_key(key));
+        let is_grid = saved.keys.iter().all(|&key| self.grid.bins.tiles().has(key));
         self.agreed(if is_grid { Ok(()) } else { Err(SavedStateError::Place) })?;
         let steps_done = saved.steps_done as u64;
         // Those that have read no part do not know it.

@@ -286,12 +286,6 @@ pub(crate) fn node_below<T: RealField + Copy>(s: T) -> (f64, T) {
     (below, real(below - PAD_BELOW as f64))
 }
 
-/// Index of the first node along an axis, as in the weights.
-#[inline(always)]
-pub(crate) fn first_layer<T: RealField + Copy>(xi: T, l: T) -> usize {
-    index(node_below(xi - l).0)
-}
-
 /// GIMP weights along one axis for `0 < l <= 1/2`.
 ///
 /// For r = |xi - node|: `1 - (r^2 + l^2) / (2 l)` up to l, `1 - r` up to `1 - l`, `(1 + l - r)^2 / (4 l)` up to `1 + l`.
@@ -441,7 +435,6 @@ mod tests {
                 let s: f64 = at + away;
                 let below = s.floor();
                 assert_eq!(node_below(s), (below + PAD_BELOW as f64, below), "{s:e}");
-                assert_eq!(first_layer(s, 0.0), (below as i32 + PAD_BELOW as i32) as usize);
                 let s = s as f32;
                 let below = s.floor();
                 assert_eq!(node_below(s), (f64::from(below) + PAD_BELOW as f64, below), "{s:e}");
@@ -461,12 +454,12 @@ mod tests {
             check(&extended_mean(xi, 0.75 * wide), xi)?;
         }
 
-        /// Particles are sorted by the bin of the first node of their weights.
+        /// Particles are sorted by the lower edges of their weights.
         #[test]
-        fn the_first_layer_is_that_of_the_weights(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
-            prop_assert_eq!(first_layer(xi, l) as f64, gimp_axis(xi, l).base);
-            prop_assert_eq!(first_layer(xi, 0.0) as f64, hat(xi).base);
-            prop_assert_eq!(first_layer(xi, l + HALF_A_CELL) as f64, mean(xi, l).base);
+        fn the_first_node_is_the_one_below_the_lower_edge(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64) {
+            prop_assert_eq!(node_below(xi - l).0, gimp_axis(xi, l).base);
+            prop_assert_eq!(node_below(xi).0, hat(xi).base);
+            prop_assert_eq!(node_below(xi - (l + HALF_A_CELL)).0, mean(xi, l).base);
         }
 
         #[test]

@@ -101,7 +101,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         each(pieces.collect(), &|piece| pass.advance(piece));
         shared.measured = measured;
         shared.commit_positions(true);
-        let outcome = corner_exchange::check(&c, shared, bins.bin_of());
+        let outcome = corner_exchange::check(&c, shared, bins.keys());
         if !is_in_doubt.into_inner() {
             return outcome;
         }

@@ -160,7 +160,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Some(corners) = corners {
             let Corners { shared, .. } = &mut **corners;
             shared.commit_positions(false);
-            found.add(corner_exchange::check(constants, shared, bins.bin_of()));
+            found.add(corner_exchange::check(constants, shared, bins.keys()));
             if is_in_doubt {
                 found.add(check_all(particles, (constants, shared)));
             }
@@ -338,14 +338,14 @@ fn each_piece<T: Lanes, const D: usize>(
 /// A pass of G2P over all particles.
 struct G2p<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    bins: &'a Bins,
+    bins: &'a Bins<D>,
     domain: &'a dyn Domain<T, D>,
     corners: Option<&'a Corners<T, D>>,
 }
 
 impl<T: Lanes, const D: usize> G2p<'_, T, D> {
     /// Calls `update(buffers with weights, ids, particles)` for every block of particles, then checks that each particle is valid and
-    /// in its bin. Gives the outcome, and whether a particle is in doubt: where particles share corners, these have to be at their new
+    /// in its tile. Gives the outcome, and whether a particle is in doubt: where particles share corners, these have to be at their new
     /// places before particles are told invalid.
     fn all(
         &self,
@@ -354,7 +354,7 @@ impl<T: Lanes, const D: usize> G2p<'_, T, D> {
         update: impl Fn(&mut Buffers<T, D>, &[u32], &mut Moving<'_, T, D>) + Sync,
     ) -> (SharedOutcome, bool) {
         let &Self { c, bins, domain, corners } = self;
-        let (bin_of, found) = (bins.bin_of(), SharedOutcome::default());
+        let (keys, found) = (bins.keys(), SharedOutcome::default());
         let is_in_doubt = AtomicBool::new(false);
         each_piece(particles, &|of_piece, piece| {
             let mut outcome = Outcome::default();
@@ -375,7 +375,7 @@ impl<T: Lanes, const D: usize> G2p<'_, T, D> {
                 update(&mut own, ids, &mut of_block);
                 let Moving { x, F, .. } = of_block;
                 match corners {
-                    None => outcome = outcome.merge(self.check(&mut copies, ids, bin_of, x, F)),
+                    None => outcome = outcome.merge(self.check(&mut copies, ids, keys, x, F)),
                     Some(Corners { shared, .. }) => {
                         // Polygons are measured when all corners are at their new places.
                         let is_valid = shared.mesh.is_of_cells()
@@ -398,22 +398,22 @@ impl<T: Lanes, const D: usize> G2p<'_, T, D> {
         &self,
         copies: &mut Copies<T, D>,
         ids: &[u32],
-        bin_of: &[u32],
+        keys: &[u32],
         x: &[SVector<T, D>],
         F: &[SMatrix<T, D, D>],
     ) -> Outcome {
         let &Self { c, domain, .. } = self;
-        let mut bins = [0; BLOCK];
-        for (bin, &p) in bins.iter_mut().zip(ids) {
-            *bin = bin_of[p as usize];
+        let mut tiles = [0; BLOCK];
+        for (tile, &p) in tiles.iter_mut().zip(ids) {
+            *tile = keys[p as usize];
         }
         let kinematics = copies.of_successive(x, F);
         let mut outcome = Outcome::default();
-        if domain.are_valid(OfBlock { c, ids, bins: &bins, kinematics }) {
+        if domain.are_valid(OfBlock { c, ids, tiles: &tiles, kinematics }) {
             return outcome;
         }
-        for (((x, F), bin), &p) in x.iter().zip(F).zip(bins).zip(ids) {
-            outcome = outcome.merge(domain.diagnose(c, p as usize, bin, x, F));
+        for (((x, F), tile), &p) in x.iter().zip(F).zip(tiles).zip(ids) {
+            outcome = outcome.merge(domain.diagnose(c, p as usize, tile, x, F));
         }
         outcome
     }

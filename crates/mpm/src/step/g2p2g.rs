@@ -10,6 +10,7 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
 
 use crate::domain::of_particles::{Domain, OfBlock};
+use crate::grid::bins::Band;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::grid::node::Node;
@@ -44,11 +45,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let update =
             GridUpdate::new(layout, c, VelocityAndAcceleration { scale: T::one(), vectors });
         let divide = |partition| {
-            DisjointMoving::new(partition, moving).expect("each particle is in one bin")
+            DisjointMoving::new(partition, moving).expect("each particle is in one tile")
         };
-        update.g2p2g(bins, next, divide, &|band, first, bin, divided, part| {
+        update.g2p2g(bins, next, divide, &|band, divided, part| {
             if let Some(particles) = divided.take(part) {
-                found.add(step.advance_bin(band, first, bin, particles));
+                found.add(step.advance_tile(band, particles));
             }
         });
         std::mem::swap(nodes, next);
@@ -56,7 +57,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     }
 }
 
-/// The inputs common to all bins.
+/// The inputs common to all tiles.
 struct G2p2g<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
     domain: &'a dyn Domain<T, D>,
@@ -73,16 +74,14 @@ struct G2p2g<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
-    /// Advances the particles of a bin, then adds their contributions to its band of the next step's grid, which starts at
-    /// node `first`.
-    fn advance_bin(
+    /// Advances the particles of a tile, then adds their contributions to its nodes of the next step's grid.
+    fn advance_tile(
         &self,
-        band: &mut [Node<T, D>],
-        first: usize,
-        bin: u32,
+        mut band: Band<'_, Node<T, D>, D>,
         mut particles: PartMoving<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
+        let c = &self.c.in_band(&band);
         let mut buffers = self.buffers.take(self.domain, self.transfer.is_affine());
         if let Some((mass, volume)) = self.uniform {
             buffers.contributions.set_uniform(mass, volume);
@@ -94,14 +93,14 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 buffers.contributions.take(ids, self.fixed.mass, self.fixed.volume);
             }
             if let Some(block) = particles.contiguous(place, BLOCK) {
-                let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
+                let found = self.advance_block(&mut buffers, (&mut band, c), ids, block);
                 outcome = outcome.merge(found);
                 continue;
             }
             let copies = copies.get_or_insert_with(|| MovingColumns::at_rest(BLOCK, &self.shares));
             particles.gather(place, ids.len(), copies);
             let block = copies.first(BLOCK, &self.shares);
-            let found = self.advance_block(&mut buffers, band, (first, bin), ids, block);
+            let found = self.advance_block(&mut buffers, (&mut band, c), ids, block);
             outcome = outcome.merge(found);
             particles.scatter(place, ids.len(), copies);
         }
@@ -109,12 +108,11 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         outcome
     }
 
-    /// As [`advance_bin`](Self::advance_bin) for a block of particles.
+    /// As [`advance_tile`](Self::advance_tile) for a block of particles.
     fn advance_block(
         &self,
         Buffers { weights, contributions, interpolated, .. }: &mut Buffers<T, D>,
-        band: &mut [Node<T, D>],
-        (first, bin): (usize, u32),
+        (band, in_band): (&mut Band<'_, Node<T, D>, D>, &Constants<T, D>),
         ids: &[u32],
         mut particles: Moving<'_, T, D>,
     ) -> Outcome {
@@ -160,14 +158,15 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         }
         let Moving { x, F, internal, .. } = particles;
         let (x, F) = (whole(x), whole(F));
-        weights.compute(c, ids, Kinematics { x, F });
-        let of_block = OfBlock { c, ids, bins: &[bin; BLOCK], kinematics: Kinematics { x, F } };
+        weights.compute(in_band, ids, Kinematics { x, F });
+        let (tiles, kinematics) = (&[band.tile; BLOCK], Kinematics { x, F });
+        let of_block = OfBlock { c, ids, tiles, kinematics };
         if !domain.are_valid(of_block) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
-                outcome = outcome.merge(domain.diagnose(c, p as usize, bin, &x[k], &F[k]));
+                outcome = outcome.merge(domain.diagnose(c, p as usize, band.tile, &x[k], &F[k]));
             }
-            // A particle outside its bin would write to nodes beyond the band.
+            // A particle outside its tile would write to nodes beyond the band.
             if !outcome.is_clean() {
                 return outcome;
             }
@@ -178,7 +177,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         if !has_stress {
             law.stress(c, F, internal, contributions);
         }
-        weights.p2g(&c.strides, band, first, contributions, ids.len());
+        weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
         Outcome::default()
     }
 }

@@ -39,7 +39,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Whether all particles are valid and in their bins.
+    /// Whether all particles are valid and in their tiles.
     pub(crate) fn is_clean(self) -> bool {
         self.failure.is_none() && !self.resort
     }
@@ -74,8 +74,8 @@ impl SharedOutcome {
 mod tests {
     use super::*;
     use crate::domain::of_particles::{Domain, OfBlock};
-    use crate::grid::bins::Bins;
     use crate::grid::geometry::Constants;
+    use crate::grid::tiles::Tiles;
     use crate::grid::{Grid, Layout};
     use crate::kernel::copies::{BLOCK, Copies};
     use crate::shape::one_axis::{OnAxis, ProductShape};
@@ -87,13 +87,13 @@ mod tests {
 
     fn constants() -> Constants<f64, 2> {
         let grid =
-            Grid { lower: Vector2::zeros(), spacing: 0.5, cells: [6, 60], walls: [[false; 2]; 2] };
+            Grid { lower: Vector2::zeros(), spacing: 0.5, cells: [6, 64], walls: [[false; 2]; 2] };
         let layout = Layout::new(&grid, 8).unwrap();
-        let bins = Bins::new(&layout, 1);
-        Constants::new(&grid, &layout, &bins, 0.1, 1.0)
+        let tiles = Tiles::new(&layout, &grid.cells, 6);
+        Constants::new(&grid, &layout, &tiles, 0.1, 1.0)
     }
 
-    /// `check(x, F, valid)` has to give the expected answer, in the bin of rows from 13 cells above the lower corner on.
+    /// `check(x, F, valid)` has to give the expected answer, in the tile of rows from 14 cells above the lower corner on.
     fn for_all_limits(
         shape: &str,
         F: Matrix2<f64>,
@@ -103,8 +103,8 @@ mod tests {
     ) {
         let at = |edge: f64| 0.5 * (edge + half_size);
         for (y, valid) in [
-            (at(13.0), true),
-            (at(13.0).next_down(), false),
+            (at(14.0), true),
+            (at(14.0).next_down(), false),
             (at(end), false),
             (at(end).next_down(), true),
         ] {
@@ -134,11 +134,11 @@ mod tests {
         let mut copies = Copies::new();
         copies.copy(&[x], &[F]);
         let kinematics = copies.kinematics();
-        domain.are_valid(OfBlock { c, ids: &[0], bins: &[bin; BLOCK], kinematics })
+        domain.are_valid(OfBlock { c, ids: &[0], tiles: &[bin; BLOCK], kinematics })
     }
 
     #[test]
-    fn particles_are_valid_up_to_the_limits_of_grid_bin_and_box() {
+    fn particles_are_valid_up_to_the_limits_of_grid_tile_and_box() {
         let c = constants();
         let with = |a: f64, b: f64| Matrix2::from_diagonal(&vector![a, b]);
         let one = with(1.0, 1.0);
@@ -150,30 +150,30 @@ mod tests {
                 is_valid
             }
         };
-        for_all_limits("hat", one, 0.0, 28.0, &valid(shape(OnAxis::Hat, 0.0)));
+        for_all_limits("hat", one, 0.0, 29.0, &valid(shape(OnAxis::Hat, 0.0)));
         let fixed = shape(OnAxis::FixedBox, 0.25);
-        for_all_limits("fixed", one, 0.25, 27.0, &valid(fixed));
-        for_all_limits("quadratic", one, 0.5, 27.0, &valid(shape(OnAxis::Quadratic, 0.5)));
-        for_all_limits("cubic", one, 1.0, 26.0, &valid(shape(OnAxis::Cubic, 1.0)));
+        for_all_limits("fixed", one, 0.25, 28.0, &valid(fixed));
+        for_all_limits("quadratic", one, 0.5, 28.0, &valid(shape(OnAxis::Quadratic, 0.5)));
+        for_all_limits("cubic", one, 1.0, 27.0, &valid(shape(OnAxis::Cubic, 1.0)));
         let of_box = valid(shape(OnAxis::StretchingBox, 0.25));
         for (F, half_size, end) in [
-            (one, 0.25, 27.0),
-            (with(1.0, 2.0), 0.5, 27.0),
+            (one, 0.25, 28.0),
+            (with(1.0, 2.0), 0.5, 28.0),
             // A box with extended support along any axis has six rows.
-            (with(1.0, 3.0), 0.75, 24.0),
-            (with(3.0, 1.0), 0.25, 24.0),
-            (with(1.0, 8.0), 2.0, 24.0),
-            (with(8.0, 1.0), 0.25, 24.0),
+            (with(1.0, 3.0), 0.75, 25.0),
+            (with(3.0, 1.0), 0.25, 25.0),
+            (with(1.0, 8.0), 2.0, 25.0),
+            (with(8.0, 1.0), 0.25, 25.0),
         ] {
             for_all_limits("stretching", F, half_size, end, &of_box);
         }
         let of_spline = valid(shape(OnAxis::QuadraticMean, 0.25));
         for (F, half_size, end) in [
-            (one, 0.75, 26.0),
-            (with(1.0, 2.0), 1.0, 26.0),
-            (with(1.0, 3.0), 1.25, 24.0),
-            (with(3.0, 1.0), 0.75, 24.0),
-            (with(1.0, 6.0), 2.0, 24.0),
+            (one, 0.75, 27.0),
+            (with(1.0, 2.0), 1.0, 27.0),
+            (with(1.0, 3.0), 1.25, 25.0),
+            (with(3.0, 1.0), 0.75, 25.0),
+            (with(1.0, 6.0), 2.0, 25.0),
         ] {
             for_all_limits("spline", F, half_size, end, &of_spline);
         }
@@ -181,9 +181,9 @@ mod tests {
         for F in [with(8.125, 1.0), with(1.0, 8.125)] {
             assert!(!of_box(vector![1.2, 9.0], F));
         }
-        // The lowest and the highest bin reach over the ends of the grid.
+        // The lowest and the highest tile reach over the ends of the grid.
         for (bin, y, valid) in
-            [(0, 0.0, true), (0, -5e-324, false), (7, 30.0, true), (7, 30.0_f64.next_up(), false)]
+            [(0, 0.0, true), (0, -5e-324, false), (7, 32.0, true), (7, 32.0_f64.next_up(), false)]
         {
             let hat = shape(OnAxis::Hat, 0.0);
             assert_eq!(is_valid(&c, &hat, bin, vector![1.2, y], one), valid, "{bin} {y}");
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_particle_that_left_its_bin_is_sorted_anew_and_an_invalid_one_stops_the_run() {
+    fn a_particle_that_left_its_tile_is_sorted_anew_and_an_invalid_one_stops_the_run() {
         let c = constants();
         let one = Matrix2::identity();
         let hat = shape(OnAxis::Hat, 0.0);
@@ -199,7 +199,7 @@ mod tests {
         assert!(diagnose(9.0, &one).is_clean());
         let moved = diagnose(15.0, &one);
         assert!(moved.resort && moved.failure.is_none() && !moved.is_clean());
-        let gone = diagnose(31.0, &one);
+        let gone = diagnose(33.0, &one);
         assert_eq!((gone.failure, gone.resort), (Some((Invalid::LeftGrid, 41)), false));
         let inverted = diagnose(9.0, &-Matrix2::from_diagonal(&vector![1.0, -1.0]));
         assert_eq!(inverted.failure, Some((Invalid::Inverted, 41)));

@@ -10,6 +10,7 @@ pub(crate) mod g2p;
 pub(crate) mod g2p2g;
 pub(crate) mod health;
 pub(crate) mod p2g;
+pub(crate) mod passes;
 pub(crate) mod state;
 pub(crate) mod volume;
 pub(crate) mod xpic;
@@ -20,6 +21,7 @@ use mmsmith_lanes::tensor::real;
 use crate::scheme::{Integrator, Transfer, VelocityUpdate};
 use crate::step::body_force::BodyForce;
 use crate::step::health::Outcome;
+use crate::step::passes::Pass;
 use crate::step::state::State;
 
 /// Times of a step, and the factor on its accelerations.
@@ -54,7 +56,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let projects = self.law.is_projected();
         if is_fused(integrator, self.transfer) && !projects {
             return match self.corners {
-                Some(_) => self.step_at_corners(body_force, times),
+                Some(_) => {
+                    self.timed(Pass::AtCorners, |state| state.step_at_corners(body_force, times))
+                }
                 None => self.fused_step(body_force, times),
             };
         }
@@ -62,36 +66,39 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let dt = self.grid.constants.time_step;
         let late = dt * real(1.0 - early);
         if early > 0.0 {
-            self.p2g_momentum();
-            let outcome = self.g2p_stretch(dt * real(early));
+            self.timed(Pass::P2gOfMomentum, Self::p2g_momentum);
+            let outcome =
+                self.timed(Pass::G2pOfStretch, |state| state.g2p_stretch(dt * real(early)));
             let outcome = self.reduce_outcome(outcome);
             if outcome.failure.is_some() {
                 std::mem::swap(&mut self.particles.F, &mut self.early.F);
                 return outcome;
             }
             if projects {
-                self.project_volume(true);
+                self.timed(Pass::Projection, |state| state.project_volume(true));
             }
-            self.p2g_force(body_force, times);
+            self.timed(Pass::P2gOfForce, |state| state.p2g_force(body_force, times));
         } else {
-            self.p2g(body_force, times);
+            self.timed(Pass::P2g, |state| state.p2g(body_force, times));
         }
         if let VelocityUpdate::FilteredReplace(filter) = self.transfer.velocity_update() {
-            self.filter(filter);
+            self.timed(Pass::Filter, |state| state.filter(filter));
         }
-        self.move_corners();
+        if self.corners.is_some() {
+            self.timed(Pass::Corners, Self::move_corners);
+        }
         let outcome = if integrator.reprojects() {
-            self.g2p_velocity();
-            self.p2g_updated_momentum();
-            self.g2p_reprojected(late)
+            self.timed(Pass::G2pOfVelocity, Self::g2p_velocity);
+            self.timed(Pass::P2gOfUpdatedMomentum, Self::p2g_updated_momentum);
+            self.timed(Pass::G2p, |state| state.g2p_reprojected(late))
         } else {
-            self.g2p(late)
+            self.timed(Pass::G2p, |state| state.g2p(late))
         };
         let outcome = self.reduce_outcome(outcome);
         let outcome = self.resort_if(outcome);
         // Where F has not followed since forces were computed, its change of volume has been projected.
         if projects && early < 1.0 && outcome.failure.is_none() {
-            self.project_volume(false);
+            self.timed(Pass::Projection, |state| state.project_volume(false));
         }
         outcome
     }
@@ -106,9 +113,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// A step in a single pass.
     fn fused_step(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) -> Outcome {
         if !self.grid.is_ahead {
-            self.p2g(body_force, times);
+            self.timed(Pass::P2g, |state| state.p2g(body_force, times));
         }
-        let outcome = self.g2p2g(body_force, times.end);
+        let outcome = self.timed(Pass::G2pAndP2g, |state| state.g2p2g(body_force, times.end));
         let outcome = self.reduce_outcome(outcome);
         // After a sort or a failure the partial sums on the grid are of no use.
         self.grid.is_ahead = outcome.is_clean();

@@ -4,7 +4,7 @@
 //! m_i = sum m_p S_ip;  m_i v_i = sum m_p (v_p + C_p (x_i - x_p)) S_ip;  f_i = -sum V0_p tau_p G_ip + sum m_p b_p S_ip
 //! ```
 //!
-//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), bins in [`bins`](crate::grid::bins).
+//! The affine velocity `C_p` is that of APIC. The sums of one particle are in [`kernel`](crate::kernel), tiles in [`bins`](crate::grid::bins).
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
@@ -14,7 +14,7 @@ use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
-use crate::grid::bins::Bins;
+use crate::grid::bins::{Band, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
     Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
@@ -45,7 +45,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g {
+            c: &c,
+            domain,
+            buffers,
+            is_affine: transfer.is_affine(),
+            reads_grid: false,
+            x,
+            F,
+        };
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -70,7 +78,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
-        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g {
+            c: &c,
+            domain,
+            buffers,
+            is_affine: transfer.is_affine(),
+            reads_grid: false,
+            x,
+            F,
+        };
         p2g.to_grid(&update, (bins, two_stages(corners), None), nodes, &momenta(mass, v, affine));
     }
 
@@ -88,7 +104,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, domain, buffers, is_affine: false, x, F };
+        let p2g = P2g { c: &c, domain, buffers, is_affine: false, reads_grid: false, x, F };
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -115,7 +131,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g { c: &c, domain, buffers, is_affine: transfer.is_affine(), x, F };
+        let p2g = P2g {
+            c: &c,
+            domain,
+            buffers,
+            is_affine: transfer.is_affine(),
+            reads_grid: false,
+            x,
+            F,
+        };
         p2g.to_grid(
             &update,
             (bins, two_stages(corners), None),
@@ -142,7 +166,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             None => (GridValues { nodes: from, at_corners: None }, None),
         };
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g { c: &c, domain, buffers, is_affine: false, x, F };
+        let p2g = P2g { c: &c, domain, buffers, is_affine: false, reads_grid: true, x, F };
         let set = |buffers: &mut Buffers<T, D>, _: &mut Copies<T, D>, ids: &[u32]| {
             values.g2p(&c, buffers, ids);
             let Buffers { contributions, interpolated, .. } = buffers;
@@ -187,22 +211,24 @@ pub(crate) struct P2g<'a, T, const D: usize> {
     pub(crate) domain: &'a dyn Domain<T, D>,
     pub(crate) buffers: &'a BufferPool<T, D>,
     pub(crate) is_affine: bool,
+    /// Whether contributions need the grid's values at the particles.
+    pub(crate) reads_grid: bool,
     pub(crate) x: &'a [SVector<T, D>],
     pub(crate) F: &'a [SMatrix<T, D, D>],
 }
 
 impl<T: Lanes, const D: usize> P2g<'_, T, D> {
-    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: bin by bin, and by
+    /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: tile by tile, and by
     /// way of corners where particles share them, with the loads on these.
     pub(crate) fn to_grid<S: NodeUpdate<T, D>>(
         &self,
         update: &GridUpdate<'_, T, S, D>,
-        (bins, stages, loading): (&mut Bins, Option<TwoStages<'_, T, D>>, Loading<'_, T, D>),
+        (bins, stages, loading): (&mut Bins<D>, Option<TwoStages<'_, T, D>>, Loading<'_, T, D>),
         nodes: &mut [Node<T, D>],
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
         let Some((corners, exchange)) = stages else {
-            update.p2g(bins, nodes, &|band, first, ids| self.bin(band, first, ids, set));
+            update.p2g(bins, nodes, &|band, ids| self.tile(band, ids, set));
             return;
         };
         self.to_corners(corners, exchange, set);
@@ -217,7 +243,7 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         exchange: &mut Exchange<T, D>,
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
-        let &Self { c, domain, buffers: pool, is_affine, x, F } = self;
+        let &Self { c, domain, buffers: pool, is_affine, x, F, .. } = self;
         let chunks = &corners.chunks;
         let pieces = chunks.iter().zip(exchange.begin(chunks, is_affine)).collect();
         each(pieces, &|(Chunk { particles, .. }, mut of_chunk)| {
@@ -246,27 +272,34 @@ impl<T: Lanes, const D: usize> P2g<'_, T, D> {
         });
     }
 
-    /// Adds the particles `ids`, block by block, to the band of nodes that starts at node `first`.
+    /// Adds the particles `ids`, block by block, to the nodes of their tile.
     /// `set(buffers, copies, ids)` sets the contributions of a block.
-    fn bin(
+    fn tile(
         &self,
-        band: &mut [Node<T, D>],
-        first: usize,
+        band: Band<'_, Node<T, D>, D>,
         ids: &[u32],
         set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
-        let &Self { c, domain, buffers: pool, is_affine, x, F } = self;
+        let &Self { c, domain, buffers: pool, is_affine, reads_grid, x, F } = self;
+        let in_band = c.in_band(&band);
+        let set_first = reads_grid && band.strides != c.strides;
         let mut copies = Copies::new();
         let mut buffers = pool.take(domain, is_affine);
         for ids in ids.chunks(BLOCK) {
             copies.pick(ids, x, F);
-            buffers.weights.compute(c, ids, copies.kinematics());
+            if set_first {
+                buffers.weights.compute(c, ids, copies.kinematics());
+                set(&mut buffers, &mut copies, ids);
+            }
+            buffers.weights.compute(&in_band, ids, copies.kinematics());
             if c.planted.is(Fault::LastNodeSkipped) {
                 buffers.weights.skip_last_node(c, &copies.x);
             }
-            set(&mut buffers, &mut copies, ids);
+            if !set_first {
+                set(&mut buffers, &mut copies, ids);
+            }
             let Buffers { weights, contributions, .. } = &mut *buffers;
-            weights.p2g(&c.strides, band, first, contributions, ids.len());
+            weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
         }
         pool.give_back(buffers);
     }

@@ -14,6 +14,7 @@ use crate::particles::columns::Shares;
 use crate::processes::decomposition::LocalBody;
 use crate::scheme::Transfer;
 use crate::step::health::{Invalid, Outcome};
+use crate::step::passes::{Pass, Passes};
 
 /// Everything that a step reads and changes.
 pub(crate) struct State<T, const D: usize> {
@@ -28,7 +29,7 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) shares: Shares,
     /// Mass and volume of every particle, where they are uniform.
     pub(crate) uniform: Option<(T, T)>,
-    /// The grid, with the bins of particles.
+    /// The grid, with the particles sorted by tile.
     pub(crate) grid: GridState<T, D>,
     /// Where other processes hold the rest of the body: this one's part.
     pub(crate) part: Option<LocalBody>,
@@ -38,6 +39,8 @@ pub(crate) struct State<T, const D: usize> {
     pub(crate) buffers: BufferPool<T, D>,
     /// Buffer for the part of the body force that depends on time alone.
     pub(crate) of_time: Vec<T>,
+    /// Times of passes, where they are wanted.
+    pub(crate) passes: Passes,
 }
 
 /// F and internal variables after the early part of a step, while the weights still need F at its start.
@@ -51,12 +54,20 @@ pub(crate) struct EarlyState<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
-    /// Sorts the particles into bins, if one of them left its bin in the last pass.
+    /// Sorts the particles by tile, if one of them left its tile in the last pass.
     pub(crate) fn resort_if(&mut self, outcome: Outcome) -> Outcome {
         if outcome.resort && outcome.failure.is_none() {
-            self.sort();
+            self.timed(Pass::Sort, Self::sort);
         }
         outcome
+    }
+
+    /// Does a pass, and takes its time where that is wanted.
+    pub(crate) fn timed<R>(&mut self, pass: Pass, work: impl FnOnce(&mut Self) -> R) -> R {
+        let begun = self.passes.before();
+        let result = work(self);
+        self.passes.after(pass, begun);
+        result
     }
 
     /// The outcome of all processes.
@@ -64,17 +75,17 @@ impl<T: Lanes, const D: usize> State<T, D> {
         self.part.as_ref().map_or(outcome, |part| part.reduce_outcome(outcome))
     }
 
-    /// Sorts the particles into bins, those of other processes too.
+    /// Sorts the particles by tile, those of other processes too.
     pub(crate) fn sort(&mut self) {
         let Self { grid, particles, domain, corners, .. } = self;
-        let GridState { constants: c, bins, layout, .. } = grid;
+        let GridState { constants: c, bins, .. } = grid;
         let Particles { x, F, .. } = &*particles;
         let keys = match corners {
             Some(corners) => {
                 let Corners { shared, .. } = &**corners;
-                bins.keys_of(layout, shared.count(), &|corner| shared.first_node(c, corner))
+                bins.keys_of(shared.count(), &|corner| shared.edges(c, corner))
             }
-            None => bins.keys_of(layout, x.len(), &|p| domain.first_node(c, p, &x[p], &F[p])),
+            None => bins.keys_of(x.len(), &|p| domain.edges(c, p, &x[p], &F[p])),
         };
         self.sort_as(keys);
     }

@@ -1,4 +1,4 @@
-//! Particles that share corners go to the processes of the bins of these.
+//! Particles that share corners go to the processes of the layers of these.
 //!
 //! The process of its first corner holds a particle, and gives it to all others that have corners of it: see
 //! [`corner_halo`](crate::processes::corner_halo).
@@ -16,7 +16,7 @@ use crate::step::state::State;
 use mmsmith_ranks::{Lists, Move};
 
 impl<T: Lanes, const D: usize> State<T, D> {
-    /// Gives every particle to the processes of its corners, of which `keys` has the sub-bins. Gives those of the corners that this
+    /// Gives every particle to the processes of its corners, of which `keys` has the tiles. Gives those of the corners that this
     /// process sorts then.
     pub(super) fn give_mesh(&mut self, keys: &[u32]) -> Vec<u32> {
         let (Some(part), Some(corners)) = (&mut self.part, &self.corners) else {
@@ -27,15 +27,16 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let is_own = |corner: u32| (corner as usize) < corners.own();
         let first_corner = |p: usize| mesh.corners[mesh.places(p).start];
 
-        let bin_of = |corner: u32| self.grid.bins.bin_of_key(keys[corner as usize]);
-        let mut counts = vec![0_u64; self.grid.bins.rows().count()];
+        let layer_of = |corner: u32| self.grid.bins.tiles().layer_of(keys[corner as usize]);
+        let mut counts = vec![0_u64; self.grid.bins.tiles().layers()];
         for corner in (0..known.len()).map(first_corner).filter(|corner| is_own(*corner)) {
-            counts[bin_of(corner)] += 1;
+            counts[layer_of(corner)] += 1;
         }
         let held = part.cut(counts);
         let part = &*part;
         let holders = |corners: &[u32]| -> Vec<usize> {
-            let mut holders: Vec<usize> = corners.iter().map(|&c| part.holder(bin_of(c))).collect();
+            let mut holders: Vec<usize> =
+                corners.iter().map(|&c| part.holder(layer_of(c))).collect();
             holders.sort_unstable();
             holders.dedup();
             holders
@@ -64,7 +65,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Some(moved) = self.give(&|p| &of_particles[p]) else { return Vec::new() };
         let (records, keys) = (records.follow(&moved), moved.lists(&keys));
 
-        let bin = |p: usize, place: usize| self.grid.bins.bin_of_key(keys.of(p)[place]);
+        let bin = |p: usize, place: usize| self.grid.bins.tiles().layer_of(keys.of(p)[place]);
         let is_other = |p: usize, place: usize| !held.contains(&bin(p, place));
         let (mesh, places) = records.assemble(moved.len(), &loads, kind, is_other);
         let own = places.iter().filter(|[p, place]| !is_other(*p, *place)).count();

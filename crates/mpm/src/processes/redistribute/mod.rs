@@ -1,4 +1,4 @@
-//! Particles go to the process of their bin.
+//! Particles go to the process of their layer of tiles.
 
 mod mesh;
 
@@ -14,22 +14,23 @@ use crate::step::state::State;
 use mmsmith_ranks::Move;
 
 impl<T: Lanes, const D: usize> State<T, D> {
-    /// Gives every particle to the process of its bin, and sorts those that are here then: `keys` has the sub-bin of each particle here,
+    /// Gives every particle to the process of its tile, and sorts those that are here then: `keys` has the tile of each particle here,
     /// or of each corner that they share.
     pub(crate) fn sort_as(&mut self, mut keys: Vec<u32>) {
         if self.part.is_some() {
             keys = match self.corners {
                 Some(_) => self.give_mesh(&keys),
-                None => self.give_to_bins(keys),
+                None => self.give_to_layers(keys),
             };
         }
         self.grid.bins.sort_as(keys);
     }
 
-    /// Gives every particle to the process of its bin. Gives the sub-bins of those that are here then.
-    fn give_to_bins(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
-        let bins: Vec<usize> = keys.iter().map(|&key| self.grid.bins.bin_of_key(key)).collect();
-        let mut counts = vec![0_u64; self.grid.bins.rows().count()];
+    /// Gives every particle to the process of its tile. Gives the tiles of those that are here then.
+    fn give_to_layers(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
+        let bins: Vec<usize> =
+            keys.iter().map(|&key| self.grid.bins.tiles().layer_of(key)).collect();
+        let mut counts = vec![0_u64; self.grid.bins.tiles().layers()];
         bins.iter().for_each(|&bin| counts[bin] += 1);
         let Some(part) = &mut self.part else { return keys };
         let own = part.cut(counts);

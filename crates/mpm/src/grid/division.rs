@@ -1,0 +1,132 @@
+//! How many threads a step keeps busy, counted from the schedule of its sums.
+
+use mmsmith_threads::coloring::Held;
+
+use crate::error::SetupError;
+use crate::grid::tiles::Tiles;
+use crate::grid::{Grid, Layout, NODES_AT_ONCE};
+use crate::shape::one_axis::EXTENDED;
+
+/// What it costs to clear a node of a tile's buffer and to add it to the grid, or to clear a node of the grid and to update it, as a part of
+/// what a particle costs in a step. `cargo bench -p mmsmith-mpm --bench space` measures it.
+const NODE: f64 = 0.05;
+
+/// How the work of a step is divided among threads: tiles of particles, and the order in which their sums are added.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Division {
+    /// Tiles that have particles.
+    pub tiles: usize,
+    /// The particles of the fullest tile over their mean number, among tiles that have some.
+    pub unevenness: f64,
+    /// All work over that of the longest chain of tasks each of which waits for the one before: more threads than that are of no use.
+    pub cores: f64,
+}
+
+impl Division {
+    /// Of a body that fills a grid, with so many particles along each axis of a cell.
+    ///
+    /// # Errors
+    ///
+    /// Where the grid has no cells or its nodes cannot be numbered.
+    pub fn of_lattice<const D: usize>(
+        grid: &Grid<f64, D>,
+        per_cell: usize,
+    ) -> Result<Self, SetupError> {
+        let layout = Layout::new(grid, 1)?;
+        let tiles = Tiles::new(&layout, &grid.cells, EXTENDED);
+        let along = tiles.along_axes(per_cell);
+        let count = tiles.layers() * tiles.in_a_layer();
+        let particles: Vec<usize> = (0..count)
+            .map(|tile| {
+                let mut rest = tile;
+                along.iter().fold(1, |particles, pieces| {
+                    let own = pieces[rest % pieces.len()];
+                    rest /= pieces.len();
+                    particles * own
+                })
+            })
+            .collect();
+        Ok(Self::new(&tiles, &layout, &particles))
+    }
+
+    /// Of so many particles in each tile of a grid that one process holds.
+    pub(crate) fn new<const D: usize>(
+        tiles: &Tiles<D>,
+        layout: &Layout<D>,
+        particles: &[usize],
+    ) -> Self {
+        let held = Held::whole(tiles.layers());
+        let row = layout.row() as f64;
+        let of_rows = 2.0 * NODE * layout.dims[D - 1] as f64 * row;
+        let (work, longest) = match tiles.lattice(&held) {
+            Some(lattice) => {
+                let fill = |tile: usize| particles[tile] as f64;
+                let add = |tile: usize| {
+                    let sums = if particles[tile] > 0 { lattice.elements(tile) } else { 0 };
+                    NODE * sums as f64
+                };
+                let of_tiles: f64 = (0..particles.len()).map(|tile| fill(tile) + add(tile)).sum();
+                // Rows are cleared and updated some nodes at a time; ghost nodes beyond walls across the last axis one row after the other.
+                let at_once = row.max(NODES_AT_ONCE as f64).min(of_rows);
+                let ghosts = layout.ghost_rows() as f64 * row.min(NODES_AT_ONCE as f64);
+                let update = NODE * (2.0 * at_once + 2.0 * ghosts);
+                (of_tiles + of_rows, lattice.longest(&fill, &add) + update)
+            }
+            None => {
+                // A layer's rows are updated with it, and every second layer waits for its neighbours.
+                let work = |layer: usize| {
+                    let rows = tiles.first_row(layer + 1) - tiles.first_row(layer);
+                    particles[layer] as f64 + 2.0 * NODE * rows as f64 * row
+                };
+                let waits = |layer: usize| (particles.len() + layer).is_multiple_of(2);
+                let chain = |layer: usize| {
+                    let around = layer.saturating_sub(1)..particles.len().min(layer + 2);
+                    let before = around.filter(|&other| other != layer && waits(layer));
+                    work(layer) + before.map(work).fold(0.0, f64::max)
+                };
+                let all = (0..particles.len()).map(work).sum();
+                (all, (0..particles.len()).map(chain).fold(0.0, f64::max))
+            }
+        };
+        let with: Vec<usize> = particles.iter().copied().filter(|&count| count > 0).collect();
+        let all: usize = with.iter().sum();
+        let mean = all as f64 / with.len().max(1) as f64;
+        let most = with.iter().max().copied().unwrap_or(0) as f64;
+        let unevenness = if mean > 0.0 { most / mean } else { 1.0 };
+        let cores = if longest > 0.0 { work / longest } else { 1.0 };
+        Self { tiles: with.len(), unevenness, cores }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SVector;
+
+    fn of<const D: usize>(cells: usize) -> Division {
+        let grid = Grid {
+            lower: SVector::zeros(),
+            spacing: 1.0,
+            cells: [cells; D],
+            walls: [[true; 2]; D],
+        };
+        Division::of_lattice(&grid, 2).unwrap()
+    }
+
+    #[test]
+    fn bands_keep_half_as_many_threads_busy_as_there_are() {
+        let plane = of::<2>(256);
+        assert_eq!((plane.tiles, plane.unevenness), (32, 1.0));
+        assert!((15.0..=16.5).contains(&plane.cores), "{plane:?}");
+        assert_eq!(of::<1>(100).cores, 1.0);
+    }
+
+    #[test]
+    fn a_cube_keeps_many_threads_busy() {
+        for (cells, least) in [(64, 64.0), (100, 128.0), (500, 10_000.0)] {
+            let division = of::<3>(cells);
+            assert!(division.cores >= least && division.cores <= division.tiles as f64);
+            assert!(division.unevenness <= 1.3, "{cells}: {division:?}");
+        }
+    }
+}

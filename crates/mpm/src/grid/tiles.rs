@@ -1,0 +1,265 @@
+//! Tiles: pieces of the grid, by which particles are sorted and sums go.
+//!
+//! Along the last axis the grid is cut into layers; in space each layer is cut along the other axes as well. The cuts depend on the numbers
+//! of cells alone, and all pieces of an axis have the same length, which need not be a whole number of cells. A particle belongs to the tile
+//! of the lower corner of its box at the last sort. It reaches nodes of the tile's window, which leaves it some room to drift.
+
+use std::ops::Range;
+
+use mmsmith_threads::coloring::Held;
+use mmsmith_threads::windows::TileLattice;
+
+use crate::grid::{Layout, PAD_BELOW};
+
+/// Least length of a layer, in cells: in one dimension, where a row is one node, and in more. A stencil of six nodes with its lower edge in
+/// a layer of eight cells ends within the next one.
+pub(crate) const LAYER_OF_NODES: usize = 256;
+const LAYER: usize = 8;
+
+/// Least lengths of the pieces of a layer in space along axes 0 and 1, in cells. Particles that follow each other along axis 0 lie side by
+/// side in memory, hence the length.
+const PIECES: [usize; 2] = [128, 4];
+
+/// Nodes that a layer has below the lower edges of its particles, and cells that these may sink before the next sort.
+const BELOW_LAYER: usize = 2;
+/// The same of a piece of a layer, and the cells that its particles may rise.
+const AROUND_PIECE: usize = 1;
+
+/// The pieces of the grid along an axis.
+#[derive(Clone, Copy, Debug)]
+struct Pieces {
+    count: usize,
+    cells: usize,
+    /// Layers of nodes along the axis, padding included.
+    nodes: usize,
+    reach: Reach,
+}
+
+/// How far the window of a piece reaches above it.
+#[derive(Clone, Copy, Debug)]
+enum Reach {
+    /// As far as that of the next piece, less the nodes that the one after it has.
+    NextPiece,
+    /// As far as stencils of so many nodes do whose lower edges rise a cell.
+    Stencil(usize),
+}
+
+impl Pieces {
+    /// The piece of a lower edge, in cells.
+    fn of(self, edge: f64) -> usize {
+        let piece = edge * self.count as f64 / self.cells as f64;
+        (piece.max(0.0) as usize).min(self.count - 1)
+    }
+
+    /// The first node of a piece's window.
+    fn first(self, piece: usize) -> usize {
+        let below = match self.reach {
+            Reach::NextPiece => BELOW_LAYER,
+            Reach::Stencil(_) => AROUND_PIECE,
+        };
+        if piece == 0 { 0 } else { piece * self.cells / self.count + PAD_BELOW - below }
+    }
+
+    /// The nodes of a piece's window.
+    fn window(self, piece: usize) -> Range<usize> {
+        let end = match self.reach {
+            Reach::NextPiece if piece + 2 < self.count => self.first(piece + 2),
+            Reach::Stencil(width) if piece + 1 < self.count => {
+                // The first node of a stencil is the one at its lower edge or below.
+                let last = ((piece + 1) * self.cells).div_ceil(self.count) + AROUND_PIECE - 1;
+                self.nodes.min(last + PAD_BELOW + width)
+            }
+            _ => self.nodes,
+        };
+        self.first(piece)..end
+    }
+
+    /// The lower edges, in cells from the lower corner of the grid, of stencils of `width` nodes that lie in the window of a piece: from the
+    /// first value on and below the second. Windows that reach the end of the grid hold all stencils up to there.
+    #[inline(always)]
+    fn range(self, piece: usize, width: usize) -> (f64, f64) {
+        let Range { start, end } = self.window(piece);
+        let last = if end < self.nodes {
+            (end + 1) as f64 - (PAD_BELOW + width) as f64
+        } else {
+            f64::INFINITY
+        };
+        (start as f64 - PAD_BELOW as f64, last)
+    }
+}
+
+/// The tiles of a grid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tiles<const D: usize> {
+    axes: [Pieces; D],
+}
+
+/// The first axis along which grids of so many axes are cut; all after it are cut, too.
+pub(crate) const fn first_cut_axis<const D: usize>() -> usize {
+    if D == 3 { 0 } else { D - 1 }
+}
+
+impl<const D: usize> Tiles<D> {
+    /// Of a grid on which stencils have `width` nodes along an axis at most.
+    pub(crate) fn new(layout: &Layout<D>, cells: &[usize; D], width: usize) -> Self {
+        let axes = std::array::from_fn(|a| {
+            let (least, reach) = match a {
+                _ if a < first_cut_axis::<D>() => (usize::MAX, Reach::NextPiece),
+                _ if a + 1 < D => (PIECES[a], Reach::Stencil(width)),
+                _ => (if D == 1 { LAYER_OF_NODES } else { LAYER }, Reach::NextPiece),
+            };
+            let count = (cells[a] / least).max(1);
+            Pieces { count, cells: cells[a], nodes: layout.dims[a], reach }
+        });
+        Self { axes }
+    }
+
+    /// Number of layers.
+    pub(crate) fn layers(&self) -> usize {
+        self.axes[D - 1].count
+    }
+
+    /// Number of tiles in a layer.
+    pub(crate) fn in_a_layer(&self) -> usize {
+        self.axes[..D - 1].iter().map(|pieces| pieces.count).product()
+    }
+
+    /// How many of the particles of a lattice each piece of each axis has, with so many along an axis of a cell.
+    pub(crate) fn along_axes(&self, per_cell: usize) -> [Vec<usize>; D] {
+        self.axes.map(|pieces| {
+            let mut counts = vec![0; pieces.count];
+            for particle in 0..per_cell * pieces.cells {
+                counts[pieces.of(particle as f64 / per_cell as f64)] += 1;
+            }
+            counts
+        })
+    }
+
+    /// The tile of a particle at a sort, by the lower edges of its box along all axes, in cells.
+    pub(crate) fn tile_of(&self, edges: &[f64; D]) -> u32 {
+        let tile = (0..D).rev().fold(0, |tile, a| {
+            let pieces = self.axes[a];
+            tile * pieces.count + pieces.of(edges[a])
+        });
+        tile as u32
+    }
+
+    /// Whether the grid has this tile.
+    pub(crate) fn has(&self, tile: u32) -> bool {
+        self.layer_of(tile) < self.layers()
+    }
+
+    /// The layer of a tile.
+    pub(crate) fn layer_of(&self, tile: u32) -> usize {
+        tile as usize / self.in_a_layer()
+    }
+
+    /// The first row of nodes of a layer, or their number for the one after the last.
+    pub(crate) fn first_row(&self, layer: usize) -> usize {
+        let layers = self.axes[D - 1];
+        if layer < layers.count { layers.first(layer) } else { layers.nodes }
+    }
+
+    /// The rows that the windows of these layers cover.
+    pub(crate) fn rows_of(&self, held: &Held) -> Range<usize> {
+        let Range { start, end } = held.segments();
+        self.first_row(start)..self.first_row(end)
+    }
+
+    /// For each axis the lower edges of stencils of `width` nodes, in cells from the lower corner of the grid, that lie in the window of a
+    /// tile: from the first value on and below the second.
+    #[inline(always)]
+    pub(crate) fn range(&self, tile: u32, width: usize) -> [(f64, f64); D] {
+        let mut rest = tile as usize;
+        let mut range = [(f64::NEG_INFINITY, f64::INFINITY); D];
+        for a in first_cut_axis::<D>()..D {
+            let pieces = self.axes[a];
+            let piece = if a + 1 < D { rest % pieces.count } else { rest };
+            rest /= pieces.count;
+            range[a] = pieces.range(piece, width);
+        }
+        range
+    }
+
+    /// The windows of the tiles of the layers `held`, where layers are cut.
+    pub(crate) fn lattice(&self, held: &Held) -> Option<TileLattice<D>> {
+        let windows = |pieces: &Pieces| (0..pieces.count).map(|p| pieces.window(p)).collect();
+        (D == 3).then(|| TileLattice::new(self.axes.each_ref().map(windows), held.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::shape::one_axis::EXTENDED;
+    use nalgebra::SVector;
+    use proptest::prelude::*;
+
+    fn tiles<const D: usize>(cells: [usize; D], width: usize) -> (Layout<D>, Tiles<D>) {
+        let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
+        let layout = Layout::new(&grid, 8).unwrap();
+        let tiles = Tiles::new(&layout, &cells, width);
+        (layout, tiles)
+    }
+
+    /// A particle that was sorted may drift by a cell, if its stencil is not the widest one, and its stencil lies in the tile's window.
+    fn check<const D: usize>(
+        cells: [usize; D],
+        width: usize,
+        at: &[f64],
+    ) -> Result<(), TestCaseError> {
+        let (layout, tiles) = tiles(cells, EXTENDED);
+        let lattice = tiles.lattice(&Held::whole(tiles.layers()));
+        let edges: [f64; D] = std::array::from_fn(|a| at[a] * (cells[a] as f64 + 2.0) - 2.0);
+        let tile = tiles.tile_of(&edges);
+        prop_assert!(tiles.has(tile));
+        let ranges = tiles.range(tile, width);
+        for a in first_cut_axis::<D>()..D {
+            let (first, end) = ranges[a];
+            prop_assert!(first <= edges[a] && edges[a] < end, "{:?} {} {:?}", edges, a, ranges);
+            if width < EXTENDED {
+                prop_assert!(first <= (edges[a] - 1.0).max(-2.0) && edges[a] + 1.0 <= end);
+            }
+            let window = match &lattice {
+                Some(lattice) => lattice.window(tile as usize)[a].clone(),
+                None => {
+                    let held =
+                        Held { bands: tile as usize..tile as usize + 1, all: tiles.layers() };
+                    tiles.rows_of(&held)
+                }
+            };
+            // The lowest and the highest stencil.
+            prop_assert!(first.floor() + PAD_BELOW as f64 >= window.start as f64);
+            let last =
+                (end.next_down().floor() + (PAD_BELOW + width) as f64).min(layout.dims[a] as f64);
+            prop_assert!(last <= window.end as f64);
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn stencils_of_particles_lie_in_the_windows_of_their_tiles(
+            cells in prop::array::uniform3(1..400_usize),
+            width in 2..=EXTENDED,
+            at in prop::array::uniform3(0.0..1.0),
+        ) {
+            check([cells[0] * 7], width, &at)?;
+            check([cells[0], cells[1]], width, &at)?;
+            check(cells, width, &at)?;
+        }
+
+        /// Two particles along each axis of a cell: tiles have much the same number of them.
+        #[test]
+        fn tiles_of_a_lattice_have_as_many_particles(cells in 12..700_usize) {
+            let (_, tiles) = tiles([cells; 3], EXTENDED);
+            let mut most = 1.0;
+            for counts in tiles.along_axes(2) {
+                let (least, largest) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+                most *= *largest as f64 / *least as f64;
+            }
+            prop_assert!(most <= 1.3, "{cells}: {most}");
+        }
+    }
+}
