@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use mmsmith_mpm::{
-    Grid, Integrator, Material, NoBodyForce, Particles, Settings, Shape, Simulation, Transfer,
+    Grid, Integrator, Law, Material, NoBodyForce, Particles, Settings, Shape, Simulation, Transfer,
 };
 use nalgebra::Vector3;
 use rayon::ThreadPoolBuilder;
@@ -54,8 +54,8 @@ fn rate(
     let time_step = 0.2 * spacing / speed;
     let settings =
         Settings { shape, integrator, transfer, time_step, halve_first_acceleration: false };
-    let law = Material::NeoHookean { lambda: LAMBDA, mu: MU };
-    let mut simulation = Simulation::new(grid, particles, law.into(), settings).unwrap();
+    let law = Law::from(Material::NeoHookean { lambda: LAMBDA, mu: MU });
+    let mut simulation = Simulation::new(grid, particles, law, settings).unwrap();
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let mut best = f64::INFINITY;
     for _ in 0..rounds {
