@@ -287,7 +287,15 @@ fn content(form: Form, section: &Section, place: &Workplace) -> anyhow::Result<S
                 succeed(place, &format!("{command} --json OUT.json"))?;
                 let document: Value = serde_json::from_str(&place.read("OUT.json")?)
                     .with_context(|| format!("the JSON of {command}"))?;
-                billion(&document).with_context(|| format!("the JSON of '{command}' lacks a row"))
+                let division = |cells: f64| {
+                    let name = command.split_whitespace().nth(2).unwrap_or_default();
+                    succeed(place, &format!("mms explain {name} --cells {cells} --json OUT.json"))?;
+                    let document: Value = serde_json::from_str(&place.read("OUT.json")?)?;
+                    let last = document["runs"].as_array().and_then(|runs| runs.last());
+                    Ok(last.map(|run| run["division"].clone()).unwrap_or_default())
+                };
+                billion(&document, &division)?
+                    .with_context(|| format!("the JSON of '{command}' lacks a row"))
             });
             let columns = columns.collect::<anyhow::Result<Vec<_>>>()?;
             parts.push(format!("| | `{}` |", section.commands.join("` | `")));
@@ -448,7 +456,7 @@ fn speed(document: &Value) -> Option<Vec<String>> {
 const OF_A_BILLION: [&str; 10] = [
     "measured: million particle-steps/s of a core",
     "cells",
-    "bins",
+    "tiles",
     "cores of use",
     "million particles of a core",
     "a step's work (s)",
@@ -458,18 +466,35 @@ const OF_A_BILLION: [&str; 10] = [
     "hours for a period",
 ];
 
-/// Cost of 10^9 particles of a square or a cube, from the rate of a smaller one on one core, in the order of [`OF_A_BILLION`]. Bins, rows
-/// and messages are those of the solver, which a test of it counts.
-fn billion(document: &Value) -> Option<Vec<String>> {
-    const PARTICLES: f64 = 1e9;
+/// Cost of 10^9 particles of a square or a cube, from the rate of a smaller one on one core, in the order of [`OF_A_BILLION`]. Messages are those
+/// of the solver, which a test of it counts; tiles and cores are counted by `division`, for a number of cells.
+fn billion(
+    document: &Value,
+    division: &dyn Fn(f64) -> anyhow::Result<Value>,
+) -> anyhow::Result<Option<Vec<String>>> {
+    let Some((large, dimension)) = size_of_a_billion(document) else { return Ok(None) };
+    Ok(of_a_billion(document, (large, dimension), &division(large)?))
+}
+
+const PARTICLES: f64 = 1e9;
+
+/// Cells along an axis, and axes.
+fn size_of_a_billion(document: &Value) -> Option<(f64, f64)> {
     let (settings, row) = (&document["settings"], &document["result"]);
     let (cells, per_cell) = (settings["cells"].as_f64()?, settings["ppc"].as_f64()?);
     let dimension = (row["particles"].as_f64()?.ln() / (cells * per_cell).ln()).round();
+    Some(((PARTICLES.powf(1.0 / dimension) / per_cell).round(), dimension))
+}
+
+fn of_a_billion(
+    document: &Value,
+    (large, dimension): (f64, f64),
+    division: &Value,
+) -> Option<Vec<String>> {
+    let (settings, row) = (&document["settings"], &document["result"]);
+    let cells = settings["cells"].as_f64()?;
     let rate = row["particle_steps_per_s"].as_f64()?;
-    let large = (PARTICLES.powf(1.0 / dimension) / per_cell).round();
-    let bins = ((large + 9.0) / 8.0).floor();
-    // Bins of one colour work while those of the other one wait.
-    let cores = (bins / 2.0).floor();
+    let (tiles, cores) = (division["tiles"].as_f64()?, division["cores_of_use"].as_f64()?.floor());
     let work = PARTICLES / cores / rate;
     let sent = 2.0 * 8.0 * (large + 9.0).powf(dimension - 1.0) * (2.0 * dimension + 1.0) * 8.0;
     let steps = row["steps"].as_f64()? / settings["periods"].as_f64()? * large / cells;
@@ -477,9 +502,9 @@ fn billion(document: &Value) -> Option<Vec<String>> {
     Some(vec![
         format!("{:.1}", rate / 1e6),
         format!("{large:.0}^{dimension:.0}"),
-        format!("{bins:.0}"),
+        format!("{tiles:.0}"),
         format!("{cores:.0}"),
-        format!("{:.1}", PARTICLES / cores / 1e6),
+        format!("{:.2}", PARTICLES / cores / 1e6),
         format!("{work:.3}"),
         format!("{:.1}", sent / 1e6),
         format!("{:.4}", sent / 1e10),

@@ -53,8 +53,12 @@ pub(super) fn learn(case: &Discretized<'_>) -> Result<CostModel, CaseError> {
     CostModel::calibrate(case, BRIEF)
 }
 
-/// Costs of the scheme of `base` on some grids; grids that do not fit the solution are left out.
-pub(super) fn on_grids(model: &Model, base: &Case) -> Result<Vec<(usize, Plan, Cost)>, CaseError> {
+/// Costs of the scheme of `base` on some grids, those with `more` cells among them; grids that do not fit the solution are left out.
+pub(super) fn on_grids(
+    model: &Model,
+    base: &Case,
+    more: &[usize],
+) -> Result<Vec<(usize, Plan, Cost)>, CaseError> {
     let mut fitting: Vec<Discretized<'_>> = Vec::new();
     let mut refused = None;
     for cells in GRIDS {
@@ -68,6 +72,9 @@ pub(super) fn on_grids(model: &Model, base: &Case) -> Result<Vec<(usize, Plan, C
     }
     let Some(finest) = fitting.last() else { return Ok(Vec::new()) };
     let learnt = learn(finest)?;
+    for &cells in more {
+        fitting.push(model.discretized(&Case { cells, ..*base })?);
+    }
     let row = |case: &Discretized<'_>| {
         Some((case.case().cells, *case.plan(), learnt.predict(case.plan())?))
     };

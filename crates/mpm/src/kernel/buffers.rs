@@ -1,4 +1,4 @@
-//! Buffers for blocks of particles, which outlive a pass: to set them up for each bin would cost up to a fifth of a step.
+//! Buffers for blocks of particles, which outlive a pass: to set them up for each layer would cost up to a fifth of a step.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -23,7 +23,7 @@ pub(crate) mod prefetch;
 pub(crate) mod product;
 pub(crate) mod shared;
 
-/// Ends the run: a weight, a block or a node is not the one that the code around it has prepared. Checks of particles and bins rule it out;
+/// Ends the run: a weight, a block or a node is not the one that the code around it has prepared. Checks of particles and layers rule it out;
 /// sums that lack a part would be worse than no result.
 #[cold]
 #[inline(never)]

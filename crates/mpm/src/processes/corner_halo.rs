@@ -1,7 +1,7 @@
 //! Corners of polygons that other processes sort: their values come from there.
 //!
 //! A process has the corners of its bins, and all particles at them. A particle whose corners are of several processes is at each of them,
-//! and each computes the same of it, to the bit. The values of the grid at a corner are known where its bin is; the others are told.
+//! and each computes the same of it, to the bit. The values of the grid at a corner are known where its layer is; the others are told.
 
 use std::sync::Arc;
 

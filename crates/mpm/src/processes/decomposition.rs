@@ -42,7 +42,7 @@ pub(crate) struct LocalBody {
     /// The particles that this process owns, where others are present for corners that they share.
     pub(crate) own: Option<Owned>,
     pub(crate) version: u64,
-    /// The first bin of each process, and the number of bins.
+    /// The first layer of each process, and the number of layers.
     pub(crate) cuts: Vec<usize>,
 }
 
@@ -68,7 +68,7 @@ impl LocalBody {
         Arrangement { ids, version: self.version }
     }
 
-    /// Cuts the bins anew where they are uneven, by the number of particles that this process has in each of them; gives the bins that
+    /// Cuts the layers anew where they are uneven, by the number of particles that this process has in each of them; gives the layers that
     /// this process holds from now on. A call of all.
     pub(crate) fn cut(&mut self, mut counts: Vec<u64>) -> Range<usize> {
         let Self { ranks, cuts: known, .. } = self;
@@ -89,9 +89,9 @@ impl LocalBody {
         known[ranks.rank()]..known[ranks.rank() + 1]
     }
 
-    /// The process that holds a bin.
-    pub(crate) fn holder(&self, bin: usize) -> usize {
-        self.cuts.partition_point(|&cut| cut <= bin) - 1
+    /// The process that holds a layer.
+    pub(crate) fn holder(&self, layer: usize) -> usize {
+        self.cuts.partition_point(|&cut| cut <= layer) - 1
     }
 
     /// The outcome of all processes; a failed particle has its number in the whole body.
@@ -146,25 +146,25 @@ pub(crate) fn most_ranks<const D: usize>(layout: &Layout<D>, tiles: &Tiles<D>) -
     if low.end > tiles.first_row(1) { 1 } else { tiles.layers().saturating_sub(1).max(1) }
 }
 
-/// The first bin of each of `ranks` processes, and the number of bins: each has one at least, the last one two, and otherwise as
+/// The first layer of each of `ranks` processes, and the number of layers: each has one at least, the last one two, and otherwise as
 /// many particles as the others.
 pub(crate) fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
-    let bins = particles.len();
+    let layers = particles.len();
     let total: u64 = particles.iter().sum();
     let mut cuts = vec![0];
-    let (mut bin, mut before) = (0, 0);
+    let (mut layer, mut before) = (0, 0);
     for rank in 1..ranks {
         let least = cuts[rank - 1] + 1;
-        // The processes from this one on need a bin each, and the last one more.
-        let most = bins - (ranks - rank) - 1;
+        // The processes from this one on need a layer each, and the last one more.
+        let most = layers - (ranks - rank) - 1;
         let wanted = total as f64 * rank as f64 / ranks as f64;
-        while bin < most && (bin < least || before as f64 + 0.5 * particles[bin] as f64 <= wanted) {
-            before += particles[bin];
-            bin += 1;
+        while layer < most && (layer < least || before as f64 + 0.5 * particles[layer] as f64 <= wanted) {
+            before += particles[layer];
+            layer += 1;
         }
-        cuts.push(bin);
+        cuts.push(layer);
     }
-    cuts.push(bins);
+    cuts.push(layers);
     cuts
 }
 

@@ -1,7 +1,7 @@
 //! The state of a simulation between two steps, as bytes, and simulations that go on from it.
 //!
 //! A process saves the particles that it holds. Any number of processes goes on with them: first each particle goes to a process that
-//! follows from its number, where its state is put in place, then to the process of the bin that it was sorted into before the state was
+//! follows from its number, where its state is put in place, then to the process of the layer that it was sorted into before the state was
 //! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
 
 use std::slice;
@@ -47,7 +47,7 @@ pub enum SavedStateError {
     #[error("it has other particles than this run")]
     Particles,
     /// Numbers that do not belong together.
-    #[error("it has a corner or a bin that this run does not have")]
+    #[error("it has a corner or a layer that this run does not have")]
     Place,
     /// Saved by several processes, for a scheme that one simulates.
     #[error("it is in {found} parts where this run has one")]

@@ -1,4 +1,4 @@
-//! Checks of particles after each step: invalid particles end the run, particles that left their bin cause a new sort.
+//! Checks of particles after each step: invalid particles end the run, particles that left their tile cause a new sort.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -34,7 +34,7 @@ impl Invalid {
 pub(crate) struct Outcome {
     /// The worst reason, and the first particle it holds for.
     pub(crate) failure: Option<(Invalid, usize)>,
-    /// Whether a particle left its bin.
+    /// Whether a particle left its tile.
     pub(crate) resort: bool,
 }
 
@@ -127,14 +127,14 @@ mod tests {
     fn is_valid(
         c: &Constants<f64, 2>,
         domain: &ProductShape<f64, 2>,
-        bin: u32,
+        tile: u32,
         x: Vector2<f64>,
         F: Matrix2<f64>,
     ) -> bool {
         let mut copies = Copies::new();
         copies.copy(&[x], &[F]);
         let kinematics = copies.kinematics();
-        domain.are_valid(OfBlock { c, ids: &[0], tiles: &[bin; BLOCK], kinematics })
+        domain.are_valid(OfBlock { c, ids: &[0], tiles: &[tile; BLOCK], kinematics })
     }
 
     #[test]
@@ -182,11 +182,11 @@ mod tests {
             assert!(!of_box(vector![1.2, 9.0], F));
         }
         // The lowest and the highest tile reach over the ends of the grid.
-        for (bin, y, valid) in
+        for (tile, y, valid) in
             [(0, 0.0, true), (0, -5e-324, false), (7, 32.0, true), (7, 32.0_f64.next_up(), false)]
         {
             let hat = shape(OnAxis::Hat, 0.0);
-            assert_eq!(is_valid(&c, &hat, bin, vector![1.2, y], one), valid, "{bin} {y}");
+            assert_eq!(is_valid(&c, &hat, tile, vector![1.2, y], one), valid, "{tile} {y}");
         }
     }
 

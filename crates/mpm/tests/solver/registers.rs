@@ -23,7 +23,7 @@ fn bits<T: Scalar<D>, const D: usize>(
 ) -> Vec<u64> {
     registers.use_at_most();
     let number = nalgebra::convert::<f64, T>;
-    // Of three bins in the plane, of two in space.
+    // Of three layers in the plane, of two in space.
     let cells = if D == 3 { 7 } else { 21 };
     let spacing = number(1.0 / cells as f64);
     let walls = [[true; 2]; D];

@@ -65,15 +65,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Some(moved) = self.give(&|p| &of_particles[p]) else { return Vec::new() };
         let (records, keys) = (records.follow(&moved), moved.lists(&keys));
 
-        let bin = |p: usize, place: usize| self.grid.bins.tiles().layer_of(keys.of(p)[place]);
-        let is_other = |p: usize, place: usize| !held.contains(&bin(p, place));
+        let layer = |p: usize, place: usize| self.grid.bins.tiles().layer_of(keys.of(p)[place]);
+        let is_other = |p: usize, place: usize| !held.contains(&layer(p, place));
         let (mesh, places) = records.assemble(moved.len(), &loads, kind, is_other);
         let own = places.iter().filter(|[p, place]| !is_other(*p, *place)).count();
         let own_keys = places[..own].iter().map(|&[p, place]| keys.of(p)[place]).collect();
         let halo = self.part.as_mut().zip(mesh.numbers.as_ref()).map(|(part, numbers)| {
             part.own = Some(own_particles(&mesh, own, &part.ids));
             let (own, others) = numbers.corners.split_at(own);
-            let holders = places[own.len()..].iter().map(|&[p, place]| part.holder(bin(p, place)));
+            let holders = places[own.len()..].iter().map(|&[p, place]| part.holder(layer(p, place)));
             CornerHalo::new(&part.ranks, own, others, holders)
         });
         let ids = self.part.as_ref().map_or_else(Default::default, |part| part.ids.clone());
