@@ -23,11 +23,13 @@ fn bits<T: Scalar<D>, const D: usize>(
 ) -> Vec<u64> {
     registers.use_at_most();
     let number = nalgebra::convert::<f64, T>;
-    // Of three layers in the plane, of two in space.
-    let cells = if D == 3 { 7 } else { 21 };
+    // Of two layers in the plane, of two layers of three tiles in space.
+    let cells = if D == 3 { 5 } else { 21 };
     let spacing = number(1.0 / cells as f64);
+    let along = [cells, 12, 16];
+    let cells = std::array::from_fn(|a| if D == 3 { along[a] } else { cells });
     let walls = [[true; 2]; D];
-    let grid = Grid { lower: SVector::zeros(), spacing, cells: [cells; D], walls };
+    let grid = Grid { lower: SVector::zeros(), spacing, cells, walls };
     let mut body = Body::lattice(&grid, 2, number(1.0), |_| true);
     for (v, X) in body.particles.v.iter_mut().zip(&body.particles.X) {
         let angle: SVector<T, D> = X * T::pi();
@@ -65,7 +67,7 @@ fn check<T: Scalar<D>, const D: usize>() {
         let plain = bits::<T, D>(Registers::Scalar, 1, scheme);
         for (turn, registers) in Registers::present().into_iter().rev().enumerate() {
             // The widest registers with every number of threads, the others with some.
-            for threads in [1, 2, 3].into_iter().filter(|&n| turn == 0 || n == turn + 1) {
+            for threads in [1, 2, 3, 5, 8].into_iter().filter(|&n| turn == 0 || n == turn + 1) {
                 let same = bits::<T, D>(registers, threads, scheme) == plain;
                 assert!(same, "{D} {scheme:?} {registers:?} {threads} threads");
             }
