@@ -51,6 +51,7 @@ def explain(
     solution: Named,
     /,
     *,
+    cells: int | Iterable[int] | None = None,
     compare: bool = False,
     json: str | os.PathLike[str] | None = None,
     progress: Progress = None,
@@ -59,6 +60,7 @@ def explain(
 
     Args:
         solution: What `load` gave, a name, or the path of a specification.
+        cells: Numbers of cells, separated by commas, of more runs to predict: their particles, time, memory and threads of use.
         compare: Compare predicted and measured times: five schemes on 64, 128 and 256 cells, for a part of a period.
         json: Keep the JSON of the result in this file.
         progress: Called with the share that is done and a line about the work under way. True: a line on standard error. Default: True
@@ -105,6 +107,7 @@ def run(
     checkpoint: str | os.PathLike[str] | None = None,
     every: int | None = None,
     history: str | os.PathLike[str] | None = None,
+    profile: bool = False,
     plot: str | os.PathLike[str] | None = None,
     picture: str | os.PathLike[str] | None = None,
     at: float | None = None,
@@ -208,6 +211,7 @@ def run(
         every: Steps between checkpoints. Default: 1000.
         history: Write errors of u, energies and momentum over time to this CSV file, of the particles and of the exact motion, at up to
             1000 evenly spread steps; json then has them too.
+        profile: Say how long each pass of the steps took, and how many threads the tiles of particles keep busy.
         plot: Draw the difference of the energy from the exact one over time to this SVG file.
         picture: Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis.
         at: Time of the picture in periods of the solution, at most periods. Default: the end of the run.
