@@ -30,6 +30,7 @@ fn row(exact: &AnySolution<f64>, case: &Case) -> Row {
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     run(exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -44,6 +45,7 @@ fn row_in_single(exact: &AnySolution<f64>, single: &AnySolution<f32>, case: &Cas
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     run(exact, Arithmetic::Single(single), case, &mut outputs).expect("a case that can be run")

@@ -29,6 +29,7 @@ fn history<S: Plane>(solution: S, case: &Case) -> (Row, Vec<Moment>) {
         history: Some(&mut moments),
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     let row = run(&exact, Arithmetic::Double, case, &mut outputs).expect("a case that can be run");

@@ -26,6 +26,7 @@ fn run_quietly(solution: &AnySolution<f64>, case: &Case) -> Row {
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     run(solution, Arithmetic::Double, case, &mut outputs).expect("a case that can be run")
@@ -132,6 +133,7 @@ fn single_precision_has_the_same_particles_and_nearly_the_same_error() {
             history: None,
             ranks: None,
             traffic: None,
+            profile: None,
             until: None,
         };
         let coarse = run(&double, Arithmetic::Single(&single), &case, &mut outputs).unwrap();
@@ -162,6 +164,7 @@ fn conditions_that_the_solver_does_not_model_are_named() {
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     let error =
@@ -180,6 +183,7 @@ fn an_extent_is_for_rings_only() {
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     let error = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap_err();
@@ -205,6 +209,7 @@ fn frames_hold_what_the_row_measured() {
         history: None,
         ranks: None,
         traffic: None,
+        profile: None,
         until: None,
     };
     let row = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap();
