@@ -94,7 +94,7 @@ where
         };
         let round_off = self.rounding() * (steps.count as f64).sqrt();
         let division = match &case.scheme {
-            Scheme::Updated(_) => Some(Division::of_lattice(&scene.grid::<f64>(), per_cell)?),
+            Scheme::Updated(_) => Division::of_lattice(&scene.grid::<f64>(), per_cell),
             Scheme::Total(_) => None,
         };
         let (steps, extent) = (steps.count, scene.extent());

@@ -32,7 +32,8 @@ pub(crate) fn explain(options: &ExplainOptions) -> Result<bool> {
     let cost = BodyForceCost::of(&spec, fields);
     let problem = Problem::new(Selection::new(&options.name, &[])?, &SchemeOptions::open())?;
     let Problem { selection, model, settled } = &problem;
-    let predicted = predict::on_grids(model, &settled.case, &options.cells).map_err(|error| error.to_string());
+    let predicted =
+        predict::on_grids(model, &settled.case, &options.cells).map_err(|error| error.to_string());
     let words = settled.choice();
     let blind = blind::measure(selection)?;
     let deformation = Deformation::of(&options.name, model, settled)?;

@@ -2,7 +2,6 @@
 
 use mmsmith_threads::coloring::Held;
 
-use crate::error::SetupError;
 use crate::grid::tiles::Tiles;
 use crate::grid::{Grid, Layout, NODES_AT_ONCE};
 use crate::shape::one_axis::EXTENDED;
@@ -10,6 +9,9 @@ use crate::shape::one_axis::EXTENDED;
 /// What it costs to clear a node of a tile's buffer and to add it to the grid, or to clear a node of the grid and to update it, as a part of
 /// what a particle costs in a step. `cargo bench -p mmsmith-mpm --bench space` measures it.
 const NODE: f64 = 0.05;
+
+/// Tiles that are counted within a moment.
+const MOST_TILES: usize = 1 << 16;
 
 /// How the work of a step is divided among threads: tiles of particles, and the order in which their sums are added.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,19 +25,16 @@ pub struct Division {
 }
 
 impl Division {
-    /// Of a body that fills a grid, with so many particles along each axis of a cell.
-    ///
-    /// # Errors
-    ///
-    /// Where the grid has no cells or its nodes cannot be numbered.
-    pub fn of_lattice<const D: usize>(
-        grid: &Grid<f64, D>,
-        per_cell: usize,
-    ) -> Result<Self, SetupError> {
-        let layout = Layout::new(grid, 1)?;
+    /// Of a body that fills a grid, with so many particles along each axis of a cell. `None` for a grid that no machine holds, or with more
+    /// tiles than are soon counted.
+    pub fn of_lattice<const D: usize>(grid: &Grid<f64, D>, per_cell: usize) -> Option<Self> {
+        let layout = Layout::new(grid, size_of::<[f64; 8]>()).ok()?;
         let tiles = Tiles::new(&layout, &grid.cells, EXTENDED);
-        let along = tiles.along_axes(per_cell);
         let count = tiles.layers() * tiles.in_a_layer();
+        if count > MOST_TILES {
+            return None;
+        }
+        let along = tiles.along_axes(per_cell);
         let particles: Vec<usize> = (0..count)
             .map(|tile| {
                 let mut rest = tile;
@@ -46,7 +45,7 @@ impl Division {
                 })
             })
             .collect();
-        Ok(Self::new(&tiles, &layout, &particles))
+        Some(Self::new(&tiles, &layout, &particles))
     }
 
     /// Of so many particles in each tile of a grid that one process holds.

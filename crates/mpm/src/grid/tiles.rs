@@ -127,11 +127,10 @@ impl<const D: usize> Tiles<D> {
     /// How many of the particles of a lattice each piece of each axis has, with so many along an axis of a cell.
     pub(crate) fn along_axes(&self, per_cell: usize) -> [Vec<usize>; D] {
         self.axes.map(|pieces| {
-            let mut counts = vec![0; pieces.count];
-            for particle in 0..per_cell * pieces.cells {
-                counts[pieces.of(particle as f64 / per_cell as f64)] += 1;
-            }
-            counts
+            let all = (per_cell * pieces.cells) as u128;
+            // The first particle whose lower edge lies in a piece.
+            let first = |piece: usize| (piece as u128 * all).div_ceil(pieces.count as u128);
+            (0..pieces.count).map(|piece| (first(piece + 1) - first(piece)) as usize).collect()
         })
     }
 

@@ -158,7 +158,9 @@ pub(crate) fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
         // The processes from this one on need a layer each, and the last one more.
         let most = layers - (ranks - rank) - 1;
         let wanted = total as f64 * rank as f64 / ranks as f64;
-        while layer < most && (layer < least || before as f64 + 0.5 * particles[layer] as f64 <= wanted) {
+        while layer < most
+            && (layer < least || before as f64 + 0.5 * particles[layer] as f64 <= wanted)
+        {
             before += particles[layer];
             layer += 1;
         }

@@ -73,7 +73,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let halo = self.part.as_mut().zip(mesh.numbers.as_ref()).map(|(part, numbers)| {
             part.own = Some(own_particles(&mesh, own, &part.ids));
             let (own, others) = numbers.corners.split_at(own);
-            let holders = places[own.len()..].iter().map(|&[p, place]| part.holder(layer(p, place)));
+            let holders =
+                places[own.len()..].iter().map(|&[p, place]| part.holder(layer(p, place)));
             CornerHalo::new(&part.ranks, own, others, holders)
         });
         let ids = self.part.as_ref().map_or_else(Default::default, |part| part.ids.clone());
