@@ -288,8 +288,12 @@ impl<const D: usize> HistoryTable<D> {
     #[must_use]
     pub fn series(&self, X: &[f64; D]) -> Option<PointSeries<D>> {
         if self.axes.is_empty() {
+            let coordinates = self.points.iter().flat_map(|(place, _)| place);
+            let farthest = coordinates.fold(0.0_f64, |most, x| most.max(x.abs()));
             let is_here = |(place, _): &&([f64; D], PointSeries<D>)| {
-                place.iter().zip(X).all(|(a, b)| (a - b).abs() <= 1e-9 * (a.abs() + 1e-3))
+                let is_near =
+                    |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * a.abs() + 1e-12 * farthest;
+                place.iter().zip(X).all(is_near)
             };
             return self.points.iter().find(is_here).map(|(_, series)| series.clone());
         }
@@ -398,5 +402,33 @@ impl<T: Real, const D: usize> BodyForceAtPoints<T, D> for TabulatedPoints<D> {
     fn bytes_per_point(&self) -> usize {
         let first = self.series.iter().flatten().next();
         first.map_or(0, |series| size_of_val(&series.coefficients[..]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of bodies of any size are told apart, and found again after rounding.
+    #[test]
+    fn points_are_found_by_positions_of_any_size() {
+        for size in [1e-12, 1e-6, 1.0, 1e6] {
+            let places = [[0.25 * size, 0.0], [0.25 * size, 1e-3 * size], [0.5 * size, 0.0]];
+            let series =
+                |knot: f64| PointSeries { knots: vec![knot], in_time: 1, coefficients: Vec::new() };
+            let table = HistoryTable::<2> {
+                shapes: Vec::new(),
+                is_annulus: false,
+                frame: Frame::Cartesian,
+                axes: Vec::new(),
+                body: series(-1.0),
+                points: places.iter().enumerate().map(|(k, X)| (*X, series(k as f64))).collect(),
+            };
+            for (k, [x, y]) in places.into_iter().enumerate() {
+                let rounded = [x * (1.0 + 1e-15), y + 1e-16 * size];
+                assert_eq!(table.series(&rounded), Some(series(k as f64)), "{size:e}, point {k}");
+            }
+            assert_eq!(table.series(&[0.3 * size, 0.0]), None, "{size:e}");
+        }
     }
 }

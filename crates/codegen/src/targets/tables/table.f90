@@ -115,8 +115,12 @@
   pure integer function table_point_of(tab, X) result(number)
     type(table), intent(in) :: tab
     real(dp), intent(in) :: X(DIMENSION)
+    real(dp) :: least
+    number = 0
+    if (tab%points == 0) return
+    least = 1.0e-12_dp * maxval(abs(tab%places(:, :tab%points)))
     do number = 1, tab%points
-      if (all(abs(X - tab%places(:, number)) <= 1.0e-9_dp * (abs(tab%places(:, number)) + 1.0e-3_dp))) return
+      if (all(abs(X - tab%places(:, number)) <= 1.0e-9_dp * abs(tab%places(:, number)) + least)) return
     end do
     number = 0
   end function

@@ -151,11 +151,15 @@ MMSMITH_FN void mmsmith_turn(const mmsmith_table *table, const double *X, char s
 MMSMITH_FN long mmsmith_point_of(const mmsmith_table *table, const double *X)
 {
     const int d = table->dimension;
+    double farthest = 0.0;
     long n;
     int k;
+    for (n = 0; n < table->points * d; ++n) {
+        farthest = fmax(farthest, fabs(table->places[n]));
+    }
     for (n = 0; n < table->points; ++n) {
         const double *place = table->places + n * d;
-        for (k = 0; k < d && fabs(X[k] - place[k]) <= 1e-9 * (fabs(place[k]) + 1e-3); ++k) {
+        for (k = 0; k < d && fabs(X[k] - place[k]) <= 1e-9 * fabs(place[k]) + 1e-12 * farthest; ++k) {
         }
         if (k == d) {
             return n;

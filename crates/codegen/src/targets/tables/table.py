@@ -92,7 +92,8 @@ class _Table:
     def _point_of(self, X):
         # The number of the point at each position, and whether there is one.
         place = XP.stack(X, axis=-1)[..., None, :]
-        off = XP.max(XP.abs(place - self.places) / (XP.abs(self.places) + 1e-3), axis=-1)
+        least = 1e-3 * XP.max(XP.abs(self.places)) + 1e-300
+        off = XP.max(XP.abs(place - self.places) / (XP.abs(self.places) + least), axis=-1)
         return XP.argmin(off, axis=-1), XP.min(off, axis=-1) <= 1e-9
 
     def _turned(self, X, values, shape):
