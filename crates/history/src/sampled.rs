@@ -201,7 +201,8 @@ mod tests {
     fn smooth_motions_are_asked_for_a_few_times_and_others_are_not_changed() {
         type Of = fn(f64) -> Kinematics<Dual<f64, 2>>;
         let smooth: Of = |t| along((3.0 * t).sin(), 3.0 * (3.0 * t).cos());
-        let fast: Of = |t| along((25.0 * t).sin(), 25.0 * (25.0 * t).cos());
+        // Of faster ones the phase alone has more rounding than the last coefficients may have.
+        let fast: Of = |t| along((12.0 * t).sin(), 12.0 * (12.0 * t).cos());
         // The wave is zero at the nodes of the first series.
         let hidden: Of = |t| {
             let x: f64 = (2.0 * t / 1.7 - 1.0).clamp(-1.0, 1.0);
@@ -220,7 +221,7 @@ mod tests {
                 let t = 0.01 * f64::from(k);
                 let (found, exact) = (flat(&sampled.at(t)), flat(&of(t)));
                 for (place, (found, exact)) in found.iter().zip(exact).enumerate() {
-                    let size = if place >= 27 { 25.0 } else { 1.0 };
+                    let size = if place >= 27 { 12.0 } else { 1.0 };
                     assert!((found - exact).abs() < 4e-15 * size, "{t} {place} {found} {exact}");
                 }
             }

@@ -28,7 +28,17 @@ pub struct Grid<const D: usize> {
 
 /// Roots of the Chebyshev polynomial of degree `n`, ascending, from -1 to 1.
 pub(crate) fn roots(n: usize) -> Vec<f64> {
-    (0..n).map(|k| -((k as f64 + 0.5) / n as f64).cos_pi()).collect()
+    (0..n).map(|k| -cosine(2 * k + 1, n)).collect()
+}
+
+/// `cos(pi k / 2n)`, from angles up to a quarter of a turn: whole ones are left out before there is any rounding.
+fn cosine(k: usize, n: usize) -> f64 {
+    let within = k % (4 * n);
+    let within = within.min(4 * n - within);
+    match within <= n {
+        true => (within as f64 / (2 * n) as f64).cos_pi(),
+        false => -((2 * n - within) as f64 / (2 * n) as f64).cos_pi(),
+    }
 }
 
 /// The Chebyshev polynomials at a place between -1 and 1.
@@ -57,9 +67,8 @@ pub(crate) struct Transform {
 impl Transform {
     pub(crate) fn new(n: usize) -> Self {
         let entry = |k: usize, j: usize| {
-            // The roots ascend, their angles descend. Whole turns are left out before there is any rounding.
-            let quarters = k * (2 * (n - 1 - j) + 1) % (4 * n);
-            let cosine = (quarters as f64 / (2 * n) as f64).cos_pi();
+            // The roots ascend, their angles descend.
+            let cosine = cosine(k * (2 * (n - 1 - j) + 1), n);
             cosine * if k == 0 { 1.0 } else { 2.0 } / n as f64
         };
         let matrix = (0..n * n).map(|place| entry(place / n, place % n)).collect();

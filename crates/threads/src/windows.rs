@@ -309,13 +309,12 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
             if let Some(buffer) = &filled {
                 self.add(tile, buffer, add);
             }
+            let neighbours = self.lattice.neighbours(tile);
+            let after: Vec<usize> =
+                neighbours.filter(|&other| self.lattice.precedes(tile, other)).collect();
             let mut progress = self.progress();
             progress.free.extend(filled);
-            for other in self.lattice.neighbours(tile) {
-                if self.lattice.precedes(tile, other) {
-                    progress.count_down(other);
-                }
-            }
+            after.into_iter().for_each(|other| progress.count_down(other));
         }
     }
 
@@ -398,7 +397,7 @@ mod tests {
         array
     }
 
-    /// The same by hand: tile after tile in the order of turns.
+    /// Sums by hand: tile after tile in the order of turns.
     fn by_turns(lattice: &TileLattice<3>, dims: [usize; 3]) -> Vec<u64> {
         let mut array = vec![7_u64; dims.iter().product()];
         let mut order: Vec<usize> = (0..lattice.count()).collect();

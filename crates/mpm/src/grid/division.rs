@@ -6,9 +6,10 @@ use crate::grid::tiles::Tiles;
 use crate::grid::{Grid, Layout, NODES_AT_ONCE};
 use crate::shape::one_axis::EXTENDED;
 
-/// What it costs to clear a node of a tile's buffer and to add it to the grid, or to clear a node of the grid and to update it, as a part of
-/// what a particle costs in a step. `cargo bench -p mmsmith-mpm --bench space` measures it.
-const NODE: f64 = 0.05;
+/// Cost of clearing a node of a tile's buffer and adding it to the grid, or of clearing a node of the grid and updating it, as a part of the
+/// cost of a particle in a step. Measured by `mms run axis-aligned-3d --shape ugimp --integrator usl
+/// --profile` with one to four particles along an axis of a cell.
+const NODE: f64 = 0.07;
 
 /// Tiles that are counted within a moment.
 const MOST_TILES: usize = 1 << 16;
@@ -25,7 +26,7 @@ pub struct Division {
 }
 
 impl Division {
-    /// Of a body that fills a grid, with so many particles along each axis of a cell. `None` for a grid that no machine holds, or with more
+    /// Division of a body that fills a grid, with so many particles along each axis of a cell. `None` for a grid that no machine holds, or with more
     /// tiles than are soon counted.
     pub fn of_lattice<const D: usize>(grid: &Grid<f64, D>, per_cell: usize) -> Option<Self> {
         let layout = Layout::new(grid, size_of::<[f64; 8]>()).ok()?;
@@ -48,7 +49,7 @@ impl Division {
         Some(Self::new(&tiles, &layout, &particles))
     }
 
-    /// Of so many particles in each tile of a grid that one process holds.
+    /// Division of so many particles in each tile of a grid that one process holds.
     pub(crate) fn new<const D: usize>(
         tiles: &Tiles<D>,
         layout: &Layout<D>,
@@ -65,10 +66,10 @@ impl Division {
                     NODE * sums as f64
                 };
                 let of_tiles: f64 = (0..particles.len()).map(|tile| fill(tile) + add(tile)).sum();
-                // Rows are cleared and updated some nodes at a time; ghost nodes beyond walls across the last axis one row after the other.
-                let at_once = row.max(NODES_AT_ONCE as f64).min(of_rows);
-                let ghosts = layout.ghost_rows() as f64 * row.min(NODES_AT_ONCE as f64);
-                let update = NODE * (2.0 * at_once + 2.0 * ghosts);
+                // Nodes are cleared some at a time and updated by rows; ghost nodes beyond walls across the last axis one row after the other.
+                let at_once = NODES_AT_ONCE as f64;
+                let ghosts = layout.ghost_rows() as f64 * row.min(at_once);
+                let update = NODE * (at_once + row.max(at_once) + 2.0 * ghosts);
                 (of_tiles + of_rows, lattice.longest(&fill, &add) + update)
             }
             None => {

@@ -54,7 +54,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         }
     }
 
-    /// The same with the indices of nodes as they are in a band.
+    /// These constants with the indices of nodes as they are in a band.
     pub(crate) fn in_band<N>(&self, band: &Band<'_, N, D>) -> Self {
         Self { strides: band.strides, nodes_before: band.nodes_before, ..*self }
     }

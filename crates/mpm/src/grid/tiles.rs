@@ -22,7 +22,7 @@ const PIECES: [usize; 2] = [128, 4];
 
 /// Nodes that a layer has below the lower edges of its particles, and cells that these may sink before the next sort.
 const BELOW_LAYER: usize = 2;
-/// The same of a piece of a layer, and the cells that its particles may rise.
+/// Nodes that a piece of a layer has below the lower edges of its particles, and cells by which these may rise.
 const AROUND_PIECE: usize = 1;
 
 /// The pieces of the grid along an axis.
@@ -100,7 +100,7 @@ pub(crate) const fn first_cut_axis<const D: usize>() -> usize {
 }
 
 impl<const D: usize> Tiles<D> {
-    /// Of a grid on which stencils have `width` nodes along an axis at most.
+    /// Tiles of a grid on which stencils have `width` nodes along an axis at most.
     pub(crate) fn new(layout: &Layout<D>, cells: &[usize; D], width: usize) -> Self {
         let axes = std::array::from_fn(|a| {
             let (least, reach) = match a {

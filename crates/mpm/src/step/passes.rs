@@ -27,7 +27,7 @@ pub enum Pass {
     G2p,
     /// G2P of a step and P2G of the next one, with its grid update.
     G2pAndP2g,
-    /// The same for particles that share corners, by way of these.
+    /// G2P of a step and P2G of the next one for particles that share corners, by way of these.
     AtCorners,
     /// Corners that particles share.
     Corners,

@@ -69,7 +69,7 @@ fn problems() -> Vec<Problem> {
         let placement = Updated::default().placement;
         Scheme::Updated(Updated { shape, integrator, transfer, placement, ..Updated::default() })
     };
-    let case = |scheme, periods| Case { scheme, cells: 32, periods, ..Case::default() };
+    let case = |scheme, periods| Case { scheme, cells: 40, periods, ..Case::default() };
     vec![
         Problem::new(
             AnySolution::Two(Box::new(Coded(AxisAligned::default()))),
