@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     fn plan(particles: f64, steps: u64) -> Plan {
-        Plan { steps, particles, bytes: 0.0, extent: None, round_off: 0.0, division: None }
+        Plan { steps, particles, bytes: 0.0, extent: None, round_off: 0.0 }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use mmsmith_measure::norms::PerField;
+use mmsmith_mpm::Division;
 use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
@@ -89,6 +90,13 @@ impl<'a> Discretized<'a> {
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// How many threads a step keeps busy, counted for a body that fills its grid. `None` in the total formulation, and for grids whose
+    /// tiles are not soon counted.
+    #[must_use]
+    pub fn division(&self) -> Option<Division> {
+        self.on_grid.division()
     }
 
     /// The errors that rounding alone may cause, field by field.
@@ -188,6 +196,8 @@ trait Simulate: Send + Sync {
     fn observe(&self, cfl: f64, end: f64, limits: Option<&Limits>) -> Result<Observed, CaseError>;
     /// The scales of runs at other CFL numbers.
     fn scales(&self) -> Result<Scales, CaseError>;
+    /// As [`Discretized::division`].
+    fn division(&self) -> Option<Division>;
 }
 
 /// A case of a body of revolution in its half plane.
@@ -245,12 +255,20 @@ impl<T: Precision<2>> Simulate for InHalfPlane<'_, T> {
     fn scales(&self) -> Result<Scales, CaseError> {
         self.on_grid()?.scales()
     }
+
+    fn division(&self) -> Option<Division> {
+        self.on_grid().ok()?.division()
+    }
 }
 
 impl<T: Precision<D>, const D: usize> Simulate for OnGrid<'_, T, D>
 where
     f64: Precision<D>,
 {
+    fn division(&self) -> Option<Division> {
+        OnGrid::division(self)
+    }
+
     fn run(&self, outputs: &mut Outputs<'_>) -> Result<Row, CaseError> {
         run::follow(self, outputs)
     }

@@ -26,8 +26,6 @@ pub struct Plan {
     /// The error of `u` that rounding alone may cause, a length: half a unit in the last place of the body's size,
     /// or of its largest coordinate, at each step, added up as a random walk.
     pub round_off: f64,
-    /// How many threads a step keeps busy, of a body that fills its grid; in the updated formulation.
-    pub division: Option<Division>,
 }
 
 impl Plan {
@@ -93,12 +91,14 @@ where
             }
         };
         let round_off = self.rounding() * (steps.count as f64).sqrt();
-        let division = match &case.scheme {
-            Scheme::Updated(_) => Division::of_lattice(&scene.grid::<f64>(), per_cell),
-            Scheme::Total(_) => None,
-        };
-        let (steps, extent) = (steps.count, scene.extent());
-        Ok(Plan { steps, particles, bytes, extent, round_off, division })
+        Ok(Plan { steps: steps.count, particles, bytes, extent: scene.extent(), round_off })
+    }
+
+    /// How many threads a step keeps busy, of a body that fills its grid; in the updated formulation.
+    pub(crate) fn division(&self) -> Option<Division> {
+        let Self { scene, case, .. } = self;
+        case.scheme.updated()?;
+        Division::of_lattice(&scene.grid::<f64>(), case.per_cell)
     }
 
     /// The rounding error of a position, a length: half a unit in the last place.

@@ -8,11 +8,12 @@ use mmsmith_expr::{Expr, OperationCount};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Around, Domain, Fields, SolvedCondition, Spec};
 use mmsmith_stage::{BodyForceOperations, Staged};
-use mmsmith_verify::{Cost, Part, Plan, Share, coverage};
+use mmsmith_verify::{Part, Share, coverage};
 use serde_json::{Value, json};
 
 use super::coverage::{POINTS, THRESHOLD};
 use super::growth::{MOST_GROWTH_WORK, Told};
+use super::predict::Prediction;
 use super::problem::Problem;
 use super::{blind, predict, profile};
 use crate::arguments::{ExplainOptions, SchemeOptions};
@@ -223,7 +224,7 @@ fn exact_elements(degree: Option<usize>) -> String {
 }
 
 /// Predicted costs of runs of the usual scheme, or why there are none.
-type Predicted = Result<Vec<(usize, Plan, Cost)>, String>;
+type Predicted = Result<Vec<Prediction>, String>;
 
 fn runs(predicted: &Predicted, choice: &str) -> String {
     let rows = match predicted {
@@ -232,7 +233,7 @@ fn runs(predicted: &Predicted, choice: &str) -> String {
     };
     let header = ["cells", "particles", "steps", "stepping", "in all", "memory", "threads of use"];
     let mut table = Table::new(0, header);
-    for (cells, plan, cost) in rows {
+    for Prediction { cells, plan, cost, division } in rows {
         table.row([
             cells.to_string(),
             format!("{:.0}", plan.particles),
@@ -240,7 +241,7 @@ fn runs(predicted: &Predicted, choice: &str) -> String {
             predict::duration(cost.steps_s),
             predict::duration(cost.total_s),
             predict::amount(plan.bytes),
-            plan.division.map_or_else(String::new, |of| number::rounded(of.cores, 2)),
+            division.map_or_else(String::new, |of| number::rounded(of.cores, 2)),
         ]);
     }
     format!(
@@ -282,7 +283,7 @@ fn document(
     predicted: &Predicted,
 ) -> Value {
     let runs = predicted.as_ref().map(|rows| {
-        let row = |(cells, plan, cost): &(usize, Plan, Cost)| {
+        let row = |Prediction { cells, plan, cost, division }: &Prediction| {
             json!({
                 "cells": cells,
                 "particles": plan.particles,
@@ -290,7 +291,7 @@ fn document(
                 "steps_s": cost.steps_s,
                 "total_s": cost.total_s,
                 "bytes": plan.bytes,
-                "division": plan.division.as_ref().map(profile::division_document),
+                "division": division.as_ref().map(profile::division_document),
             })
         };
         rows.iter().map(row).collect::<Vec<_>>()

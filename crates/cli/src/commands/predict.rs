@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use mmsmith_verify::{Case, CaseError, Cost, CostModel, Discretized, Plan};
+use mmsmith_verify::{Case, CaseError, Cost, CostModel, Discretized, Division, Plan};
 
 use super::problem::Model;
 use crate::{processes, terminal};
@@ -53,12 +53,20 @@ pub(super) fn learn(case: &Discretized<'_>) -> Result<CostModel, CaseError> {
     CostModel::calibrate(case, BRIEF)
 }
 
+/// Costs of a run, and the threads that it keeps busy where they can be counted.
+pub(super) struct Prediction {
+    pub(super) cells: usize,
+    pub(super) plan: Plan,
+    pub(super) cost: Cost,
+    pub(super) division: Option<Division>,
+}
+
 /// Costs of the scheme of `base` on some grids, those with `more` cells among them; grids that do not fit the solution are left out.
 pub(super) fn on_grids(
     model: &Model,
     base: &Case,
     more: &[usize],
-) -> Result<Vec<(usize, Plan, Cost)>, CaseError> {
+) -> Result<Vec<Prediction>, CaseError> {
     let mut fitting: Vec<Discretized<'_>> = Vec::new();
     let mut refused = None;
     for cells in GRIDS {
@@ -76,7 +84,8 @@ pub(super) fn on_grids(
         fitting.push(model.discretized(&Case { cells, ..*base })?);
     }
     let row = |case: &Discretized<'_>| {
-        Some((case.case().cells, *case.plan(), learnt.predict(case.plan())?))
+        let (cells, plan, division) = (case.case().cells, *case.plan(), case.division());
+        Some(Prediction { cells, plan, cost: learnt.predict(&plan)?, division })
     };
     Ok(fitting.iter().filter_map(row).collect())
 }

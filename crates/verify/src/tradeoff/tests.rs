@@ -31,7 +31,7 @@ impl Formula {
                 let steps = (2.0 * cells / setting.case.cfl).ceil() as u64;
                 let particles = (cells * setting.case.per_cell as f64).powi(2);
                 let bytes = 300.0 * particles;
-                Plan { steps, particles, bytes, extent: None, round_off: 0.0, division: None }
+                Plan { steps, particles, bytes, extent: None, round_off: 0.0 }
             },
         )
     }
