@@ -120,6 +120,17 @@ impl TableFile {
         points: Option<&[Vec<f64>]>,
     ) -> Result<Self, TableFileError> {
         let values = resolve(spec, overrides).map_err(InterpretError::from)?;
+        Self::of_values(spec, staged, values, periods, points)
+    }
+
+    /// Not generic, so that trajectories are compiled with this crate, and not with a caller that may not be optimised.
+    fn of_values(
+        spec: &Spec,
+        staged: &Staged,
+        values: Vec<f64>,
+        periods: f64,
+        points: Option<&[Vec<f64>]>,
+    ) -> Result<Self, TableFileError> {
         match spec.dimension {
             1 => Self::of::<1>(spec, staged, values, periods, points),
             2 => Self::of::<2>(spec, staged, values, periods, points),
