@@ -185,6 +185,16 @@ impl LawWithHistory for AnyLaw {
         each!(self, law => law.margin(at, constants, z, branch))
     }
 
+    fn halving_time(
+        &self,
+        at: &Kinematics<f64>,
+        constants: &[f64],
+        z: &[f64],
+        rates: &[f64],
+    ) -> f64 {
+        each!(self, law => law.halving_time(at, constants, z, rates))
+    }
+
     fn smoothness(&self, constants: &[f64], z: &[f64], begins: Branch) -> Smoothness {
         each!(self, law => law.smoothness(constants, z, begins))
     }

@@ -340,6 +340,11 @@ impl<const K: usize> Step<K> {
         rate(end, &self.to, &mut self.stages[12]);
     }
 
+    /// The rates where the step begins.
+    pub(crate) fn rates(&self) -> &[Dual<f64, K>] {
+        &self.stages[0]
+    }
+
     /// Makes ready to interpolate; the rates at the end are known.
     pub(crate) fn prepare(&mut self, rate: &mut impl Rate<K>) {
         if self.is_dense {

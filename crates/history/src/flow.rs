@@ -16,7 +16,7 @@
 use mmsmith_vocabulary::Smoothness;
 
 use crate::law::{Branch, Kinematics, LawWithHistory, Residuals};
-use crate::number::{Number, power};
+use crate::number::{Dual, Number, power};
 use crate::tensor::{
     ENTRIES, Logarithm, Space, Tensor, determinant, identity, symmetric_product, tensor,
 };
@@ -332,6 +332,31 @@ impl LawWithHistory for Flow {
                 space.contraction_with_transpose(&s, &pulled) / (square * of_d).sqrt()
             }
         }
+    }
+
+    fn halving_time(
+        &self,
+        at: &Kinematics<f64>,
+        constants: &[f64],
+        z: &[f64],
+        rates: &[f64],
+    ) -> f64 {
+        let own = Constants::of(constants);
+        // Elsewhere flow ends before the stress does.
+        if !self.creeps(&own) {
+            return f64::INFINITY;
+        }
+        let along = |value: f64, rate: f64| Dual { value, slopes: [rate] };
+        let F = tensor(|i, j| along(at.F[i][j], at.rate[i][j]));
+        let z: Vec<_> = z.iter().zip(rates).map(|(&z, &rate)| along(z, rate)).collect();
+        let State { s, square, .. } = self.state(&F, Dual::constant(own.mu), &z);
+        let rate = tensor(|i, j| s[i][j].slopes[0]);
+        let of_rate = self.space().contraction_with_transpose(&rate, &rate).abs();
+        if of_rate == 0.0 {
+            return f64::INFINITY;
+        }
+        let share = if square.slopes[0] < 0.0 { 0.5 } else { 1.0 };
+        share * (square.value / of_rate).sqrt()
     }
 
     fn smoothness(&self, constants: &[f64], z: &[f64], begins: Branch) -> Smoothness {

@@ -112,6 +112,18 @@ pub trait LawWithHistory: Sync {
         N::constant(1.0)
     }
 
+    /// The time in which the stress on which flow depends falls to a half at its rate, or grows to twice its size. Next to a zero rates are
+    /// not smooth, which estimates of errors do not see, so that steps of the integrator are no longer. Default: it never does.
+    fn halving_time(
+        &self,
+        _at: &Kinematics<f64>,
+        _constants: &[f64],
+        _z: &[f64],
+        _rates: &[f64],
+    ) -> f64 {
+        f64::INFINITY
+    }
+
     /// How smooth the body force is where a branch begins. Default: smooth.
     fn smoothness(&self, _constants: &[f64], _z: &[f64], _begins: Branch) -> Smoothness {
         Smoothness::Smooth

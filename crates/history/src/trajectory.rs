@@ -107,6 +107,8 @@ const MOST_REJECTIONS: usize = 3;
 const ROUNDINGS: f64 = 64.0;
 /// From one step to the next the estimate of an error falls by its length to the eighth power and by such a share, at most.
 const LEAST_SHARE: f64 = 0.1;
+/// The share of all time that steps over a zero of the stress have.
+const SHORTEST: f64 = 1e-6;
 /// Evaluations of rates, at most: a second or so.
 const MOST_EVALUATIONS: usize = 1_000_000;
 /// Intervals in which a time without flow is searched for its end, at least.
@@ -144,6 +146,13 @@ impl<'a, L: LawWithHistory, M: Motion<K>, const K: usize> Along<'a, L, M, K> {
             return self.law.margin(&at, &values_of(&self.constants(time)), z, branch);
         }
         self.law.margin(&at, &self.steady_values, z, branch)
+    }
+
+    /// The length of a step in which the stress on which flow depends halves or doubles.
+    fn longest_step(&self, time: f64, z: &[Dual<f64, K>], rates: &[Dual<f64, K>]) -> f64 {
+        let at = values(&self.motion.at(time));
+        let constants = values_of(&self.constants(time));
+        self.law.halving_time(&at, &constants, &values_of(z), &values_of(rates))
     }
 
     /// By how much rates move where the entries of `F` and its rate are off by a unit of their last place, as they are: no step
@@ -369,13 +378,19 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                 return Err(HistoryError::Stiff { time: self.time, evaluations });
             }
             let rest = end - self.time;
+            let mut usual = self.step;
+            // The stress may begin from zero.
+            if law.has_branches() && self.time > 0.0 {
+                let longest = self.along.longest_step(self.time, &step.from, step.rates());
+                usual = usual.min(longest.max(SHORTEST * end));
+            }
             // The last two steps share the rest, so that none of them is tiny.
-            let length = if rest <= self.step {
+            let length = if rest <= usual {
                 rest
-            } else if rest < 2.0 * self.step {
+            } else if rest < 2.0 * usual {
                 0.5 * rest
             } else {
-                self.step
+                usual
             };
             let Errors { of_values, of_slopes } =
                 step.go(&mut rate, length, self.tolerance, scales);
