@@ -4,8 +4,8 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use mmsmith_interpret::{Arrays, Quantity, interpret_staged};
-use mmsmith_runtime::AnySolution;
 use mmsmith_runtime::nalgebra::SVector;
+use mmsmith_runtime::{AnySolution, BLOCK, Solution};
 use mmsmith_spec::Spec;
 use mmsmith_stage::{FieldName, Staged};
 use std::sync::Arc;
@@ -14,8 +14,13 @@ use std::time::Instant;
 const POINTS: usize = 1_000_000;
 const TIMES: usize = 9;
 
-/// The median time of a call.
-fn tell(what: &str, mut call: impl FnMut(f64)) {
+/// The median time of a call, for all points.
+fn tell(what: &str, call: impl FnMut(f64)) {
+    tell_shared(what, POINTS, call);
+}
+
+/// The median time of a call, for so many points.
+fn tell_shared(what: &str, points: usize, mut call: impl FnMut(f64)) {
     let mut times: Vec<f64> = (0..TIMES)
         .map(|n| {
             let begun = Instant::now();
@@ -24,10 +29,55 @@ fn tell(what: &str, mut call: impl FnMut(f64)) {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    println!("{what:<28} {:6.1} ns a point", times[TIMES / 2] / POINTS as f64 * 1e9);
+    println!("{what:<28} {:6.1} ns a point", times[TIMES / 2] / points as f64 * 1e9);
+}
+
+/// The body force of a law with memory, from series of particles in the blocks in which a solver takes them.
+fn tell_of_memory(name: &str, text: &str) {
+    let spec = Spec::parse(text, name).unwrap();
+    let staged = Staged::of(&spec, spec.derive().unwrap());
+    match interpret_staged(&spec, &staged, []).unwrap() {
+        AnySolution::One(solution) => tell_of_blocks(name, solution.as_ref()),
+        AnySolution::Two(solution) => tell_of_blocks(name, solution.as_ref()),
+        AnySolution::Three(solution) => tell_of_blocks(name, solution.as_ref()),
+        _ => {}
+    }
+}
+
+fn tell_of_blocks<const D: usize>(name: &str, solution: &dyn Solution<f64, D>) {
+    const COUNT: usize = POINTS / 4;
+    let steps = [0.618_033_988_75, 0.754_877_666_25, 0.569_840_290_998];
+    let X: Vec<SVector<f64, D>> = (0..COUNT)
+        .map(|n| SVector::from_fn(|i, _| 0.5 + 0.5 * (n as f64 * steps[i]).fract()))
+        .collect();
+    let points = solution.body_force_at(&X);
+    let ids: Vec<u32> = (0..COUNT as u32).collect();
+    for count in [COUNT, 4000] {
+        let mut b = [SVector::zeros(); BLOCK];
+        tell_shared(&format!("{name}, {count} particles"), COUNT, |t| {
+            for _ in 0..COUNT / count {
+                let mut time = Vec::new();
+                points.of_time(t, &mut time);
+                for ids in ids[..count].chunks(BLOCK) {
+                    points.evaluate_of(&time, ids, &mut b[..ids.len()]);
+                    std::hint::black_box(&b);
+                }
+            }
+        });
+        tell_shared(&format!("{name}, one after the other"), COUNT, |t| {
+            for _ in 0..COUNT / count {
+                for ids in ids[..count].chunks(BLOCK) {
+                    points.evaluate(t, ids[0] as usize, &mut b[..ids.len()]);
+                    std::hint::black_box(&b);
+                }
+            }
+        });
+    }
 }
 
 fn main() {
+    tell_of_memory("bar-j2", include_str!("../../../mms-specs/with-memory/bar-j2.toml"));
+    tell_of_memory("block-j2", include_str!("../../../mms-specs/with-memory/block-j2.toml"));
     let text = include_str!("../../../mms-specs/ring.toml");
     let spec = Spec::parse(text, "ring.toml").unwrap();
     let staged = Staged::of(&spec, spec.derive().unwrap());

@@ -11,10 +11,16 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
+mod prepared;
+
+pub(crate) use prepared::{Moment, Prepared, Quantities};
+
 /// The relative tolerance of trajectories of laws with flow.
 const TOLERANCE: f64 = 1e-13;
 /// That of smooth ones, whose steps are longer, and with them the errors of values between steps.
 const TOLERANCE_OF_SMOOTH: f64 = 1e-15;
+/// Where tables have larger errors each particle has series of its own.
+const LARGEST_ERROR: f64 = 1e-11;
 /// The part that a table may leave out, as a share of each quantity's largest value.
 const TABLE_TOLERANCE: f64 = 1e-12;
 
@@ -521,10 +527,13 @@ pub(crate) fn first_entries(names: &[String]) -> Vec<usize> {
     firsts.filter(|(_, names)| is_tensor(names)).map(|(first, _)| first).collect()
 }
 
+fn is_identity<const D: usize>(Q: &[[f64; D]; D]) -> bool {
+    (0..D).all(|i| (0..D).all(|a| Q[i][a] == f64::from(u8::from(i == a))))
+}
+
 /// Turns the symmetric tensors among internal variables, whose first entries are known, from a frame to Cartesian axes.
 fn turn_tensors<const D: usize>(firsts: &[usize], Q: &[[f64; D]; D], values: &mut [f64]) {
-    let is_cartesian = (0..D).all(|i| (0..D).all(|a| Q[i][a] == f64::from(u8::from(i == a))));
-    if is_cartesian {
+    if is_identity(Q) {
         return;
     }
     let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| {
@@ -635,189 +644,5 @@ impl<const D: usize> Tables<D> {
             Some(OverAxes::Two(table)) => table.grid().at_time(t),
             Some(OverAxes::Three(table)) => table.grid().at_time(t),
         }
-    }
-}
-
-/// A field, or several, by their place among the quantities of tables.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Quantities {
-    BodyForce,
-    Stress,
-    Internal,
-}
-
-/// Series of fields of particles that stay at their places.
-pub(crate) struct Prepared<'a, const D: usize> {
-    histories: &'a Histories<D>,
-    tables: Arc<Tables<D>>,
-    series: SeriesOfAll,
-    particles: Vec<Place<D>>,
-}
-
-enum SeriesOfAll {
-    /// From tables, all with the same pieces.
-    OfTables {
-        /// How many fields there are.
-        count: usize,
-        /// Coefficients of a series of one piece, with zeros up to a multiple of [`SIDE_BY_SIDE`].
-        padded: usize,
-        pieces: usize,
-        /// For each particle, piece and field the coefficients.
-        coefficients: Vec<f64>,
-    },
-    /// From the history of each particle; none where it could not be followed.
-    Own(Vec<Option<AtPoint>>),
-}
-
-/// A particle.
-struct Place<const D: usize> {
-    X: [f64; D],
-    /// `[i][a]`: Cartesian component `i` of the unit vector `a` of its frame.
-    frame: [[f64; D]; D],
-}
-
-/// Terms of a series that are summed side by side.
-const SIDE_BY_SIDE: usize = 4;
-/// Particles whose series are formed at a time.
-const CHUNK: usize = 1024;
-/// Where tables have larger errors each particle has series of its own.
-const LARGEST_ERROR: f64 = 1e-10;
-
-/// The polynomials at a time, for [`Prepared`].
-pub(crate) struct Moment {
-    t: f64,
-    piece: usize,
-    polynomials: Vec<f64>,
-}
-
-impl<'a, const D: usize> Prepared<'a, D> {
-    pub(crate) fn new(
-        histories: &'a Histories<D>,
-        tables: Arc<Tables<D>>,
-        quantities: Quantities,
-        X: &[[f64; D]],
-    ) -> Self {
-        let range = match quantities {
-            Quantities::BodyForce => 0..D,
-            Quantities::Stress => D..D + D * D,
-            Quantities::Internal => D + D * D..D + D * D + histories.names.len(),
-        };
-        let place = |X: &[f64; D]| Place { X: *X, frame: histories.particle(*X).frame };
-        let series = if tables.table.is_some() {
-            SeriesOfAll::of_tables(histories, &tables, &range, X)
-        } else {
-            let own = |X: &[f64; D]| histories.own_series(*X, tables.end, &range);
-            SeriesOfAll::Own(X.par_iter().map(own).collect())
-        };
-        Self { histories, series, particles: X.par_iter().map(place).collect(), tables }
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.particles.len()
-    }
-
-    pub(crate) fn bytes(&self) -> usize {
-        let of_series = match &self.series {
-            SeriesOfAll::OfTables { count, padded, pieces, .. } => pieces * count * padded,
-            SeriesOfAll::Own(all) => {
-                all.iter().flatten().next().map_or(0, |series| series.coefficients(0).len() * D)
-            }
-        };
-        size_of::<Place<D>>() + 8 * of_series
-    }
-
-    /// The values of a time that all particles need.
-    pub(crate) fn moment(&self, t: f64) -> Moment {
-        let AtTime { piece, mut polynomials } = self.tables.at_time(t);
-        polynomials.resize(polynomials.len().next_multiple_of(SIDE_BY_SIDE), 0.0);
-        Moment { t, piece, polynomials }
-    }
-
-    /// Field `k` of particle `n` in its frame.
-    #[inline]
-    fn value(&self, n: usize, k: usize, moment: &Moment) -> f64 {
-        let (count, padded, pieces, coefficients) = match &self.series {
-            SeriesOfAll::Own(all) => {
-                return all[n].as_ref().map_or(f64::NAN, |series| series.value(k, moment.t));
-            }
-            SeriesOfAll::OfTables { count, padded, pieces, coefficients } => {
-                (*count, *padded, *pieces, coefficients)
-            }
-        };
-        let first = ((n * pieces + moment.piece) * count + k) * padded;
-        let own = &coefficients[first..][..padded];
-        let mut sums = [0.0; SIDE_BY_SIDE];
-        let terms = own.chunks_exact(SIDE_BY_SIDE);
-        for (c, p) in terms.zip(moment.polynomials.chunks_exact(SIDE_BY_SIDE)) {
-            for m in 0..SIDE_BY_SIDE {
-                sums[m] += c[m] * p[m];
-            }
-        }
-        (sums[0] + sums[1]) + (sums[2] + sums[3])
-    }
-
-    /// Whether the tables have this time; later ones take a trajectory each.
-    fn has(&self, t: f64) -> bool {
-        t <= self.tables.end * (1.0 + 1e-12)
-    }
-
-    #[inline]
-    pub(crate) fn body_force(&self, n: usize, moment: &Moment) -> [f64; D] {
-        let Place { X, frame } = &self.particles[n];
-        if !self.has(moment.t) {
-            let found = self.histories.response(*X, moment.t);
-            return found.map_or([f64::NAN; D], |response| response.b);
-        }
-        let own: [f64; D] = std::array::from_fn(|a| self.value(n, a, moment));
-        turn_vector(frame, |a| own[a])
-    }
-
-    pub(crate) fn stress(&self, n: usize, moment: &Moment) -> [[f64; D]; D] {
-        let Place { X, frame: Q } = &self.particles[n];
-        if !self.has(moment.t) {
-            let nan = [[f64::NAN; D]; D];
-            return self.histories.stressed(*X, moment.t).map_or(nan, |found| found.P);
-        }
-        let own: [[f64; D]; D] =
-            std::array::from_fn(|a| std::array::from_fn(|b| self.value(n, a * D + b, moment)));
-        turn_tensor(Q, |k| own[k / D][k % D])
-    }
-
-    pub(crate) fn internal(&self, n: usize, moment: &Moment) -> Vec<f64> {
-        let Place { X, frame } = &self.particles[n];
-        let names = &self.histories.names;
-        if !self.has(moment.t) {
-            let nan = vec![f64::NAN; names.len()];
-            return self.histories.stressed(*X, moment.t).map_or(nan, |found| found.internal);
-        }
-        let mut own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
-        turn_tensors(&self.histories.tensors, frame, &mut own);
-        own
-    }
-}
-
-impl SeriesOfAll {
-    fn of_tables<const D: usize>(
-        histories: &Histories<D>,
-        tables: &Tables<D>,
-        range: &Range<usize>,
-        X: &[[f64; D]],
-    ) -> Self {
-        let in_time = tables.at_time(0.0).polynomials.len().max(1);
-        let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
-        let (mut pieces, mut coefficients) = (1, Vec::new());
-        for X in X.chunks(CHUNK) {
-            for series in tables.at_all(histories, X, range) {
-                pieces = series.coefficients(0).len() / in_time;
-                for piece in 0..pieces {
-                    for quantity in 0..range.len() {
-                        let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
-                        coefficients.extend_from_slice(own);
-                        coefficients.resize(coefficients.len() + padded - in_time, 0.0);
-                    }
-                }
-            }
-        }
-        Self::OfTables { count: range.len(), padded, pieces, coefficients }
     }
 }

@@ -14,7 +14,7 @@ mod table_file;
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
 pub use table_file::{FieldShape, TableFile, TableFileError, TabulatedField};
 
-use history::{Chart, Histories, HistoryProblem, Prepared, Quantities};
+use history::{Chart, Histories, HistoryProblem, Moment, Prepared, Quantities};
 use lattice::LatticeStages;
 use mmsmith_expr::{Program, Scalar, Slot};
 use mmsmith_history::HistoryError;
@@ -530,16 +530,11 @@ impl<T: Interpretable, const D: usize> BodyForceAtPoints<T, D> for Prepared<'_, 
     }
 
     fn of_time(&self, t: T, values: &mut Vec<T>) {
-        values.push(t);
+        self.moment(t.to_f64()).put(t, values);
     }
 
     fn evaluate_of(&self, time: &[T], points: &[u32], b: &mut [SVector<T, D>]) {
-        let &[t] = time else { panic!("one value of the time is needed, not {}", time.len()) };
-        let moment = self.moment(t.to_f64());
-        for (n, b) in points.iter().zip(b) {
-            let own = self.body_force(*n as usize, &moment);
-            *b = SVector::from_fn(|i, _| T::nearest(own[i]));
-        }
+        self.body_forces(points, &Moment::of(time), b);
     }
 
     fn len(&self) -> usize {

@@ -25,6 +25,7 @@ mod staged;
 mod statics;
 mod structure;
 mod symmetries;
+mod tables;
 mod tangents;
 mod units;
 mod updated_frame;
