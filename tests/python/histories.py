@@ -250,7 +250,9 @@ class Perzyna(Flow):
         f = lambda t, z: self.beyond(self.kinematics(X, t)[0], z)
         rate = lambda t, z: self.rate(X, t, z)
         while at < t:
-            parts = 1 if flows else 8
+            # Next to the yield surface in short steps, so that no time without flow is passed over.
+            over = f(at, z)
+            parts = 1 if flows and over > 60 else 8 if abs(over) > 6 else 64
             to = min(at + length / parts, t)
             new = step(rate, at, z, to - at) if flows else z
             if (f(to, new) < 0) == flows:
