@@ -9,6 +9,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use std::fmt;
 
+use crate::across::Across;
 use crate::case::law;
 use crate::check::{CheckError, with};
 use crate::difference::derivative;
@@ -143,8 +144,8 @@ where
         return Err(SceneError::Unknown { what: "shape", value: format!("{domain:?}") }.into());
     }
     let exact = solution.law();
+    let pressure = Pressure::of(exact.clone());
     let elastic = |law: &mmsmith_mpm::Law<f64, D>| !matches!(law, mmsmith_mpm::Law::WithMemory(_));
-    let without_pressure = law::<f64, D>(without_pressure(exact.clone())).ok().filter(elastic);
     let law = law::<f64, D>(exact).ok().filter(elastic);
     let density = solution.density();
     let mut squares = Squares::default();
@@ -167,10 +168,9 @@ where
                 squares.stress[i][J] += slope[i] * slope[i];
             }
         }
-        if let Some(law) = &without_pressure
-            && let Some(P) = law.first_piola_kirchhoff(&fields.F)
+        if let Some(P) = pressure.as_ref().and_then(|part| part.stress(solution, &X, t, &fields.F))
         {
-            squares.lambda += (fields.P - P).norm_squared();
+            squares.lambda += P.norm_squared();
         }
         if let Some(law) = &law {
             let P = law.stress_at_small_strain(&fields.H);
@@ -217,6 +217,63 @@ fn skew<const D: usize>(A: &SMatrix<f64, D, D>) -> f64 {
     ((A - A.transpose()) * 0.5).norm_squared()
 }
 
+/// The part of a law's stress from the modulus of a change of volume: that of the law less that of the law without it.
+enum Pressure<const D: usize> {
+    /// Of a law of the deformation and, where it has memory, of internal variables.
+    Of { law: mmsmith_mpm::Law<f64, D>, without: mmsmith_mpm::Law<f64, D> },
+    /// Without stress across: of the law in space at the stretch there.
+    InSpace { law: Box<Across<D>>, without: Box<Across<D>> },
+}
+
+impl<const D: usize> Pressure<D>
+where
+    f64: Precision<D>,
+{
+    /// None where the law cannot be read.
+    fn of(declared: Law<f64>) -> Option<Self> {
+        // Elements and flow change the shape alone: the pressure is that of the elastic law.
+        let declared = match declared {
+            Law::WithMemory(law) => Law::Library(law.elastic),
+            law => law,
+        };
+        let without = without_pressure(declared.clone());
+        if let (Some(law), Some(without)) =
+            (Across::of(declared.clone()), Across::of(without.clone()))
+        {
+            let (law, without) = (Box::new(law), Box::new(without));
+            return Some(Self::InSpace { law, without });
+        }
+        Some(Self::Of { law: law(declared).ok()?, without: law(without).ok()? })
+    }
+
+    fn stress(
+        &self,
+        solution: &dyn Solution<f64, D>,
+        X: &SVector<f64, D>,
+        t: f64,
+        F: &SMatrix<f64, D, D>,
+    ) -> Option<SMatrix<f64, D, D>> {
+        match self {
+            Self::Of { law, without } => {
+                let q = match law.variables().is_empty() {
+                    true => Vec::new(),
+                    false => solution.internal(X, t),
+                };
+                let of = |law: &mmsmith_mpm::Law<f64, D>| {
+                    law.with_variables(&q).first_piola_kirchhoff(F)
+                };
+                Some(of(law)? - of(without)?)
+            }
+            Self::InSpace { law, without } if law.is_cartesian => {
+                let stretch = solution.stretch_across(X, t);
+                let difference = law.stress(F, stretch) - without.stress(F, stretch);
+                Some(difference.fixed_view::<D, D>(0, 0).into_owned())
+            }
+            Self::InSpace { .. } => None,
+        }
+    }
+}
+
 /// The law without the modulus of a change of volume, where it has one of its own.
 fn without_pressure(law: Law<f64>) -> Law<f64> {
     match law {
@@ -225,9 +282,17 @@ fn without_pressure(law: Law<f64>) -> Law<f64> {
             let keep = |name, value| if modulus == Some(name) { 0.0 } else { value };
             Law::Library(material.map_named(keep))
         }
-        law @ (Law::Stated(_) | Law::WithMemory(_)) => law,
+        Law::Stated(mut stated) => {
+            let moduli = stated.constants.iter_mut().filter(|(name, _)| VOLUME.contains(&&**name));
+            moduli.for_each(|(_, value)| *value = 0.0);
+            Law::Stated(stated)
+        }
+        law @ Law::WithMemory(_) => law,
     }
 }
+
+/// The moduli of a change of volume in the laws of the library, which formulas made of these have too.
+const VOLUME: [&str; 2] = ["lambda", "kappa"];
 
 /// The sum of the squared tractions on the surface that is loaded most; as many points as in the body.
 fn loads<const D: usize>(solution: &dyn Solution<f64, D>, count: usize) -> f64 {
