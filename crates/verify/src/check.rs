@@ -668,8 +668,7 @@ fn traction_finding<const D: usize>(
     if places.is_empty() {
         return None;
     }
-    let stress = |(X, t): &(SVector<f64, D>, f64)| solution.first_piola_kirchhoff(X, *t).amax();
-    let stress = samples.iter().map(stress).fold(0.0, f64::max);
+    let stress = largest_stress(solution, places, samples);
     let mut found = Comparison::new(format!("traction on {surface}"), "P N");
     for (X, N, t) in places {
         let expected = solution.first_piola_kirchhoff(X, *t) * N;
@@ -678,6 +677,17 @@ fn traction_finding<const D: usize>(
         found.add((X, *t), difference, 16.0 * f64::EPSILON * stress, stress);
     }
     Some(found.finding())
+}
+
+/// The largest stress in the body and on a surface, where it may be larger than at the samples within.
+fn largest_stress<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    places: &[(SVector<f64, D>, SVector<f64, D>, f64)],
+    samples: &[(SVector<f64, D>, f64)],
+) -> f64 {
+    let within = samples.iter().map(|(X, t)| (X, *t));
+    let all = within.chain(places.iter().map(|(X, _, t)| (X, *t)));
+    all.map(|(X, t)| solution.first_piola_kirchhoff(X, t).amax()).fold(0.0, f64::max)
 }
 
 fn boundary_findings<const D: usize>(
@@ -689,9 +699,11 @@ fn boundary_findings<const D: usize>(
     let name = |what: &str| format!("{what} on {}", boundary.surface);
     // Scales are those of the whole body: on the boundary itself everything may vanish.
     let largest = |field: &dyn Fn(&SVector<f64, D>, f64) -> f64| {
-        samples.iter().map(|(X, t)| field(X, *t)).fold(0.0, f64::max)
+        let within = samples.iter().map(|(X, t)| (X, *t));
+        let all = within.chain(places.iter().map(|(X, _, t)| (X, *t)));
+        all.map(|(X, t)| field(X, t)).fold(0.0, f64::max)
     };
-    let stress = largest(&|X, t| solution.first_piola_kirchhoff(X, t).amax());
+    let stress = largest_stress(solution, places, samples);
     let traction = |X, N: &SVector<f64, D>, t| solution.first_piola_kirchhoff(X, t) * N;
     match boundary.condition {
         Condition::Sliding | Condition::Symmetry => {
