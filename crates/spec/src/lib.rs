@@ -15,6 +15,7 @@ mod derive;
 mod diagnostic;
 mod document;
 mod law;
+mod limits;
 mod memory;
 mod polynomial;
 mod read;

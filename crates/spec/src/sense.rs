@@ -103,12 +103,12 @@ fn at_defaults(spec: &Spec, constants: &[Expr]) -> Vec<f64> {
     Program::lower(&mut graph, &inputs, &[], constants).evaluate(&defaults)
 }
 
-fn figure(value: f64) -> String {
+pub(crate) fn figure(value: f64) -> String {
     if value.is_nan() { "not a number".into() } else { format!("{value}") }
 }
 
 /// The defaults in words, where there are few.
-fn given(parameters: &[Parameter]) -> String {
+pub(crate) fn given(parameters: &[Parameter]) -> String {
     if parameters.is_empty() || parameters.len() > 8 {
         return String::new();
     }

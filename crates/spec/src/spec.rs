@@ -577,7 +577,7 @@ impl<'a> Reader<'a> {
             self.scope.declare_unknown(unknown.get_ref(), unknown.span())?;
         }
         self.scope.define_all(&document.lets.0)?;
-        let requirements = self.requirements(document, &parameters)?;
+        let mut requirements = self.requirements(document, &parameters)?;
         let displacement = self.displacement(document)?;
         let given = self.given(document)?;
         let in_space = self.material(document)?;
@@ -587,6 +587,7 @@ impl<'a> Reader<'a> {
         };
         let prestress = self.prestress(document, &material)?;
         let memory = self.memory(document, &material)?;
+        requirements.extend(self.limits_of_memory(document, memory.as_ref(), &parameters)?);
         let internal = self.internal(document, &material)?;
         let table = document.material.span();
         let density = document.material.get_ref().density.as_ref();
