@@ -6,7 +6,7 @@ use crate::table::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{comment, meaning, with};
 use mmsmith_expr::{Operation, Slot};
-use mmsmith_spec::Parameter;
+use mmsmith_spec::{Coordinates, Parameter};
 use mmsmith_stage::{Block, FieldName, Measures, Shape, TubeMeasures};
 use mmsmith_vocabulary::Law;
 use std::collections::BTreeSet;
@@ -103,6 +103,9 @@ impl Code<'_> {
     /// A sentence on the directions left out.
     fn assumption(&self) -> &'static str {
         match (self.staged.across, self.spec.dimension) {
+            (None, _) if self.spec.coordinates == Coordinates::Axisymmetric => {
+                "The body is one of revolution: nothing depends on the angle, and the stretch and the stress around the axis are those along theta."
+            }
             (None, _) => "In two dimensions the deformation is plane strain.",
             (Some(_), 1) => {
                 "There is no stress across the line (uniaxial stress): P, b and tractions are per unit of area before the deformation, J is \

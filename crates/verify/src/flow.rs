@@ -41,6 +41,19 @@ pub fn has_flow(solution: &AnySolution<f64>) -> bool {
     in_dimension!(solution, |s| is_flow(s.law()), else false)
 }
 
+/// Whether flow hardens by a root of the equivalent plastic strain, so that it begins smoothly where there was none before.
+#[must_use]
+pub fn flows_smoothly(solution: &AnySolution<f64>) -> bool {
+    let is_root = |law: Law<f64>| match law {
+        Law::WithMemory(law) => match law.memory {
+            Memory::Flow(flow) => flow.modulus > 0.0 && flow.exponent < 1.0,
+            Memory::Maxwell(_) => false,
+        },
+        Law::Library(_) | Law::Stated(_) => false,
+    };
+    in_dimension!(solution, |s| is_root(s.law()), else false)
+}
+
 /// Whether the stress depends on more than the deformation gradient.
 #[must_use]
 pub fn has_memory(solution: &AnySolution<f64>) -> bool {

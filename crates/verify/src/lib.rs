@@ -85,7 +85,7 @@ pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
 pub use evaluate::{FieldRow, evaluate, evaluate_with_tangent};
-pub use flow::{has_flow, has_memory, history_of};
+pub use flow::{flows_smoothly, has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
 pub use growth::{
     A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,

@@ -78,7 +78,10 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
         let motion =
             solutions.first().map(|solution| Told::measure(solution, 1.0, MOST_GROWTH_WORK));
         let told = inverted.as_ref().map(|told| format!("  {}\n", told.text()));
-        let history_told = history.as_ref().map(history::text).unwrap_or_default();
+        let history_told = match (&history, solutions.first()) {
+            (Some(report), Some(solution)) => history::text(report, solution),
+            _ => String::new(),
+        };
         terminal::say(&format!(
             "{findings}{history_told}{}{}{}\n",
             told.unwrap_or_default(),
@@ -321,6 +324,10 @@ fn places(report: &CheckReport, parameters: &[BTreeMap<String, f64>]) -> String 
             let values: Vec<String> =
                 set.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
             places += &format!("    with {}\n", values.join(", "));
+        }
+        if finding.what == "F_zz" && finding.difference.is_nan() {
+            places += "    there is no real F_zz here: no stretch across leaves no stress there, with these parameters and this motion; narrower \
+                       ranges of the parameters keep away from it\n";
         }
     }
     places

@@ -1,6 +1,7 @@
 //! Findings from histories of internal variables, for people and for JSON.
 
-use mmsmith_solutions::{HistoryReport, Smoothness};
+use mmsmith_solutions::{AnySolution, HistoryReport, Smoothness};
+use mmsmith_verify::flows_smoothly;
 use serde_json::{Value, json};
 
 use crate::table;
@@ -15,7 +16,7 @@ fn word(smoothness: Smoothness) -> &'static str {
 }
 
 /// Where the body flows, and what that means for orders.
-pub(super) fn text(report: &HistoryReport) -> String {
+pub(super) fn text(report: &HistoryReport, exact: &AnySolution<f64>) -> String {
     let HistoryReport { particles, always, onsets, unloadings, least_margin, smoothness, .. } =
         *report;
     let mut text = String::new();
@@ -39,6 +40,11 @@ pub(super) fn text(report: &HistoryReport) -> String {
     }
     if onsets + unloadings > 0 {
         text += match smoothness {
+            // The root is there: only a second beginning jumps.
+            Smoothness::Jump if flows_smoothly(exact) => {
+                "    where a particle flows again after a stop b jumps, also with hardening by a root of alpha, which is smooth at alpha = 0 alone: \
+                 orders are not judged; with a motion that goes on in one direction they are\n"
+            }
             Smoothness::Jump => {
                 "    where a particle begins to flow b jumps: orders are not judged; with hardening sy + K*alpha^(1/3), or with \
                  [start] on-yield = true and a motion that goes on in one direction, they are\n"

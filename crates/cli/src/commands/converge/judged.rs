@@ -3,7 +3,8 @@
 use mmsmith_solutions::{AnySolution, Smoothness};
 use mmsmith_verify::{
     Discretized, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
-    Values, expected_in_space, expected_in_time, history_of, orders_above, verdicts_above,
+    Values, expected_in_space, expected_in_time, flows_smoothly, history_of, orders_above,
+    verdicts_above,
 };
 
 use super::Converge;
@@ -28,9 +29,18 @@ const HISTORIES: usize = 100;
 fn not_judged(exact: &AnySolution<f64>) -> Option<String> {
     let report = history_of(exact, HISTORIES).ok()??;
     (report.smoothness == Smoothness::Jump && report.onsets + report.unloadings > 0).then(|| {
-        "Orders are not judged: the body force jumps where particles begin to flow, and errors at such a front have no order. With \
-         yield = 'sy + K*alpha^(1/3)', or a motion that flows everywhere from the start, they have one."
-            .to_owned()
+        let advice = match flows_smoothly(exact) {
+            true => {
+                "The hardening is smooth where a particle flows for the first time, and not where it flows again after a stop: with a motion \
+                 that goes on in one direction they have one."
+            }
+            false => {
+                "With yield = 'sy + K*alpha^(1/3)', or a motion that flows everywhere from the start, they have one."
+            }
+        };
+        format!(
+            "Orders are not judged: the body force jumps where particles begin to flow, and errors at such a front have no order. {advice}"
+        )
     })
 }
 
