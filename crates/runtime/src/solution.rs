@@ -112,6 +112,11 @@ pub trait Solution<T: Real, const D: usize>: Send + Sync {
     fn is_half_plane(&self) -> bool {
         false
     }
+    /// Stretch around the axis and first Piola-Kirchhoff stress there, force per reference area, at each of some places of the half plane
+    /// of a body of revolution; `None` of other bodies.
+    fn around_axis(&self, _X: &[SVector<T, D>], _t: T) -> Option<Vec<[T; 2]>> {
+        None
+    }
     /// The conditions on the body's boundary.
     fn boundaries(&self) -> &[Boundary];
     /// The length that a cell count divides: the grid spacing is this length over the number of cells.

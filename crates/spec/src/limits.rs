@@ -30,7 +30,7 @@ impl<'a> Limit<'a> {
 }
 
 impl Reader<'_> {
-    /// What the constants of a law with memory have to satisfy.
+    /// Requirements on the constants of a law with memory.
     ///
     /// # Errors
     ///
@@ -117,7 +117,7 @@ impl Reader<'_> {
     }
 }
 
-/// Those of a flow, whose yield stress, drag, exponent and time have these texts.
+/// Limits of a flow, whose yield stress, drag, exponent and time have these texts.
 fn limits_of_flow<'a>(
     flow: &Flow<Expr>,
     [yields, drag, exponent, time]: [&'a Option<Text>; 4],

@@ -219,9 +219,9 @@ fn skew<const D: usize>(A: &SMatrix<f64, D, D>) -> f64 {
 
 /// The part of a law's stress from the modulus of a change of volume: that of the law less that of the law without it.
 enum Pressure<const D: usize> {
-    /// Of a law of the deformation and, where it has memory, of internal variables.
+    /// A law of the deformation and, where it has memory, of internal variables.
     Of { law: mmsmith_mpm::Law<f64, D>, without: mmsmith_mpm::Law<f64, D> },
-    /// Without stress across: of the law in space at the stretch there.
+    /// A law without stress across: that in space at the stretch there.
     InSpace { law: Box<Across<D>>, without: Box<Across<D>> },
 }
 

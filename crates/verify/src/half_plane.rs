@@ -202,6 +202,16 @@ impl<T: Real> Solution<T, 2> for HalfPlane<'_, T> {
         true
     }
 
+    fn around_axis(&self, X: &[SVector<T, 2>], t: T) -> Option<Vec<[T; 2]>> {
+        let mut runs = vec![StateRun::<T, 3>::zero(); X.len().div_ceil(BLOCK)];
+        self.space.state_at(&places(X)).evaluate(t, t, 0, &mut runs);
+        let of = |n: usize| {
+            let (run, n) = (&runs[n / BLOCK], n % BLOCK);
+            [run.F[1][1][n], run.P[1][1][n]]
+        };
+        Some((0..X.len()).map(of).collect())
+    }
+
     fn boundaries(&self) -> &[Boundary] {
         &self.boundaries
     }

@@ -15,6 +15,7 @@ mod remedy;
 mod schemas;
 mod scheme;
 mod score;
+mod score_faults;
 mod score_readings;
 mod shards;
 mod simulate;
@@ -22,5 +23,6 @@ mod stability;
 mod statics;
 #[cfg(unix)]
 mod terminal;
+mod told_causes;
 mod tradeoff;
 mod warnings;

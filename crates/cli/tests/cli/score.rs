@@ -97,7 +97,10 @@ fn several_recordings_have_the_orders_of_converge() {
     for field in FIELDS {
         assert_eq!(scored["orders"][field], study["orders"][field]);
     }
-    assert_eq!(keys(&scored), "blind_spots findings orders passed rows schema settings verdict");
+    assert_eq!(
+        keys(&scored),
+        "across_orders blind_spots findings orders passed rows schema settings verdict"
+    );
     assert_eq!(scored["schema"], "mmsmith.score/1");
     for (row, expected) in
         scored["rows"].as_array().unwrap().iter().zip(study["rows"].as_array().unwrap())
@@ -110,7 +113,7 @@ fn several_recordings_have_the_orders_of_converge() {
         assert_eq!(keys(&row["errors"]), "F P cauchy u v");
         assert_eq!(
             keys(row),
-            "cells displacements errors exact_displacement fields file first_time frames h last_time \
+            "across cells displacements errors exact_displacement fields file first_time frames h last_time \
              law particles reference_positions status"
         );
     }

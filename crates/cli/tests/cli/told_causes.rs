@@ -1,4 +1,4 @@
-//! What commands say of the law and the parameters is true of them: each line is a case that was told wrongly.
+//! Commands say of the law and the parameters what is true of them: each line is a case that was told wrongly.
 
 #![allow(clippy::unwrap_used)]
 

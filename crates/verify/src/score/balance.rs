@@ -3,9 +3,9 @@
 use mmsmith_runtime::{Domain, Solution};
 use mmsmith_vtk::foreign::Snapshot;
 
+use super::data::FrameData;
 use super::error::ScoreError;
 use super::findings::Remarks;
-use super::frame::FrameData;
 
 /// The names of masses of particles.
 const MASSES: [&str; 5] = ["mass", "masses", "particle_mass", "mp_mass", "m"];

@@ -14,8 +14,8 @@ use serde::Serialize;
 use crate::dimension::in_dimension;
 use crate::order::Order;
 
+use super::data::FrameData;
 use super::findings::Remarks;
-use super::frame::FrameData;
 use super::points::{Taken, decide};
 use super::recording::{Opened, status};
 use super::times::{TIME_SLACK, open};

@@ -1,18 +1,16 @@
-//! Data of one frame for the comparison.
+//! Reads the frames of a recording.
 
 use std::collections::HashSet;
 
-use mmsmith_measure::norms::PerNorm;
-use mmsmith_measure::{RUNS, Row, over_particles};
-use mmsmith_runtime::{BLOCK, Domain, Solution, State, StateRun};
+use mmsmith_runtime::{Domain, Solution};
 use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector};
 
-use crate::across::Across;
-use crate::inverse::determinant;
 use crate::points;
 
+use super::across::TENSORS;
 use super::arrays::{Chosen, Role, matrices, vectors};
+use super::data::FrameData;
 use super::error::ScoreError;
 use super::findings::Remarks;
 use super::options::{Exchange, ScoreOptions};
@@ -31,6 +29,9 @@ const SAME_PLACE: f64 = 1e-9;
 /// One vector a particle.
 type Vectors<const D: usize> = Vec<SVector<f64, D>>;
 
+/// One tensor a particle, and the same in space where they are known across.
+type Tensors<const D: usize> = (Vec<SMatrix<f64, D, D>>, Option<Vec<Matrix3<f64>>>);
+
 /// The particles of the first frame, by which later frames are judged.
 #[derive(Default)]
 pub(super) struct Identities {
@@ -38,113 +39,6 @@ pub(super) struct Identities {
     ids: Option<HashSet<i64>>,
     /// Their coordinates across the solution's plane or line.
     across: Vec<f64>,
-}
-
-/// Data of one frame for the comparison.
-pub(super) struct FrameData<const D: usize> {
-    pub(super) ids: Option<Vec<i64>>,
-    pub(super) X: Vec<SVector<f64, D>>,
-    pub(super) u: Vec<SVector<f64, D>>,
-    /// With the time to which they belong.
-    pub(super) v: Option<(Vec<SVector<f64, D>>, f64)>,
-    /// F, P, Cauchy and Kirchhoff stress.
-    pub(super) tensors: [Option<Vec<SMatrix<f64, D, D>>>; 4],
-    /// J and density.
-    pub(super) scalars: [Option<Vec<f64>>; 2],
-}
-
-/// The error norms of a frame.
-pub(super) struct FrameErrors {
-    /// In the order of [`Quantity::ALL`]; zero for what the frame lacks.
-    pub(super) errors: [PerNorm<f64>; 8],
-    /// Errors of F and P if they were transposed.
-    pub(super) transposed: [PerNorm<f64>; 2],
-    /// The difference of the given density from that at rest.
-    pub(super) density_from_rest: PerNorm<f64>,
-    /// The norms of the exact displacement.
-    pub(super) displacement: PerNorm<f64>,
-}
-
-impl<const D: usize> FrameData<D> {
-    /// Which fields the frame has, in the order of [`Quantity::ALL`].
-    pub(super) fn fields(&self) -> [bool; 8] {
-        let [F, P, cauchy, kirchhoff] = self.tensors.each_ref().map(Option::is_some);
-        let [J, density] = self.scalars.each_ref().map(Option::is_some);
-        [true, self.v.is_some(), F, P, cauchy, kirchhoff, J, density]
-    }
-
-    /// The particles for which `kept` is true.
-    fn only(self, kept: &[bool]) -> Self {
-        fn some<T>(all: Vec<T>, kept: &[bool]) -> Vec<T> {
-            all.into_iter().zip(kept).filter(|(_, kept)| **kept).map(|(one, _)| one).collect()
-        }
-        Self {
-            ids: self.ids.map(|ids| some(ids, kept)),
-            X: some(self.X, kept),
-            u: some(self.u, kept),
-            v: self.v.map(|(v, time)| (some(v, kept), time)),
-            tensors: self.tensors.map(|tensor| tensor.map(|all| some(all, kept))),
-            scalars: self.scalars.map(|scalar| scalar.map(|all| some(all, kept))),
-        }
-    }
-
-    /// The error norms of the frame.
-    pub(super) fn errors(&self, exact: &dyn Solution<f64, D>, time: f64) -> FrameErrors {
-        let density = exact.density();
-        let law = Across::<D>::of(exact.law());
-        let across = |F: &SMatrix<f64, D, D>| {
-            let stretch = law.as_ref().map_or(Some(1.0), |law| law.stretch(F));
-            stretch.unwrap_or(f64::NAN).powi(3 - D as i32)
-        };
-        let of_particle = |p: usize, exact: &State<f64, D>| {
-            let v = self.v.as_ref().map_or(0.0, |(v, _)| (v[p] - exact.v).norm());
-            let J = determinant(&exact.F);
-            let kirchhoff = exact.P * exact.F.transpose();
-            let tensor = |n: usize, exact: SMatrix<f64, D, D>| {
-                self.tensors[n].as_ref().map_or(0.0, |given| (given[p] - exact).norm())
-            };
-            let scalar = |n: usize, exact: f64| {
-                self.scalars[n].as_ref().map_or(0.0, |given| (given[p] - exact).abs())
-            };
-            [
-                (self.u[p] - exact.u).norm(),
-                v,
-                tensor(0, exact.F),
-                tensor(1, exact.P),
-                tensor(2, kirchhoff / (J * across(&exact.F))),
-                tensor(3, kirchhoff),
-                scalar(0, J),
-                scalar(1, density / (J * across(&exact.F))),
-                tensor(0, exact.F.transpose()),
-                tensor(1, exact.P.transpose()),
-                scalar(1, density),
-                exact.u.norm(),
-            ]
-        };
-        let velocity_time = self.v.as_ref().map_or(time, |(_, time)| *time);
-        let room = || [StateRun::zero(); RUNS];
-        let magnitudes = |runs: &mut [_; RUNS], first: usize, magnitudes: &mut [[Row<f64>; 12]]| {
-            let runs = &mut runs[..magnitudes.len()];
-            let count = (runs.len() * BLOCK).min(self.X.len() - first);
-            // Other frames may have their particles in another order, or others: nothing is worth keeping.
-            let X = &self.X[first..first + count];
-            exact.state_at(X).evaluate(time, velocity_time, 0, runs);
-            for n in 0..count {
-                let own = of_particle(first + n, &runs[n / BLOCK].get(n % BLOCK));
-                for (row, magnitude) in magnitudes[n / BLOCK].iter_mut().zip(own) {
-                    row[n % BLOCK] = magnitude;
-                }
-            }
-        };
-        let [u, v, F, P, cauchy, kirchhoff, J, of_density, F_turned, P_turned, from_rest, size] =
-            over_particles(self.X.len(), room, magnitudes);
-        FrameErrors {
-            errors: [u, v, F, P, cauchy, kirchhoff, J, of_density],
-            transposed: [F_turned, P_turned],
-            density_from_rest: from_rest,
-            displacement: size,
-        }
-    }
 }
 
 /// Reads frame after frame.
@@ -156,8 +50,6 @@ pub(super) struct FrameReader<'a, const D: usize> {
     pub(super) options: &'a ScoreOptions,
     pub(super) has_velocity_times: bool,
     pub(super) velocity_lag: f64,
-    /// Whether a body that is stretched in a plane has a stress across it.
-    pub(super) has_lateral_stress: bool,
     pub(super) remarks: &'a mut Remarks,
     pub(super) first: Identities,
 }
@@ -179,14 +71,14 @@ impl<const D: usize> FrameReader<'_, D> {
         if let Some(exchange) = self.options.exchange {
             exchange_columns(exchange, &mut X, &mut u, v.as_mut().map(|(v, _)| v));
         }
+        let (mut tensors, mut whole) = ([const { None }; 4], [const { None }; 4]);
+        for (n, field) in TENSORS.into_iter().enumerate() {
+            (tensors[n], whole[n]) = self.tensor(field.role(), snapshot)?.unzip();
+        }
         let data = FrameData {
             v,
-            tensors: [
-                self.tensor(Role::DeformationGradient, snapshot)?,
-                self.tensor(Role::FirstPiolaKirchhoff, snapshot)?,
-                self.tensor(Role::Cauchy, snapshot)?,
-                self.tensor(Role::Kirchhoff, snapshot)?,
-            ],
+            tensors,
+            whole: whole.map(Option::flatten),
             scalars: [
                 self.scalar(Role::VolumeRatio, snapshot)?,
                 self.scalar(Role::Density, snapshot)?,
@@ -459,45 +351,26 @@ impl<const D: usize> FrameReader<'_, D> {
         Ok(Some(all))
     }
 
+    /// A tensor in the solution's directions, and in space where the array has components across.
     fn tensor(
         &mut self,
         role: Role,
         snapshot: &Snapshot,
-    ) -> Result<Option<Vec<SMatrix<f64, D, D>>>, ScoreError> {
+    ) -> Result<Option<Tensors<D>>, ScoreError> {
         let Some((flat, components)) = self.array(role, snapshot)? else { return Ok(None) };
         count_not_finite(&flat, components, role.name(), snapshot, self.remarks);
-        self.tell_no_zz(role, &flat, components);
-        let dimensions = if [6, 9].contains(&components) { 3 } else { D };
-        let mut all = matrices(&flat, components, self.place.axes_of(dimensions));
+        let is_of_space = [6, 9].contains(&components);
+        let axes = self.place.axes_of(if is_of_space { 3 } else { D });
+        let mut all = matrices(&flat, components, axes);
+        let others = (0..3).filter(|axis| !axes.contains(axis));
+        let order: Vec<usize> = axes.into_iter().chain(others).collect();
+        let mut whole = (is_of_space && D < 3)
+            .then(|| matrices::<3>(&flat, components, std::array::from_fn(|i| order[i])));
         if role == Role::DeformationGradient && self.chosen.is_less_one {
             all.iter_mut().for_each(|F| *F += SMatrix::identity());
+            whole.iter_mut().flatten().for_each(|F| *F += Matrix3::identity());
         }
-        Ok(Some(all))
-    }
-
-    /// Tells of stresses across the plane that are zero, which are not in plane strain.
-    fn tell_no_zz(&mut self, role: Role, flat: &[f64], components: usize) {
-        let zz = match components {
-            9 => 8,
-            6 => 2,
-            _ => return,
-        };
-        let is_stress = ![Role::DeformationGradient, Role::DisplacementGradient].contains(&role);
-        let is_first_plane = D == 2 && self.options.placing.axes.iter().all(|axis| *axis < 2);
-        let rows = || flat.chunks_exact(components);
-        let is_stressed = |row: &[f64]| row[0] != 0.0 && row[zz] == 0.0;
-        if is_stress
-            && is_first_plane
-            && rows().all(|row| row[zz] == 0.0)
-            && rows().any(is_stressed)
-            && self.has_lateral_stress
-        {
-            let what = format!(
-                "array `{}` has no zz component, which is not zero in plane strain: it is not compared; is plane stress computed?",
-                self.chosen.name(role).unwrap_or_default()
-            );
-            self.remarks.note("no-zz", false, what);
-        }
+        Ok(Some((all, whole)))
     }
 
     fn scalar(&mut self, role: Role, snapshot: &Snapshot) -> Result<Option<Vec<f64>>, ScoreError> {

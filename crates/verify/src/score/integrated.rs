@@ -8,8 +8,8 @@ use mmsmith_vtk::foreign::Snapshot;
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
+use super::data::FrameData;
 use super::elements::Element;
-use super::frame::FrameData;
 use crate::order::Order;
 
 /// Exact values that are asked for in one recording; beyond, as many frames are left out.

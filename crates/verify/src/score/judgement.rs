@@ -17,6 +17,12 @@ const LEAST_ORDER: f64 = 0.5;
 const FALLING: f64 = 0.3;
 /// From this order on a falling one still shows convergence.
 const FALLEN: f64 = 1.5;
+/// An order below it is none.
+const NO_ORDER: f64 = 0.25;
+/// By how many times the largest error exceeds one that fell with the L2 error before it is told that it does not fall.
+const ABOVE: f64 = 1.9;
+/// As many particles with the largest error, and no error elsewhere, are few: a boundary has more.
+const FEW: f64 = 4.0;
 
 /// Whether errors vanish with the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -47,6 +53,29 @@ pub struct Judgement {
     pub not_converging: Vec<Quantity>,
     /// Verdict on each norm of each recorded field.
     pub fields: BTreeMap<Quantity, PerNorm<Verdict>>,
+    /// The fields whose L2 error falls, and whose largest error does not.
+    #[serde(skip)]
+    pub(super) stuck: Vec<Stuck>,
+}
+
+/// A field whose L2 error falls, and whose largest error does not.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Stuck {
+    pub(super) field: Quantity,
+    /// The order of the largest error on the finest pair of grids.
+    pub(super) order: f64,
+    /// Whether it is of a few particles alone.
+    pub(super) is_of_few: bool,
+    /// The recording on the finest grid.
+    pub(super) row: usize,
+}
+
+/// A field, or a part of one, whose L2 error does not fall.
+struct Flat {
+    field: Quantity,
+    /// The part across the solution's plane or line, in words.
+    part: Option<&'static str>,
+    order: f64,
 }
 
 /// Convergence that the L2 errors of a field show.
@@ -67,25 +96,69 @@ impl Judgement {
             .map(|field| (field, series.verdicts(field, options)))
             .collect();
         let shown = |field: &Quantity| series.shown(*field, &fields[field].l2);
-        let flat: Vec<(Quantity, f64)> = fields
+        let mut flat: Vec<Flat> = fields
             .keys()
             .filter_map(|field| match shown(field) {
-                Shown::None(order) => Some((*field, order)),
+                Shown::None(order) => Some(Flat { field: *field, part: None, order }),
                 _ => None,
             })
             .collect();
+        let is_of_fields_alone = flat.len();
+        flat.extend(series.across(options));
         let of_u = shown(&Quantity::Displacement);
-        let (kind, message) = told(rows, &of_u, &flat, series.between(options));
+        let between = series.between(options);
+        let is_explained = flat.len() == is_of_fields_alone && between.is_none();
+        let (kind, message) = told(rows, &of_u, &flat, between);
+        let mut not_converging: Vec<_> = flat.iter().map(|flat| flat.field).collect();
+        not_converging.dedup();
+        let stuck = fields.iter().filter_map(|(field, verdicts)| series.stuck(*field, verdicts));
+        let stuck: Vec<Stuck> = stuck.collect();
         let mut judged = Self {
             kind,
             passed: None,
             order: fields[&Quantity::Displacement].l2.finest,
             message,
-            not_converging: flat.into_iter().map(|(field, _)| field).collect(),
+            not_converging,
             fields,
+            stuck,
         };
-        judged.settle(rows, options);
+        judged.tell_stuck();
+        judged.settle(rows, options, is_explained);
         judged
+    }
+
+    /// Takes into account that largest errors do not fall: of u that is no convergence, of few particles of another field nothing can be
+    /// told, and more particles are those of a boundary.
+    fn tell_stuck(&mut self) {
+        if self.kind != Convergence::Converges {
+            return;
+        }
+        let order = |field: &Quantity| self.fields[field].l2.finest.unwrap_or(f64::NAN);
+        let of_u = self.stuck.iter().find(|stuck| stuck.field == Quantity::Displacement);
+        if let Some(Stuck { order: largest, .. }) = of_u {
+            self.kind = Convergence::DoesNotConverge;
+            self.message = format!(
+                "u converges in the mean with order {:.2} (L2, finest pair), but its largest error does not fall: it has order {largest:.2}",
+                order(&Quantity::Displacement)
+            );
+            return;
+        }
+        let told = |stuck: &Stuck| {
+            format!(
+                "the largest error of {} does not fall, with order {:.2}",
+                stuck.field, stuck.order
+            )
+        };
+        if let Some(few) = self.stuck.iter().find(|stuck| stuck.is_of_few) {
+            self.kind = Convergence::CannotTell;
+            self.message = format!(
+                "cannot tell: u converges with order {:.2} (L2, finest pair), but {}, at few particles",
+                order(&Quantity::Displacement),
+                told(few)
+            );
+        } else if let Some(more) = self.stuck.first() {
+            self.message += &format!("; {}, as at a boundary", told(more));
+        }
     }
 
     /// Cannot tell, for a reason that the errors do not show.
@@ -98,10 +171,16 @@ impl Judgement {
     }
 
     /// Whether what is wanted holds.
-    fn settle(&mut self, rows: &[ScoreRow], options: &ScoreOptions) {
+    fn settle(&mut self, rows: &[ScoreRow], options: &ScoreOptions, is_explained: bool) {
         let missed = self.missed(options);
         self.passed = if !options.expected.is_empty() {
-            Some(missed.is_empty())
+            // What is asked for comes on top of what every recording has to do.
+            match self.kind {
+                _ if !missed.is_empty() => Some(false),
+                Convergence::DoesNotConverge => Some(is_explained && self.is_expected(options)),
+                Convergence::CannotTell if self.stuck.iter().any(|stuck| stuck.is_of_few) => None,
+                Convergence::Converges | Convergence::CannotTell => Some(true),
+            }
         } else {
             match self.kind {
                 Convergence::Converges => Some(true),
@@ -116,6 +195,18 @@ impl Judgement {
             self.passed = Some(false);
             self.message += "; a recording has a PROBLEM";
         }
+    }
+
+    /// Whether orders are stated for all that does not converge: somebody knows of it.
+    fn is_expected(&self, options: &ScoreOptions) -> bool {
+        let is_stated = |field: &Quantity, norm: Norm| {
+            options.expected.get(field).is_some_and(|norms| norms[norm].is_some())
+        };
+        let of_largest = match self.not_converging.is_empty() {
+            true => self.stuck.iter().all(|stuck| is_stated(&stuck.field, Norm::Linf)),
+            false => true,
+        };
+        self.not_converging.iter().all(|field| is_stated(field, Norm::L2)) && of_largest
     }
 
     /// The expectations that are not met, in words.
@@ -146,11 +237,14 @@ impl Judgement {
 fn told(
     rows: &[ScoreRow],
     of_u: &Shown,
-    flat: &[(Quantity, f64)],
+    flat: &[Flat],
     between: Option<String>,
 ) -> (Convergence, String) {
-    let list = |fields: &[(Quantity, f64)]| {
-        let each = fields.iter().map(|(field, order)| format!("{field} has order {order:.2}"));
+    let list = |fields: &[Flat]| {
+        let each = fields.iter().map(|Flat { field, part, order }| match part {
+            Some(part) => format!("{field} {part} has order {order:.2}"),
+            None => format!("{field} has order {order:.2}"),
+        });
         each.collect::<Vec<_>>().join(", ")
     };
     match of_u {
@@ -169,7 +263,7 @@ fn told(
             Convergence::Converges,
             format!("converges with order {order:.2} (u, L2, finest pair)"),
         ),
-        Shown::Order(order) if flat.iter().all(|(field, _)| is_stress(*field)) => (
+        Shown::Order(order) if flat.iter().all(|flat| is_stress(flat.field)) => (
             Convergence::DoesNotConverge,
             format!(
                 "u converges with order {order:.2}, and the motion with it; what is wrong is the stress that is written: {} (L2, \
@@ -235,6 +329,51 @@ impl Series<'_> {
             let errors = self.errors(field, norm);
             Verdict::above(&self.steps(), &errors, &floors, expected, options.tolerance)
         })
+    }
+
+    /// The parts of tensors across the solution's plane or line whose errors do not fall.
+    fn across(&self, options: &ScoreOptions) -> Vec<Flat> {
+        let mut flat = vec![];
+        for field in super::across::TENSORS {
+            let Some(row) = self.rows.iter().find(|row| row.across.contains_key(&field)) else {
+                continue;
+            };
+            let floor = |row: &ScoreRow| row.floors.get(&field).copied().unwrap_or(0.0);
+            let floors: Vec<f64> = self.rows.iter().map(floor).collect();
+            let error = |row: &ScoreRow| {
+                row.is_whole().then_some(row.across.get(&field).map_or(f64::NAN, |norms| norms.l2))
+            };
+            let errors: Vec<_> = self.rows.iter().map(error).collect();
+            let verdict = Verdict::above(&self.steps(), &errors, &floors, None, options.tolerance);
+            let order = verdict.finest.filter(|order| *order < LEAST_ORDER);
+            flat.extend(order.map(|order| Flat { field, part: Some(row.direction), order }));
+        }
+        flat
+    }
+
+    /// The field, if its L2 error falls and its largest error does not, and is far above one that did.
+    fn stuck(&self, field: Quantity, verdicts: &PerNorm<Verdict>) -> Option<Stuck> {
+        let Shown::Order(of_mean) = self.shown(field, &verdicts.l2) else { return None };
+        let order = verdicts.linf.finest.filter(|order| *order < NO_ORDER)?;
+        let errors = self.errors(field, Norm::Linf);
+        let is_above = |row: &usize| !verdicts.linf.rounding_rows.contains(row);
+        let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_above).collect();
+        rows.sort_by(|one, other| self.rows[*one].h.total_cmp(&self.rows[*other].h));
+        let (finest, coarsest) = (*rows.first()?, *rows.last()?);
+        let ratio = self.rows[finest].h / self.rows[coarsest].h;
+        let fallen = errors[coarsest]? * ratio.powf(of_mean);
+        // Two pairs where there are three grids.
+        let before = rows.get(1).zip(rows.get(2)).and_then(|(fine, coarse)| {
+            let steps = (self.rows[*coarse].h / self.rows[*fine].h).ln();
+            Some((errors[*coarse]? / errors[*fine]?).ln() / steps)
+        });
+        if errors[finest]? < ABOVE * fallen || before.is_some_and(|before| before >= NO_ORDER) {
+            return None;
+        }
+        let row = &self.rows[finest];
+        let norms = row.errors.get(&field)?;
+        let particles = row.particles as f64 * (norms.l2 / norms.linf).powi(2);
+        Some(Stuck { field, order, is_of_few: particles <= FEW, row: finest })
     }
 
     /// Which of the errors integrated over the elements of meshes do not fall, in words.

@@ -3,7 +3,7 @@
 use mmsmith_runtime::Solution;
 use serde::Serialize;
 
-use super::frame::FrameData;
+use super::data::FrameData;
 
 /// Particles of a frame that are looked at.
 const LOOKED_AT: usize = 4096;

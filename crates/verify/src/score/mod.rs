@@ -4,9 +4,11 @@
 //! `u(X, t)`; `v`, `F`, `P`, other stresses, `J` and density where the files hold them. L_inf, L2 and L1 are taken over the particles of a frame, then
 //! their maxima over the frames. For frames that `run` wrote at every step they are its errors to the bit.
 
+mod across;
 mod against;
 mod arrays;
 mod balance;
+mod data;
 mod differences;
 mod elements;
 mod error;
@@ -16,6 +18,7 @@ mod frame;
 mod integrated;
 mod judgement;
 mod lag;
+mod largest;
 mod law;
 mod motion;
 mod options;
@@ -66,6 +69,8 @@ pub struct Score {
     pub rows: Vec<ScoreRow>,
     /// The orders with respect to `h`, where there are several rows.
     pub orders: Option<BTreeMap<Quantity, PerNorm<Order>>>,
+    /// The orders in L2 of the errors across the solution's plane or line, where there are several rows with them.
+    pub across_orders: Option<BTreeMap<Quantity, Order>>,
     /// The orders of errors integrated over the elements of meshes.
     pub integrated_orders: Option<IntegratedOrders>,
     /// Whether they converge.
@@ -86,28 +91,89 @@ pub fn score(
         let (what, value) = ("periods", options.periods);
         return Err(ScoreError::Setting { what, value, admissible: "a positive number" });
     }
-    if let Some(score) = score_of_half_plane(exact, inputs, options) {
-        return Ok(score);
+    let of_half_plane = score_of_half_plane(exact, inputs, options);
+    if let Some(Ok(score)) = &of_half_plane
+        && is_of_plane(score)
+    {
+        return Ok(score.clone());
     }
-    in_dimension!(exact, |exact| score_in(exact, inputs, options), else Err(ScoreError::Dimension))
+    let in_space = in_dimension!(exact, |exact| score_in(exact, inputs, options), else Err(ScoreError::Dimension));
+    // What a file in neither form has is told as of the half plane.
+    match (in_space, of_half_plane) {
+        (Err(_), Some(of_half_plane)) => of_half_plane,
+        (in_space, _) => in_space,
+    }
 }
 
-/// The score of recordings of the half plane of a body of revolution, radius and height; `None` where they are of the body in space, and for
-/// other bodies.
+/// The score of recordings of the half plane of a body of revolution, radius and height, with the components of vectors and tensors in the
+/// order that fits them: the direction around the axis last, or second, as this program writes fields. `None` for other bodies.
 fn score_of_half_plane(
     exact: &AnySolution<f64>,
     inputs: &[Input],
     options: &ScoreOptions,
-) -> Option<Score> {
+) -> Option<Result<Score, ScoreError>> {
     let AnySolution::Three(space) = exact else { return None };
     let plane = HalfPlane::new(space.as_ref())?;
     if needs_space(exact).is_some() {
         return None;
     }
-    let score = score_in(&plane, inputs, options).ok()?;
+    let asked = &options.placing.axes;
+    let orders = if asked.is_empty() { vec![vec![], vec![0, 2]] } else { vec![asked.clone()] };
+    let mut best: Option<Result<Score, ScoreError>> = None;
+    for axes in orders {
+        let names = if axes == [0, 2] { "R, theta, Z" } else { "R, Z, theta" };
+        let placing = Placing { axes, ..options.placing.clone() };
+        let mut found = score_in(&plane, inputs, &ScoreOptions { placing, ..options.clone() });
+        if let Ok(score) = &mut found {
+            tell_order(score, names);
+        }
+        best = match (best, found) {
+            (Some(Ok(one)), Ok(other)) => {
+                let is_better = match [&one, &other].map(is_of_plane) {
+                    [true, true] => is_closer(&other, &one),
+                    [is_one, is_other] => is_other && !is_one,
+                };
+                Some(Ok(if is_better { other } else { one }))
+            }
+            (Some(Ok(one)), Err(_)) => Some(Ok(one)),
+            (Some(Err(_)), Ok(other)) => Some(Ok(other)),
+            (Some(Err(one)), Err(_)) => Some(Err(one)),
+            (None, found) => Some(found),
+        };
+    }
+    best
+}
+
+/// Whether recordings are of a half plane: nothing lies or moves out of it.
+fn is_of_plane(score: &Score) -> bool {
     let mut findings = score.rows.iter().flat_map(|row| &row.findings);
-    let is_in_space = findings.any(|finding| ["out-of-plane", "sheets"].contains(&finding.kind));
-    (!is_in_space).then_some(score)
+    !findings.any(|finding| ["out-of-plane", "sheets"].contains(&finding.kind))
+}
+
+/// Says in which order components of tensors are taken, where there are three directions.
+fn tell_order(score: &mut Score, names: &str) {
+    for row in score.rows.iter_mut().filter(|row| !row.across.is_empty()) {
+        let message = format!("components of tensors are taken in the order {names}");
+        let remark =
+            Remark { kind: "component-order", is_problem: false, count: 1, frames: 0, message };
+        row.findings.push(remark);
+    }
+}
+
+/// Whether the errors that two readings of the same recordings have in common are smaller in the first, as a product of all of them.
+fn is_closer(one: &Score, other: &Score) -> bool {
+    let mut ratio = 0.0;
+    for (one, other) in one.rows.iter().zip(&other.rows) {
+        let pairs = [(&one.errors, &other.errors), (&one.across, &other.across)];
+        for (field, error) in pairs.iter().flat_map(|(one, other)| {
+            one.iter().filter_map(|(field, norms)| Some((norms.l2, other.get(field)?.l2)))
+        }) {
+            if field > 0.0 && error > 0.0 {
+                ratio += (field / error).ln();
+            }
+        }
+    }
+    ratio < -1e-9
 }
 
 fn score_in<const D: usize>(
@@ -133,6 +199,7 @@ where
             verdict.doubt("it depends on whether points are reference or current positions; --points tells it");
         }
     }
+    largest::tell(exact, inputs, &decision.taken, options, &mut rows, &mut verdict)?;
     conclude(&mut rows, &verdict);
     let of_v = verdict.fields.get(&Quantity::Velocity).and_then(|norms| norms.l2.finest);
     if let Some(message) = staggered::told(&rows, of_v) {
@@ -142,7 +209,8 @@ where
     }
     let of_meshes = rows.iter().map(|row| (row.h, row.integrated.filter(|_| row.is_whole())));
     let integrated_orders = IntegratedOrders::of(&of_meshes.collect::<Vec<_>>());
-    Ok(Score { rows, orders, integrated_orders, verdict })
+    let across_orders = across_orders(&rows);
+    Ok(Score { rows, orders, across_orders, integrated_orders, verdict })
 }
 
 /// Says of each field that is another one whether the motion has it too.
@@ -163,6 +231,18 @@ fn conclude(rows: &mut [ScoreRow], verdict: &Judgement) {
             finding.message += &format!("; {of_motion}");
         }
     }
+}
+
+/// The orders in L2 of errors across the solution's plane or line, of the fields that any row has.
+fn across_orders(rows: &[ScoreRow]) -> Option<BTreeMap<Quantity, Order>> {
+    let fields: BTreeSet<_> = rows.iter().flat_map(|row| row.across.keys()).collect();
+    let steps: Vec<f64> = rows.iter().map(|row| row.h).collect();
+    let order = |field: &Quantity| {
+        let error = |row: &ScoreRow| Some(row.across.get(field).filter(|_| row.is_whole())?.l2);
+        (*field, Order::of(&steps, &rows.iter().map(error).collect::<Vec<_>>()))
+    };
+    let is_series = rows.len() > 1 && !fields.is_empty();
+    is_series.then(|| fields.into_iter().map(order).collect())
 }
 
 /// The errors of a recording, by quantity and norm.

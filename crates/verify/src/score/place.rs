@@ -13,11 +13,13 @@ pub(super) struct Place<const D: usize> {
     pub(super) axes: [usize; D],
     pub(super) length: f64,
     pub(super) velocity: f64,
+    /// Whether points of fewer components have the first ones along the solution's axes: radius and height of a half plane.
+    is_of_half_plane: bool,
 }
 
 impl<const D: usize> Place<D> {
     /// Checks that there is a number for each axis, and that units are units.
-    pub(super) fn new(placing: &Placing) -> Result<Self, ScoreError> {
+    pub(super) fn new(placing: &Placing, is_of_half_plane: bool) -> Result<Self, ScoreError> {
         let Placing { origin, axes, length_unit, time_unit, velocity_unit, .. } = placing;
         for (what, found) in [("--origin", origin.len()), ("--axes", axes.len())] {
             if found != 0 && found != D {
@@ -40,6 +42,7 @@ impl<const D: usize> Place<D> {
             axes: std::array::from_fn(|i| axes.get(i).copied().unwrap_or(i)),
             length: *length_unit,
             velocity,
+            is_of_half_plane,
         })
     }
 
@@ -50,6 +53,11 @@ impl<const D: usize> Place<D> {
         } else {
             std::array::from_fn(|i| i)
         }
+    }
+
+    /// The axes of points that have so many components.
+    pub(super) fn axes_of_points(&self, components: usize) -> [usize; D] {
+        if self.is_of_half_plane { self.axes_of(components) } else { self.axes }
     }
 
     /// A position of the solution.

@@ -207,7 +207,7 @@ fn evidence<const D: usize>(
     if let Some(is_at_rest) = points_are_at_rest(&found.timed, &found.first, name)? {
         return Ok(if is_at_rest { Evidence::AtRest } else { Evidence::Moving });
     }
-    let place = Place::new(&options.placing)?;
+    let place = Place::new(&options.placing, exact.is_half_plane())?;
     let [first, .., last] = &found.timed[..] else {
         return measured(exact, &found, &found.first, name, found.timed[0].time, &place)
             .map(Evidence::Measured);

@@ -10,12 +10,14 @@ use mmsmith_vtk::Provenance;
 use mmsmith_vtk::foreign::ArrayHead;
 use nalgebra::SVector;
 
+use super::across::{self, Directions};
 use super::arrays::{Chosen, DIGITS_OF_A_DOUBLE, Role};
 use super::balance::Balance;
+use super::data::FrameErrors;
 use super::error::ScoreError;
 use super::findings::{Remark, Remarks};
 use super::found::Found;
-use super::frame::{FrameErrors, FrameReader, Identities};
+use super::frame::{FrameReader, Identities};
 use super::integrated::{Integrated, Mesh};
 use super::lag::LagSums;
 use super::law::{self, Witnesses};
@@ -48,7 +50,7 @@ impl<const D: usize> Opened<D> {
         remarks: &mut Remarks,
     ) -> Result<Self, ScoreError> {
         let found = Found::new(exact, input, options, remarks)?;
-        let place = Place::new(&options.placing)?;
+        let place = Place::new(&options.placing, exact.is_half_plane())?;
         let inside = options.placing.inside;
         let scheme = scheme(exact, &found, taken.at_rest, &place, inside, remarks)?;
         if let Some(Remark { kind, is_problem, message, .. }) = &taken.told {
@@ -74,7 +76,6 @@ impl<const D: usize> Opened<D> {
             options,
             has_velocity_times: self.has_velocity_times,
             velocity_lag: self.velocity_lag,
-            has_lateral_stress: law::has_lateral_stress(exact.law()),
             remarks,
             first: Identities::default(),
         }
@@ -159,6 +160,10 @@ struct Totals {
     errors: [PerNorm<f64>; 8],
     /// Errors of F and P if they were transposed.
     transposed: [PerNorm<f64>; 2],
+    /// Errors and sizes across the solution's plane or line.
+    across: across::Found,
+    /// The frame with the largest error of each field.
+    worst: [(usize, f64); 8],
     density_from_rest: PerNorm<f64>,
     displacement: PerNorm<f64>,
     scales: Scales,
@@ -177,11 +182,14 @@ impl Totals {
     /// Reads and compares frame after frame.
     fn of<const D: usize>(
         opened: &Opened<D>,
-        exact: &dyn Solution<f64, D>,
+        (exact, directions): (&dyn Solution<f64, D>, &Directions<D>),
         resolution: Resolution,
         reader: &mut FrameReader<'_, D>,
         witnesses: &mut Witnesses<D>,
-    ) -> Result<Self, ScoreError> {
+    ) -> Result<Self, ScoreError>
+    where
+        f64: Precision<D>,
+    {
         let mut totals = Self { h: f64::NAN, ..Self::default() };
         let mut mesh = None;
         for (index, frame) in opened.found.timed.iter().enumerate() {
@@ -201,7 +209,13 @@ impl Totals {
                 *count += usize::from(is_there);
             }
             totals.scales.add(exact, &data.X, frame.time);
-            totals.add(&data.errors(exact, frame.time));
+            let errors = data.errors(exact, directions, frame.time);
+            totals.add(&errors, index);
+            if D < 3 {
+                let sizes = directions.sizes(exact, &data.X, frame.time);
+                let is_less_one = opened.found.chosen.is_less_one;
+                totals.across.add::<D>(&data.whole, &errors.across, sizes, is_less_one);
+            }
             witnesses.add(&data, frame.time);
             totals.lag.add(exact, &data);
             totals.balance.add(exact, &data);
@@ -216,7 +230,12 @@ impl Totals {
         Ok(totals)
     }
 
-    fn add(&mut self, frame: &FrameErrors) {
+    fn add(&mut self, frame: &FrameErrors, index: usize) {
+        for (worst, errors) in self.worst.iter_mut().zip(&frame.errors) {
+            if errors.linf > worst.1 {
+                *worst = (index, errors.linf);
+            }
+        }
         self.errors = array::from_fn(|n| self.errors[n].larger(&frame.errors[n]));
         self.transposed = array::from_fn(|n| self.transposed[n].larger(&frame.transposed[n]));
         self.density_from_rest = self.density_from_rest.larger(&frame.density_from_rest);
@@ -339,7 +358,10 @@ where
     let opened = Opened::new(exact, input, options, taken, &mut remarks)?;
     let mut reader = opened.reader(exact, options, &mut remarks);
     let mut witnesses = Witnesses::new(opened.found.timed.len());
-    let totals = Totals::of(&opened, exact, input.resolution, &mut reader, &mut witnesses)?;
+    let directions = Directions::new(exact);
+    let compared = (exact, &directions);
+    let totals = Totals::of(&opened, compared, input.resolution, &mut reader, &mut witnesses)?;
+    let across = totals.across.told(&directions, &opened.found.chosen, &mut remarks);
     totals.tell_missing(&opened.found.chosen, opened.found.timed.len(), &mut remarks);
     totals.tell_transposed(&mut remarks);
     opened.tell_provenance(options, &mut remarks);
@@ -380,6 +402,9 @@ where
         fields: totals.fields(),
         status: status(&findings),
         errors: totals.errors(),
+        across,
+        direction: directions.words(),
+        worst_frames: Quantity::ALL.into_iter().zip(totals.worst.map(|worst| worst.0)).collect(),
         exact_displacement: totals.displacement.l2,
         integrated: totals.integrated,
         law,

@@ -69,6 +69,16 @@ pub struct ScoreRow {
     /// The errors of u, v, F and P, and of other fields that are there; not a number for those that are not, and where a
     /// number of the files is none.
     pub errors: BTreeMap<Quantity, PerNorm<f64>>,
+    /// The errors of tensors of six or nine components in [`direction`](Self::direction), which those of `errors` leave out; in the units
+    /// of the fields.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub across: BTreeMap<Quantity, PerNorm<f64>>,
+    /// The direction of `across` in words, "around the axis" say.
+    #[serde(skip)]
+    pub direction: &'static str,
+    /// The frame with the largest error of each field, numbered from 0.
+    #[serde(skip)]
+    pub worst_frames: BTreeMap<Quantity, usize>,
     /// The exact displacement, as the root of its mean square, the largest over the frames; a length.
     pub exact_displacement: f64,
     /// Errors of u and its gradient integrated over the elements of a mesh, the largest over the frames.

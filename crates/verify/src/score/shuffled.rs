@@ -5,9 +5,9 @@ use mmsmith_vtk::foreign::{ArrayHead, Snapshot};
 use nalgebra::SVector;
 use std::collections::BTreeSet;
 
+use super::data::FrameData;
 use super::error::ScoreError;
 use super::found::Found;
-use super::frame::FrameData;
 use super::times::open;
 
 /// The largest share of the error that is left when both sets of positions are put in order.

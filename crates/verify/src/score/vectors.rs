@@ -26,7 +26,8 @@ pub(super) fn positions<const D: usize>(
 ) -> Result<Positions<D>, ScoreError> {
     let path = || snapshot.path().to_owned();
     let head = snapshot.points().ok_or_else(|| ScoreError::NoPositions { path: path() })?;
-    let least = place.axes.iter().max().map_or(D, |axis| axis + 1);
+    let axes = place.axes_of_points(head.components);
+    let least = axes.iter().max().map_or(D, |axis| axis + 1);
     if head.components < least || head.components > 3 {
         let found = head.components;
         return Err(ScoreError::Coordinates { path: path(), found, expected: least });
@@ -38,16 +39,16 @@ pub(super) fn positions<const D: usize>(
     }
     let flat = snapshot.positions()?;
     count_not_finite(&flat, head.components, "position", snapshot, remarks);
-    let (mut all, beyond) = vectors(&flat, head.components, place.axes);
+    let (mut all, beyond) = vectors(&flat, head.components, axes);
     all.iter_mut().for_each(|x| *x = place.position(*x));
-    let across = if beyond.is_some() { across(&flat, head.components, place) } else { vec![] };
+    let across = if beyond.is_some() { across(&flat, head.components, axes) } else { vec![] };
     Ok(Positions { all, across })
 }
 
 /// The coordinates that the solution does not have, in rising order.
-fn across<const D: usize>(flat: &[f64], components: usize, place: &Place<D>) -> Vec<f64> {
+fn across<const D: usize>(flat: &[f64], components: usize, axes: [usize; D]) -> Vec<f64> {
     let row = |row: &[f64]| {
-        let others = row.iter().enumerate().filter(|(axis, _)| !place.axes.contains(axis));
+        let others = row.iter().enumerate().filter(|(axis, _)| !axes.contains(axis));
         others.map(|(_, value)| *value).collect::<Vec<_>>()
     };
     let mut across: Vec<f64> = flat.chunks_exact(components).flat_map(row).collect();

@@ -111,6 +111,30 @@ fn split(name: &str) -> Option<(&str, Component)> {
     })
 }
 
+/// The columns of a body of revolution: the names of radius and height, and of the angle between them.
+const REVOLUTION: [(&str, &str, &str, &str); 2] =
+    [(REFERENCE, "R", "Z", "theta"), (POINTS, "r", "z", "theta")];
+
+/// As [`split`], of names among which there may be the columns of a body of revolution: `R, Z`, or `R, theta, Z` with components along these.
+fn split_among<'a>(name: &'a str, names: &[&str]) -> Option<(&'a str, Component)> {
+    for (base, radius, height, angle) in REVOLUTION {
+        let has = |name: &str| names.contains(&name);
+        if !(has(radius) && has(height)) {
+            continue;
+        }
+        let is_of_space = has(angle) && base == REFERENCE;
+        match name {
+            _ if name == radius => return Some((base, Component::Vector(0))),
+            _ if name == height => {
+                return Some((base, Component::Vector(1 + usize::from(is_of_space))));
+            }
+            _ if name == angle && is_of_space => return Some((base, Component::Vector(1))),
+            _ => (),
+        }
+    }
+    split(name)
+}
+
 /// A component in brackets, as in `displacement[0]` and `stress(xy)`.
 fn bracketed(name: &str) -> Option<(&str, &str)> {
     let (base, ending) = [('[', ']'), ('(', ')')]
@@ -241,15 +265,16 @@ pub(super) fn join(arrays: &[(&str, usize)]) -> (Vec<Joined>, Vec<Incomplete>) {
     let mut members: BTreeMap<&str, Vec<(Component, usize)>> = BTreeMap::new();
     let taken: Vec<_> =
         arrays.iter().filter(|(_, count)| *count > 1).map(|(name, _)| *name).collect();
+    let names: Vec<_> = arrays.iter().map(|(name, _)| *name).collect();
     for (index, (name, count)) in arrays.iter().enumerate() {
-        let parts = split(name).filter(|(base, _)| *count == 1 && !taken.contains(base));
+        let parts =
+            split_among(name, &names).filter(|(base, _)| *count == 1 && !taken.contains(base));
         let (base, component) = parts.unwrap_or((name, Component::Index(0)));
         if !members.contains_key(base) {
             order.push(base);
         }
         members.entry(base).or_default().push((component, index));
     }
-    let names: Vec<_> = arrays.iter().map(|(name, _)| *name).collect();
     join_shears(&mut members);
     join_uvw(&names, &mut members);
     let (mut joined, mut incomplete) = (vec![], vec![]);
@@ -264,7 +289,10 @@ pub(super) fn join(arrays: &[(&str, usize)]) -> (Vec<Joined>, Vec<Incomplete>) {
         }
         if let Some(columns) = whole(&components) {
             let source = |array| Source { array, component: 0 };
-            let components = columns.into_iter().map(|column| column.map(source)).collect();
+            // Of an axisymmetric body all angles are alike: at the angle zero components along R, theta and Z are those in space.
+            let is_angle = |column: &usize| base == REFERENCE && names[*column] == "theta";
+            let known = |column: Option<usize>| column.filter(|column| !is_angle(column));
+            let components = columns.into_iter().map(|column| known(column).map(source)).collect();
             joined.push(Joined { name: base.to_owned(), components });
             continue;
         }
@@ -318,6 +346,10 @@ mod tests {
             ("X Y u v", "X(0 1) u(2 3)"),
             ("X Y Z u v w", "X(0 1 2) u(3 4 5)"),
             ("X u v", "X(0) u(1) v(2)"),
+            ("R Z t u1 u2", "X(0 1) t(2) u(3 4)"),
+            ("R theta Z u1 u2 u3", "X(0 . 2) u(3 4 5)"),
+            ("z r ur uz", "Points(1 0) ur(2) uz(3)"),
+            ("R theta", "R(0) theta(1)"),
             ("F11 F12 F21 F22", "F(0 1 2 3)"),
             ("F_xx F_xy F_yx F_yy F_zz", "F(0 1 . 2 3 . . . 4)"),
             ("S11 S22 S12", "S(0 1 2)"),

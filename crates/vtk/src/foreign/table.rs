@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 
-use super::components::{Incomplete, Joined, Source, join};
+use super::components::{Incomplete, Joined, POINTS, REFERENCE, Source, join};
 use super::numbers::to_whole;
 
 /// The columns of a CSV file, and the rows of each time.
@@ -156,12 +156,29 @@ impl Filled {
         let (arrays, incomplete) = join(&heads);
         if let Some(Incomplete { name, members }) = incomplete.first() {
             return Err(format!(
-                "the {} column(s) {} are no complete vector or tensor `{name}`",
+                "the {} column(s) {} are no complete vector or tensor `{name}`{}",
                 members.len(),
-                members.join(", ")
+                members.join(", "),
+                columns_of(name)
             ));
         }
         Ok(Table { arrays, names, columns, digits, frames })
+    }
+}
+
+/// The columns that would be complete, in words.
+fn columns_of(name: &str) -> &'static str {
+    match name {
+        REFERENCE => {
+            ": write X, Y (and Z in space), or of a body of revolution R, Z or R, theta, Z"
+        }
+        POINTS => ": write x, y (and z in space), or of a body of revolution r, z",
+        "u" => ": write ux, uy or u1, u2, and uz or u3 in space and along R, theta, Z",
+        "v" => ": write vx, vy or v1, v2, and vz or v3 in space and along R, theta, Z",
+        "F" | "P" => {
+            ", whose columns are numbered 11, 12, 21, 22, or 11, 12, 13, 21 and so on to 33"
+        }
+        _ => "",
     }
 }
 
@@ -358,7 +375,6 @@ pub(super) fn is_csv(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::components::POINTS;
     use super::*;
 
     #[test]

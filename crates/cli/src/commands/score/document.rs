@@ -81,6 +81,7 @@ pub(super) fn results(score: &Score) -> Map<String, Value> {
     let orders = score.orders.as_ref().map(|orders| ("orders", json!(orders)));
     let integrated =
         score.integrated_orders.as_ref().map(|orders| ("integrated_orders", json!(orders)));
-    let all = all.into_iter().chain(orders).chain(integrated);
+    let across = score.across_orders.as_ref().map(|orders| ("across_orders", json!(orders)));
+    let all = all.into_iter().chain(orders).chain(across).chain(integrated);
     all.map(|(name, value)| (name.to_owned(), value)).collect()
 }

@@ -69,8 +69,38 @@ pub(super) fn of_score(selection: &Selection, score: &Score) -> Vec<Section> {
         |(field, table)| Section::Table(format!("error of {}", named(field, units)), table);
     let mut sections = vec![Section::Note(text)];
     sections.extend(tables.into_iter().map(titled));
+    sections.extend(across(score, units));
     sections.extend(integrated(score));
     sections.push(Section::LeftOut("A wider terminal and --json have them."));
+    sections
+}
+
+/// The errors of tensors across the solution's plane or line, where they are more than rounding: a table for each.
+fn across(score: &Score, units: Option<Units>) -> Vec<Section> {
+    let mut sections = vec![];
+    for (field, order) in score.across_orders.iter().flatten() {
+        let error = |row: &ScoreRow| row.across.get(field).map_or(f64::NAN, |norms| norms.l2);
+        let floor = |row: &ScoreRow| row.floors.get(field).copied().unwrap_or(0.0);
+        if !score.rows.iter().any(|row| error(row) > floor(row)) {
+            continue;
+        }
+        let mut table = Table::new(0, ["cells", "h", "l2", "rate"]);
+        for (index, row) in score.rows.iter().enumerate() {
+            let cells = row.cells.map_or_else(|| "-".into(), |cells| cells.to_string());
+            let local = index.checked_sub(1).and_then(|pair| order.local[pair]);
+            table.row(vec![
+                cells,
+                table::error(row.h),
+                table::error(error(row)),
+                table::rate(local),
+            ]);
+        }
+        let fit = ["fit in h".to_owned(), String::new(), String::new(), table::rate(order.fit)];
+        table.row(fit.to_vec());
+        let words = score.rows.first().map_or("", |row| row.direction);
+        let table = table.with_unit(&["h"], units.map(Units::length));
+        sections.push(Section::Table(format!("error of {}, {words}", named(*field, units)), table));
+    }
     sections
 }
 
@@ -135,6 +165,11 @@ fn errors(row: &ScoreRow, units: Option<Units>) -> String {
             cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
             table.row(cells);
         }
+    }
+    for (field, norms) in &row.across {
+        let mut cells = vec![format!("{} {}", named(*field, units), row.direction)];
+        cells.extend(norms.iter().map(|(_, value)| table::error(*value)));
+        table.row(cells);
     }
     table.text()
 }

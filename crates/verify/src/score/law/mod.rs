@@ -12,15 +12,15 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use mmsmith_runtime::{Law, Solution};
+use mmsmith_runtime::Solution;
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use self::hypotheses::{ALL, Hypothesis, Values};
 use self::judge::{Judged, judge};
 use self::moduli::{Known, Lame};
+use super::data::FrameData;
 use super::findings::Remarks;
-use super::frame::FrameData;
 use super::quantity::Quantity;
 use crate::precision::Precision;
 
@@ -72,11 +72,6 @@ pub enum LawVerdict {
     Unexplained,
 }
 
-/// Whether a body that is stretched in a plane has a stress across it.
-pub(super) fn has_lateral_stress(declared: Law<f64>) -> bool {
-    Known::<2>::new(declared).and_then(|known| known.lame).is_some_and(|lame| lame.lambda != 0.0)
-}
-
 /// Fields of a file at one particle.
 struct Place<const D: usize> {
     X: SVector<f64, D>,
@@ -86,6 +81,8 @@ struct Place<const D: usize> {
     stresses: [Option<SMatrix<f64, D, D>>; 3],
     /// J and density.
     scalars: [Option<f64>; 2],
+    /// The recorded stretch around the axis of a body of revolution in its half plane.
+    around: Option<f64>,
 }
 
 const STRESSES: [Quantity; 3] =
@@ -116,6 +113,7 @@ impl<const D: usize> Witnesses<D> {
                 F: F[p],
                 stresses: stresses.each_ref().map(|stress| Some(stress.as_ref()?[p])),
                 scalars: data.scalars.each_ref().map(|scalar| Some(scalar.as_ref()?[p])),
+                around: data.whole[0].as_ref().filter(|_| D == 2).map(|F| F[p][(2, 2)]),
             };
             if place.is_finite() {
                 self.places.push(place);
@@ -179,7 +177,7 @@ where
         }));
     }
     tell_agreement::<D>(&rows, remarks);
-    rows.extend(scalars::rows(exact.density(), places, rounding, remarks));
+    rows.extend(scalars::rows(exact, places, rounding, remarks));
     rows
 }
 

@@ -1,5 +1,6 @@
 //! Volume ratios and densities against the recorded deformation.
 
+use mmsmith_runtime::Solution;
 use nalgebra::SMatrix;
 
 use super::hypotheses::Hypothesis;
@@ -42,11 +43,12 @@ const DENSITIES: &[Number] = &[
 
 /// The comparisons of J and density, where they are recorded.
 pub(super) fn rows<const D: usize>(
-    density: f64,
+    exact: &dyn Solution<f64, D>,
     places: &[Place<D>],
     rounding: Rounding<'_>,
     remarks: &mut Remarks,
 ) -> Vec<LawRow> {
+    let (density, is_half_plane) = (exact.density(), exact.is_half_plane());
     let fields: [(_, _, Value, _); 2] = [
         (Quantity::VolumeRatio, "det F", |[J, ..]| J, VOLUME_RATIOS),
         (Quantity::Density, "rho0/det F", |[J, _, density]| density / J, DENSITIES),
@@ -56,7 +58,10 @@ pub(super) fn rows<const D: usize>(
         let recorded: Vec<_> = places
             .iter()
             .filter_map(|place| {
-                let [J, trace] = [determinant(&place.F), (place.F - SMatrix::identity()).trace()];
+                // Volumes of a half plane change with the stretch around the axis too, where it is recorded.
+                let around = if is_half_plane { place.around? } else { 1.0 };
+                let J = determinant(&place.F) * around;
+                let trace = (place.F - SMatrix::identity()).trace() + (around - 1.0);
                 Some((place.scalars[n]?, [J, trace, density]))
             })
             .filter(|(_, [J, ..])| *J > 0.0)

@@ -60,7 +60,15 @@ where
     let mut tensors = [Some(F), None, None, None];
     tensors[1 + field] = Some(stress);
     let u = X.iter().map(|X| exact.displacement(X, TIME)).collect();
-    let data = FrameData { ids: None, X: X.to_vec(), u, v: None, tensors, scalars };
+    let data = FrameData {
+        ids: None,
+        X: X.to_vec(),
+        u,
+        v: None,
+        tensors,
+        whole: Default::default(),
+        scalars,
+    };
     let mut witnesses = Witnesses::new(1);
     witnesses.add(&data, TIME);
     let mut remarks = Remarks::default();
