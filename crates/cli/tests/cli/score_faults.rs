@@ -241,7 +241,7 @@ fn one_wrong_particle_does_not_pass_and_expected_orders_are_no_laxer() {
     type Fault = fn(&mut Line, usize, usize);
     let spike: Fault = |line, number, _| of_first(line, number, "u1", 0.02);
     let late: Fault = |line, _, _| set(line, "v1", |v| 1.02 * v);
-    let cases: [(&str, Fault, i32, &str); 8] = [
+    let cases: [(&str, Fault, i32, &str); 9] = [
         ("", none, 0, "passed: converges with order 2.00"),
         ("", spike, 1, "but its largest error does not fall"),
         ("", spike, 1, "(particle 0 of"),
@@ -251,6 +251,16 @@ fn one_wrong_particle_does_not_pass_and_expected_orders_are_no_laxer() {
             |line, number, _| of_first(line, number, "P12", 2e3),
             0,
             "verdict: cannot tell: u converges with order 2.00 (L2, finest pair), but the largest error of P does not fall",
+        ),
+        // Where more is wrong, the verdict is of that.
+        (
+            "",
+            |line, number, _| {
+                of_first(line, number, "u1", 0.02);
+                set(line, "v1", |v| 1.02 * v);
+            },
+            1,
+            "v has order 0.08 (L2, finest pair)\n",
         ),
         // Of first order at a boundary.
         (

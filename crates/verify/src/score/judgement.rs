@@ -56,6 +56,9 @@ pub struct Judgement {
     /// The fields whose L2 error falls, and whose largest error does not.
     #[serde(skip)]
     pub(super) stuck: Vec<Stuck>,
+    /// Whether the message is of them.
+    #[serde(skip)]
+    pub(super) is_of_largest: bool,
 }
 
 /// A field whose L2 error falls, and whose largest error does not.
@@ -121,6 +124,7 @@ impl Judgement {
             not_converging,
             fields,
             stuck,
+            is_of_largest: false,
         };
         judged.tell_stuck();
         judged.settle(rows, options, is_explained);
@@ -133,6 +137,7 @@ impl Judgement {
         if self.kind != Convergence::Converges {
             return;
         }
+        self.is_of_largest = !self.stuck.is_empty();
         let order = |field: &Quantity| self.fields[field].l2.finest.unwrap_or(f64::NAN);
         let of_u = self.stuck.iter().find(|stuck| stuck.field == Quantity::Displacement);
         if let Some(Stuck { order: largest, .. }) = of_u {

@@ -39,7 +39,9 @@ where
             continue;
         };
         let message = format!("the largest error of {field} does not fall with the grid: {place}");
-        verdict.message += &format!("; {place}");
+        if verdict.is_of_largest {
+            verdict.message += &format!("; {place}");
+        }
         row.findings.push(Remark {
             kind: "largest-error",
             is_problem: false,
