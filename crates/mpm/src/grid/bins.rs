@@ -274,7 +274,7 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
     ) {
         let Self { held, layout, hooks, .. } = self;
         let row = layout.row();
-        let rows = (NODES_AT_ONCE / row).max(1) * row;
+        let rows = layout.rows_at_once() * row;
         each_chunk(nodes, NODES_AT_ONCE, &|_, nodes| (hooks.before)(nodes));
         let mut sums = TileSums::new(nodes, (layout.strides, layout.first_row * row), lattice);
         let fill = |tile: usize, buffer: &mut dyn FnMut() -> Vec<N>| {

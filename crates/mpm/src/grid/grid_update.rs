@@ -11,10 +11,10 @@ use bytemuck::{Pod, cast_slice, cast_slice_mut};
 use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
+use crate::grid::Layout;
 use crate::grid::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::grid::{Layout, NODES_AT_ONCE};
 use crate::scheme::{Transfer, VelocityUpdate};
 use mmsmith_threads::coloring::Shared;
 use mmsmith_threads::disjoint::Partition;
@@ -372,7 +372,7 @@ where
         for edge in here.filter(|edge| !edge.is_updated.load(Ordering::Relaxed)) {
             self.fold_edge(edge, nodes, rows.start);
             let (start, end) = (edge.rows.start - rows.start, edge.rows.end - rows.start);
-            let at_once = (NODES_AT_ONCE / row).max(1);
+            let at_once = self.layout.rows_at_once();
             each_chunk(&mut nodes[start * row..end * row], at_once * row, &|number, nodes| {
                 self.complete(nodes, edge.rows.start + number * at_once);
             });

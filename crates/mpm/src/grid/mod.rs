@@ -155,6 +155,11 @@ impl<const D: usize> Layout<D> {
         self.strides[D - 1]
     }
 
+    /// Rows that are updated together, one at least.
+    pub(crate) fn rows_at_once(&self) -> usize {
+        (NODES_AT_ONCE / self.row()).max(1)
+    }
+
     /// Rows of ghost nodes beyond walls across the last axis.
     pub(crate) fn ghost_rows(&self) -> usize {
         self.ghosts.iter().filter(|ghost| ghost.axis == D - 1).count()

@@ -45,15 +45,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let vectors = NodeVectors::of(transfer);
         let update =
             GridUpdate::new(layout, &c, VelocityAndAcceleration { scale: times.scale, vectors });
-        let p2g = P2g {
-            c: &c,
-            domain,
-            buffers,
-            is_affine: transfer.is_affine(),
-            reads_grid: false,
-            x,
-            F,
-        };
+        let p2g = P2g::new(&c, (domain, buffers), transfer.is_affine(), (x, F));
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -78,15 +70,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Velocity);
-        let p2g = P2g {
-            c: &c,
-            domain,
-            buffers,
-            is_affine: transfer.is_affine(),
-            reads_grid: false,
-            x,
-            F,
-        };
+        let p2g = P2g::new(&c, (domain, buffers), transfer.is_affine(), (x, F));
         p2g.to_grid(&update, (bins, two_stages(corners), None), nodes, &momenta(mass, v, affine));
     }
 
@@ -104,7 +88,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let forcing = Forcing::new(body_force, X, times.start, &c, of_time);
         let vectors = NodeVectors::of(transfer);
         let update = GridUpdate::new(layout, &c, Acceleration { scale: times.scale, vectors });
-        let p2g = P2g { c: &c, domain, buffers, is_affine: false, reads_grid: false, x, F };
+        let p2g = P2g::new(&c, (domain, buffers), false, (x, F));
         let loading = Some((body_force, forcing.time()));
         let set =
             |Buffers { contributions, .. }: &mut _, copies: &mut Copies<T, D>, ids: &[u32]| {
@@ -131,15 +115,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let Particles { x, v, F, mass, affine, .. } = &*particles;
         let c = *constants;
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g {
-            c: &c,
-            domain,
-            buffers,
-            is_affine: transfer.is_affine(),
-            reads_grid: false,
-            x,
-            F,
-        };
+        let p2g = P2g::new(&c, (domain, buffers), transfer.is_affine(), (x, F));
         p2g.to_grid(
             &update,
             (bins, two_stages(corners), None),
@@ -166,7 +142,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             None => (GridValues { nodes: from, at_corners: None }, None),
         };
         let update = GridUpdate::new(layout, &c, Reprojection);
-        let p2g = P2g { c: &c, domain, buffers, is_affine: false, reads_grid: true, x, F };
+        let p2g = P2g { reads_grid: true, ..P2g::new(&c, (domain, buffers), false, (x, F)) };
         let set = |buffers: &mut Buffers<T, D>, _: &mut Copies<T, D>, ids: &[u32]| {
             values.g2p(&c, buffers, ids);
             let Buffers { contributions, interpolated, .. } = buffers;
@@ -217,7 +193,17 @@ pub(crate) struct P2g<'a, T, const D: usize> {
     pub(crate) F: &'a [SMatrix<T, D, D>],
 }
 
-impl<T: Lanes, const D: usize> P2g<'_, T, D> {
+impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
+    /// P2G of particles with these positions and deformation gradients, whose contributions do not need the grid's values.
+    pub(crate) fn new(
+        c: &'a Constants<T, D>,
+        (domain, buffers): (&'a dyn Domain<T, D>, &'a BufferPool<T, D>),
+        is_affine: bool,
+        (x, F): (&'a [SVector<T, D>], &'a [SMatrix<T, D, D>]),
+    ) -> Self {
+        Self { c, domain, buffers, is_affine, reads_grid: false, x, F }
+    }
+
     /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: tile by tile, and by
     /// way of corners where particles share them, with the loads on these.
     pub(crate) fn to_grid<S: NodeUpdate<T, D>>(

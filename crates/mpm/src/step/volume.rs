@@ -86,7 +86,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let c = *constants;
         let sums = &*values;
         let update = GridUpdate::new(layout, &c, ScalarMean);
-        let p2g = P2g { c: &c, domain, buffers, is_affine: false, reads_grid: false, x, F };
+        let p2g = P2g::new(&c, (domain, buffers), false, (x, F));
         let set = |Buffers { contributions, .. }: &mut Buffers<T, D>,
                    _: &mut Copies<T, D>,
                    ids: &[u32]| {
