@@ -163,8 +163,31 @@ struct Progress<N> {
     filled: Vec<Option<Vec<N>>>,
     /// Tiles whose turn it is.
     ready: Vec<usize>,
-    /// Buffers that no tile uses at present.
-    free: Vec<Vec<N>>,
+}
+
+/// Buffers that no tile uses at present, which outlive a pass; all their elements are zero.
+#[derive(Debug)]
+pub struct TileBuffers<N>(Mutex<Vec<Vec<N>>>);
+
+impl<N> Default for TileBuffers<N> {
+    fn default() -> Self {
+        Self(Mutex::new(Vec::new()))
+    }
+}
+
+impl<N: Copy> TileBuffers<N> {
+    fn free(&self) -> MutexGuard<'_, Vec<Vec<N>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A buffer of `elements` elements or more.
+    fn take(&self, elements: usize, zero: N) -> Vec<N> {
+        let mut buffer = self.free().pop().unwrap_or_default();
+        if buffer.len() < elements {
+            buffer.resize(elements, zero);
+        }
+        buffer
+    }
 }
 
 /// A pass over the tiles of an array.
@@ -176,6 +199,7 @@ pub struct TileSums<'a, N, const D: usize> {
     strides: [usize; D],
     /// Elements of the whole array before the first here.
     before: usize,
+    buffers: &'a TileBuffers<N>,
     progress: Mutex<Progress<N>>,
     borrowed: PhantomData<&'a mut [N]>,
 }
@@ -184,11 +208,11 @@ pub struct TileSums<'a, N, const D: usize> {
 // exclusive slices, for which `Send` is the requirement.
 unsafe impl<N: Send, const D: usize> Sync for TileSums<'_, N, D> {}
 
-/// Fills the buffer of a tile here, the elements of its window, which come in zero; false where the tile has no sums.
-pub type FillTile<'a, N> = dyn Fn(usize, &mut dyn FnMut() -> Vec<N>) -> Option<Vec<N>> + Sync + 'a;
+/// Fills the buffer of a tile here, the elements of its window, which come in zero.
+pub type FillTile<'a, N> = dyn Fn(usize, &mut [N]) + Sync + 'a;
 
-/// Adds elements of a buffer to those of the array.
-pub type AddLine<'a, N> = dyn Fn(&mut [N], &[N]) + Sync + 'a;
+/// Adds elements of a buffer to those of the array, and leaves zeros in the buffer.
+pub type AddLine<'a, N> = dyn Fn(&mut [N], &mut [N]) + Sync + 'a;
 
 impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
     /// A pass over an array with these strides, of which `array` are the elements from element `before` on.
@@ -200,6 +224,7 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
         array: &'a mut [N],
         (strides, before): ([usize; D], usize),
         lattice: &'a TileLattice<D>,
+        buffers: &'a TileBuffers<N>,
     ) -> Self {
         // What the unsafe code relies on: lines lie in the array, and elements of distinct places along an axis are distinct.
         assert_eq!(strides[0], 1);
@@ -222,7 +247,6 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
             taken: vec![false; count],
             filled: (0..count).map(|_| None).collect(),
             ready: Vec::new(),
-            free: Vec::new(),
         };
         Self {
             lattice,
@@ -230,6 +254,7 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
             length: array.len(),
             strides,
             before,
+            buffers,
             progress: Mutex::new(progress),
             borrowed: PhantomData,
         }
@@ -245,9 +270,14 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Fills the buffers of all tiles, each zero at first, and adds those that wait for no other process.
-    pub fn fill_and_add(&mut self, zero: N, fill: &FillTile<'_, N>, add: &AddLine<'_, N>)
-    where
+    /// Fills the buffers of the tiles that have sums, and adds those that wait for no other process.
+    pub fn fill_and_add(
+        &mut self,
+        zero: N,
+        has_sums: &[bool],
+        fill: &FillTile<'_, N>,
+        add: &AddLine<'_, N>,
+    ) where
         N: Sync,
     {
         let own = &*self;
@@ -256,13 +286,12 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
             loop {
                 own.add_ready(add);
                 let Some(tile) = own.take(&mut next) else { break };
-                let mut buffer = || {
-                    let mut buffer = own.progress().free.pop().unwrap_or_default();
-                    buffer.clear();
-                    buffer.resize(own.lattice.elements(tile), zero);
+                let filled = has_sums[tile].then(|| {
+                    let elements = own.lattice.elements(tile);
+                    let mut buffer = own.buffers.take(elements, zero);
+                    fill(tile, &mut buffer[..elements]);
                     buffer
-                };
-                let filled = fill(tile, &mut buffer);
+                });
                 let mut progress = own.progress();
                 progress.filled[tile] = filled;
                 progress.count_down(tile);
@@ -306,22 +335,23 @@ impl<'a, N: Copy + Send, const D: usize> TileSums<'a, N, D> {
             let Some(tile) = progress.ready.pop() else { return };
             let filled = progress.filled[tile].take();
             drop(progress);
-            if let Some(buffer) = &filled {
-                self.add(tile, buffer, add);
+            if let Some(mut buffer) = filled {
+                self.add(tile, &mut buffer, add);
+                self.buffers.free().push(buffer);
             }
             let neighbours = self.lattice.neighbours(tile);
             let after: Vec<usize> =
                 neighbours.filter(|&other| self.lattice.precedes(tile, other)).collect();
             let mut progress = self.progress();
-            progress.free.extend(filled);
             after.into_iter().for_each(|other| progress.count_down(other));
         }
     }
 
     /// Adds the buffer of a tile to the array, line by line along axis 0.
-    fn add(&self, tile: usize, buffer: &[N], add: &AddLine<'_, N>) {
+    fn add(&self, tile: usize, buffer: &mut [N], add: &AddLine<'_, N>) {
         let window = self.lattice.window(tile);
-        for (line, values) in buffer.chunks_exact(window[0].len()).enumerate() {
+        let buffer = &mut buffer[..self.lattice.elements(tile)];
+        for (line, values) in buffer.chunks_exact_mut(window[0].len()).enumerate() {
             let (mut rest, mut place) = (line, window[0].start);
             for a in 1..D {
                 place += (window[a].start + rest % window[a].len()) * self.strides[a];
@@ -373,28 +403,36 @@ mod tests {
         let strides = [1, dims[0], dims[0] * dims[1]];
         let mut array = vec![7; dims.iter().product()];
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let fill = |tile: usize, buffer: &mut dyn FnMut() -> Vec<u64>| {
-            // Some tiles have no sums.
-            (tile % 5 != 3).then(|| {
-                let mut buffer = buffer();
-                assert!(buffer.iter().all(|&element| element == 0));
-                buffer.iter_mut().for_each(|element| *element = tile as u64 + 1);
-                buffer
-            })
+        let buffers = TileBuffers::default();
+        let has_sums: Vec<bool> = (0..lattice.count()).map(has_sums).collect();
+        let fill = |tile: usize, buffer: &mut [u64]| {
+            assert!(buffer.iter().all(|&element| element == 0));
+            buffer.fill(tile as u64 + 1);
         };
-        let add = |elements: &mut [u64], values: &[u64]| {
-            for (element, value) in elements.iter_mut().zip(values) {
-                *element = element.wrapping_mul(1_000_003).wrapping_add(*value);
-            }
-        };
-        pool.install(|| {
-            let mut sums = TileSums::new(&mut array, (strides, 0), lattice);
-            sums.fill_and_add(0, &fill, &add);
-            sums.add_rest(&add);
-            assert!(sums.progress().filled.iter().all(Option::is_none));
-            assert!(sums.progress().pending.iter().all(|&pending| pending == 0));
-        });
+        // Buffers are used a second time.
+        for before in [3, 7] {
+            array.fill(before);
+            pool.install(|| {
+                let mut sums = TileSums::new(&mut array, (strides, 0), lattice, &buffers);
+                sums.fill_and_add(0, &has_sums, &fill, &add);
+                sums.add_rest(&add);
+                assert!(sums.progress().filled.iter().all(Option::is_none));
+                assert!(sums.progress().pending.iter().all(|&pending| pending == 0));
+            });
+        }
         array
+    }
+
+    /// Some tiles have no sums.
+    fn has_sums(tile: usize) -> bool {
+        tile % 5 != 3
+    }
+
+    fn add(elements: &mut [u64], values: &mut [u64]) {
+        for (element, value) in elements.iter_mut().zip(values) {
+            *element = element.wrapping_mul(1_000_003).wrapping_add(*value);
+            *value = 0;
+        }
     }
 
     /// Sums by hand: tile after tile in the order of turns.
@@ -402,7 +440,7 @@ mod tests {
         let mut array = vec![7_u64; dims.iter().product()];
         let mut order: Vec<usize> = (0..lattice.count()).collect();
         order.sort_by_key(|&tile| lattice.turn(tile));
-        for tile in order.into_iter().filter(|tile| tile % 5 != 3) {
+        for tile in order.into_iter().filter(|&tile| has_sums(tile)) {
             let [x, y, z] = lattice.window(tile);
             for (z, y) in z.flat_map(|z| y.clone().map(move |y| (z, y))) {
                 for x in x.clone() {
@@ -459,27 +497,20 @@ mod tests {
             let parts = [part(0..cut), part(cut..5)];
             let shared = 4 * cut..4 * cut + 4;
             let first = usize::from(parts[1].held.shared().all(|shared| shared.is_first_here));
-            let add = |elements: &mut [u64], values: &[u64]| {
-                for (element, value) in elements.iter_mut().zip(values) {
-                    *element = element.wrapping_mul(1_000_003).wrapping_add(*value);
-                }
-            };
             let mut sums = vec![7; expected.len()];
             for own in [first, 1 - first] {
                 // The layers of the other one that do not overlap are left out below.
                 let before = if own == 0 { 0 } else { shared.start * plane };
                 let end = if own == 0 { shared.end * plane } else { expected.len() };
                 let offset = if own == 0 { 0 } else { cut * 12 };
-                let fill = |tile: usize, buffer: &mut dyn FnMut() -> Vec<u64>| {
-                    ((tile + offset) % 5 != 3).then(|| {
-                        let mut buffer = buffer();
-                        buffer.fill((tile + offset) as u64 + 1);
-                        buffer
-                    })
-                };
+                let fill =
+                    |tile: usize, buffer: &mut [u64]| buffer.fill((tile + offset) as u64 + 1);
+                let tiles = offset..offset + parts[own].count();
+                let has_sums: Vec<bool> = tiles.map(has_sums).collect();
                 let mut array = vec![7; end - before];
-                let mut pass = TileSums::new(&mut array, (strides, before), &parts[own]);
-                pass.fill_and_add(0, &fill, &add);
+                let (buffers, place) = (TileBuffers::default(), (strides, before));
+                let mut pass = TileSums::new(&mut array, place, &parts[own], &buffers);
+                pass.fill_and_add(0, &has_sums, &fill, &add);
                 if own != first {
                     let place = shared.start * plane - before;
                     pass.all()[place..place + 4 * plane]

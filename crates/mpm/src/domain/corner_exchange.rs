@@ -119,7 +119,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         &mut self,
         update: &GridUpdate<'_, T, S, D>,
         corners: &SharedCorners<T, D>,
-        bins: &mut Bins<D>,
+        bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
     ) {
         let mut extension = self.extension.take();

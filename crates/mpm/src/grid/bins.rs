@@ -23,19 +23,21 @@ use crate::grid::tiles::Tiles;
 use crate::grid::{Layout, NODES_AT_ONCE};
 use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared};
 use mmsmith_threads::disjoint::Partition;
-use mmsmith_threads::windows::{AddLine, TileLattice, TileSums};
+use mmsmith_threads::windows::{AddLine, TileBuffers, TileLattice, TileSums};
 use mmsmith_threads::{each_chunk, on_all_threads};
 
 /// Particles sorted by tile, within each tile by id.
 ///
 /// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
 /// kernels use them in place.
-pub(crate) struct Bins<const D: usize> {
+pub(crate) struct Bins<N, const D: usize> {
     tiles: Tiles<D>,
     /// The layers of tiles that this process holds.
     held: Held,
     /// The windows of these tiles, where they sum in buffers.
     lattice: Option<TileLattice<D>>,
+    /// These buffers, between passes.
+    buffers: TileBuffers<N>,
     /// The processes that hold all of them, where those are several.
     ranks: Option<Arc<dyn Ranks>>,
     /// Particle numbers, tile after tile.
@@ -75,7 +77,7 @@ pub(crate) struct NodeHooks<'a, N> {
     pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
     /// After the last contribution; the second argument is the index of the first node.
     pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
-    /// A node without contributions, and the sum of nodes and others.
+    /// A node without contributions, and the sum of nodes and others, which are cleared.
     pub(crate) zero: N,
     pub(crate) add: &'a AddLine<'a, N>,
     /// The exchange with processes that hold other tiles, where there are such.
@@ -97,13 +99,14 @@ pub(crate) struct Halo<'a, N> {
     pub(crate) finish: &'a (dyn Fn(&mut [N]) + Sync),
 }
 
-impl<const D: usize> Bins<D> {
+impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
     /// Allocates for `particles` particles on the grid; `sort_as` has to follow.
     pub(crate) fn new(tiles: Tiles<D>, particles: usize) -> Self {
         let mut own = Self {
             tiles,
             held: Held::default(),
             lattice: None,
+            buffers: TileBuffers::default(),
             ranks: None,
             order: Partition::new(0, 0),
             schedule: Schedule::default(),
@@ -200,7 +203,7 @@ impl<const D: usize> Bins<D> {
     }
 
     /// Calls `add` for every tile here, in parallel.
-    pub(crate) fn for_each<N: Copy + Send + Sync>(
+    pub(crate) fn for_each(
         &mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
@@ -222,7 +225,7 @@ impl<const D: usize> Bins<D> {
 
     /// As [`for_each`](Self::for_each) for kernels that change the tile's particles: `divide(partition)` divides them among tiles, and
     /// `add(band, divided, part)` finds those of the tile there.
-    pub(crate) fn for_each_mut<'a, N: Copy + Send + Sync, P: Sync>(
+    pub(crate) fn for_each_mut<'a, P: Sync>(
         &'a mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
@@ -231,18 +234,17 @@ impl<const D: usize> Bins<D> {
         add: &UpdateAndAdd<'_, N, P, D>,
     ) {
         let first_tile = self.first_tile();
-        let Self { tiles, held, order, schedule, lattice, .. } = self;
+        let Self { tiles, held, order, schedule, lattice, buffers, .. } = self;
         let grid = Sums { tiles, held, layout, hooks };
-        let has_particles: Vec<bool> = match lattice {
-            Some(lattice) => {
-                (0..lattice.count()).map(|part| order.part(part) != Some(&[])).collect()
-            }
-            None => Vec::new(),
-        };
+        let tiles_here = lattice.as_ref().map_or(0, TileLattice::count);
+        let has_particles: Vec<bool> =
+            (0..tiles_here).map(|part| order.part(part) != Some(&[])).collect();
         let divided = divide(order);
         let add = |band: Band<'_, N, D>, part: usize| add(band, &divided, part);
         match lattice {
-            Some(lattice) => grid.in_windows(lattice, first_tile, nodes, &has_particles, &add),
+            Some(lattice) => {
+                grid.in_windows((lattice, buffers), first_tile, nodes, &has_particles, &add);
+            }
             None => grid.in_bands(schedule, nodes, &add),
         }
     }
@@ -266,7 +268,7 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
     /// Calls `add(band, part)` for each tile here, which sums in a buffer, and the hooks around it.
     fn in_windows(
         &self,
-        lattice: &TileLattice<D>,
+        (lattice, buffers): (&TileLattice<D>, &TileBuffers<N>),
         first_tile: usize,
         nodes: &mut [N],
         has_particles: &[bool],
@@ -276,12 +278,9 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
         let row = layout.row();
         let rows = layout.rows_at_once() * row;
         each_chunk(nodes, NODES_AT_ONCE, &|_, nodes| (hooks.before)(nodes));
-        let mut sums = TileSums::new(nodes, (layout.strides, layout.first_row * row), lattice);
-        let fill = |tile: usize, buffer: &mut dyn FnMut() -> Vec<N>| {
-            if !has_particles[tile] {
-                return None;
-            }
-            let mut nodes = buffer();
+        let place = (layout.strides, layout.first_row * row);
+        let mut sums = TileSums::new(nodes, place, lattice, buffers);
+        let fill = |tile: usize, nodes: &mut [N]| {
             let window = lattice.window(tile);
             let (mut strides, mut before) = ([1; D], 0);
             for a in 0..D {
@@ -291,10 +290,9 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
                 before += window[a].start * strides[a];
             }
             let (number, nodes_before) = ((first_tile + tile) as u32, before as f64);
-            add(Band { nodes: &mut nodes, first: 0, tile: number, strides, nodes_before }, tile);
-            Some(nodes)
+            add(Band { nodes, first: 0, tile: number, strides, nodes_before }, tile);
         };
-        sums.fill_and_add(hooks.zero, &fill, hooks.add);
+        sums.fill_and_add(hooks.zero, has_particles, &fill, hooks.add);
         // A segment that two processes share is completed by the one whose turn comes last.
         let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
             held.shared().partition(|shared| shared.is_first_here);
@@ -417,7 +415,7 @@ mod tests {
     use crate::grid::{Grid, PAD_BELOW};
     use nalgebra::SVector;
 
-    fn bins<const D: usize>(cells: [usize; D], particles: usize) -> (Layout<D>, Bins<D>) {
+    fn bins<const D: usize>(cells: [usize; D], particles: usize) -> (Layout<D>, Bins<i64, D>) {
         let grid = Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls: [[false; 2]; D] };
         let layout = Layout::new(&grid, 8).unwrap();
         let tiles = Tiles::new(&layout, &cells, 6);
@@ -480,8 +478,10 @@ mod tests {
                     nodes.iter_mut().for_each(|node| *node += 1_000_000);
                 },
                 zero: 0,
-                add: &|nodes: &mut [i64], others: &[i64]| {
-                    nodes.iter_mut().zip(others).for_each(|(node, other)| *node += other);
+                add: &|nodes: &mut [i64], others: &mut [i64]| {
+                    for (node, other) in nodes.iter_mut().zip(others) {
+                        *node += std::mem::take(other);
+                    }
                 },
                 halo: None,
             };

@@ -81,7 +81,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
     pub(crate) fn p2g<S: NodeUpdate<T, D>>(
         &mut self,
         grid: &GridUpdate<'_, T, S, D>,
-        bins: &mut Bins<D>,
+        bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
         add: &AddToBand<'_, Node<T, D>, D>,
     ) {

@@ -269,7 +269,7 @@ where
     /// Calls `add` for every tile, as [`Bins::for_each`], and updates the nodes.
     pub(crate) fn p2g(
         &self,
-        bins: &mut Bins<D>,
+        bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
         add: &AddToBand<'_, Node<T, D>, D>,
     ) {
@@ -282,7 +282,7 @@ where
     /// Calls `add` for every tile, as [`Bins::for_each_mut`], and updates the nodes.
     pub(crate) fn g2p2g<'b, P: Sync>(
         &self,
-        bins: &'b mut Bins<D>,
+        bins: &'b mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
         divide: impl FnOnce(&'b mut Partition) -> P,
         add: &UpdateAndAdd<'_, Node<T, D>, P, D>,
@@ -304,9 +304,17 @@ where
             |nodes: &mut [_]| self.update.clear(nodes),
             |nodes: &mut [_], first| self.rows(nodes, first),
         );
-        let (zero, sum) = (Node::zero(), |nodes: &mut [Node<T, D>], others: &[Node<T, D>]| {
-            nodes.iter_mut().zip(others).for_each(|(node, other)| node.add(other));
-        });
+        let zero = Node::zero();
+        let sum = |nodes: &mut [Node<T, D>], others: &mut [Node<T, D>]| {
+            // Particles reach half the lines of a window, or fewer.
+            if others.iter().all(Node::is_zero) {
+                return;
+            }
+            for (node, other) in nodes.iter_mut().zip(others) {
+                node.add(other);
+                *other = zero;
+            }
+        };
         let hooks = NodeHooks { before: &before, after: &after, zero, add: &sum, halo: None };
         let Some(ranks) = ranks else {
             add(nodes, hooks);

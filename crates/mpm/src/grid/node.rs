@@ -31,6 +31,11 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         Self { values }
     }
 
+    #[inline(always)]
+    pub(crate) fn is_zero(&self) -> bool {
+        self.values == Self::zero().values
+    }
+
     /// All but the padding.
     pub(crate) fn numbers(&self) -> &[T] {
         &self.values[..=2 * D]

@@ -15,7 +15,7 @@ use crate::grid::node::Node;
 pub(crate) struct GridState<T, const D: usize> {
     pub(crate) constants: Constants<T, D>,
     pub(crate) layout: Layout<D>,
-    pub(crate) bins: Bins<D>,
+    pub(crate) bins: Bins<Node<T, D>, D>,
     pub(crate) nodes: Vec<Node<T, D>>,
     /// MUSL: velocities projected from the updated particles; XPIC: a term of the filter. One per node.
     pub(crate) reprojected: Vec<Node<T, D>>,

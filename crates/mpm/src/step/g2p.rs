@@ -18,6 +18,7 @@ use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::SharedCorners;
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
+use crate::grid::node::Node;
 use crate::grid::state::GridState;
 use crate::kernel::any::Interpolated;
 use crate::kernel::block::{BlockIncrement, BlockLaw};
@@ -338,7 +339,7 @@ fn each_piece<T: Lanes, const D: usize>(
 /// A pass of G2P over all particles.
 struct G2p<'a, T, const D: usize> {
     c: &'a Constants<T, D>,
-    bins: &'a Bins<D>,
+    bins: &'a Bins<Node<T, D>, D>,
     domain: &'a dyn Domain<T, D>,
     corners: Option<&'a Corners<T, D>>,
 }

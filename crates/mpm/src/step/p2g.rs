@@ -209,7 +209,11 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
     pub(crate) fn to_grid<S: NodeUpdate<T, D>>(
         &self,
         update: &GridUpdate<'_, T, S, D>,
-        (bins, stages, loading): (&mut Bins<D>, Option<TwoStages<'_, T, D>>, Loading<'_, T, D>),
+        (bins, stages, loading): (
+            &mut Bins<Node<T, D>, D>,
+            Option<TwoStages<'_, T, D>>,
+            Loading<'_, T, D>,
+        ),
         nodes: &mut [Node<T, D>],
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
