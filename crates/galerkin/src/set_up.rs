@@ -131,11 +131,22 @@ pub(super) fn fits<const D: usize>(
 }
 
 /// Components that are given the same on a side, at the same places.
-struct Given<const D: usize> {
+pub(super) struct Given<const D: usize> {
     moved: bool,
     components: [bool; D],
     /// Ends of each axis that belong to the places: where the motion of these components is given as well.
     ends: [[bool; 2]; D],
+}
+
+impl<const D: usize> Given<D> {
+    /// One component on a side, of which the motion or the traction is given.
+    pub(super) fn of(axes: &[Axis; D], side: Side, component: usize, moved: bool) -> Self {
+        let ends = array::from_fn(|k| match k == side.axis || !moved {
+            true => [false; 2],
+            false => axes[k].moved(component),
+        });
+        Self { moved, components: array::from_fn(|k| k == component), ends }
+    }
 }
 
 /// The components of a side of which something is given, those together that have the same places.
@@ -147,13 +158,10 @@ fn given<const D: usize>(axes: &[Axis; D], side: Side) -> Vec<Given<D>> {
         if !moved && !end.has(c, ComponentCondition::PrescribedTraction) {
             continue;
         }
-        let ends = array::from_fn(|k| match k == side.axis || !moved {
-            true => [false; 2],
-            false => axes[k].moved(c),
-        });
-        match all.iter_mut().find(|other| other.moved == moved && other.ends == ends) {
+        let own = Given::of(axes, side, c, moved);
+        match all.iter_mut().find(|other| other.moved == moved && other.ends == own.ends) {
             Some(other) => other.components[c] = true,
-            None => all.push(Given { moved, components: array::from_fn(|k| k == c), ends }),
+            None => all.push(own),
         }
     }
     all
@@ -166,48 +174,52 @@ fn sides<const D: usize>() -> impl Iterator<Item = Side> {
 
 /// The sides where something is given.
 pub(super) fn faces<const D: usize>(grid: &Grid<D>, lines: &[Line; D]) -> Vec<Face<D>> {
-    let mut faces = Vec::new();
-    for side in sides::<D>() {
-        for Given { moved, components, ends } in given(&grid.axes, side) {
-            let Side { axis, upper } = side;
-            let own = if upper { grid.axes[axis].upper } else { grid.axes[axis].lower };
-            // Coordinates and lengths; the lengths matter for tractions only.
-            let places: [Vec<[f64; 2]>; D] = array::from_fn(|k| {
-                if k == axis {
-                    return vec![[own, 1.0]];
-                }
-                let (axis, line) = (&grid.axes[k], &lines[k]);
-                let ends = ends[k];
-                let particles = line.points.iter().zip(&line.lengths).map(|(x, w)| [*x, *w]);
-                let lower = ends[0].then_some([axis.lower, 0.0]);
-                lower
-                    .into_iter()
-                    .chain(particles)
-                    .chain(ends[1].then_some([axis.upper, 0.0]))
-                    .collect()
-            });
-            let count = places.iter().map(Vec::len).product();
-            let mut face = Face {
-                side,
-                moved,
-                given: components,
-                X: Vec::with_capacity(count),
-                frames: Vec::new(),
-                areas: Vec::new(),
-                values: vec![SVector::zeros(); count],
-            };
-            for index in products(places.each_ref().map(Vec::len)) {
-                let place = SVector::<f64, D>::from_fn(|k, _| places[k][index[k]][0]);
-                let scales = grid.coordinates.scales(&place);
-                let others = (0..D).filter(|k| *k != axis);
-                face.X.push(grid.coordinates.place(&place));
-                face.frames.extend(grid.coordinates.frame(&place));
-                face.areas.push(others.map(|k| scales[k] * places[k][index[k]][1]).product());
-            }
-            faces.push(face);
+    let of_side = |side: Side| {
+        let given = given(&grid.axes, side).into_iter();
+        given.map(move |given| face(grid, lines, side, &given))
+    };
+    sides::<D>().flat_map(of_side).collect()
+}
+
+/// The places of a side where some components are given.
+pub(super) fn face<const D: usize>(
+    grid: &Grid<D>,
+    lines: &[Line; D],
+    side: Side,
+    given: &Given<D>,
+) -> Face<D> {
+    let Side { axis, upper } = side;
+    let own = if upper { grid.axes[axis].upper } else { grid.axes[axis].lower };
+    // Coordinates and lengths; the lengths matter for tractions only.
+    let places: [Vec<[f64; 2]>; D] = array::from_fn(|k| {
+        if k == axis {
+            return vec![[own, 1.0]];
         }
+        let (axis, line) = (&grid.axes[k], &lines[k]);
+        let ends = given.ends[k];
+        let particles = line.points.iter().zip(&line.lengths).map(|(x, w)| [*x, *w]);
+        let lower = ends[0].then_some([axis.lower, 0.0]);
+        lower.into_iter().chain(particles).chain(ends[1].then_some([axis.upper, 0.0])).collect()
+    });
+    let count = places.iter().map(Vec::len).product();
+    let mut face = Face {
+        side,
+        moved: given.moved,
+        given: given.components,
+        X: Vec::with_capacity(count),
+        frames: Vec::new(),
+        areas: Vec::new(),
+        values: vec![SVector::zeros(); count],
+    };
+    for index in products(places.each_ref().map(Vec::len)) {
+        let place = SVector::<f64, D>::from_fn(|k, _| places[k][index[k]][0]);
+        let scales = grid.coordinates.scales(&place);
+        let others = (0..D).filter(|k| *k != axis);
+        face.X.push(grid.coordinates.place(&place));
+        face.frames.extend(grid.coordinates.frame(&place));
+        face.areas.push(others.map(|k| scales[k] * places[k][index[k]][1]).product());
     }
-    faces
+    face
 }
 
 /// All index tuples below `counts`, the first index fastest.

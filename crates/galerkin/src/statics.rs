@@ -21,6 +21,7 @@
 
 mod newton;
 mod numbering;
+mod rigid;
 mod stiffness;
 
 use std::{array, mem};
@@ -40,6 +41,7 @@ use super::quadrature::Quadrature;
 use super::set_up::{Grid, bases, check_grid, faces, fits, line, particles};
 use super::stress::is_deformation;
 use numbering::Numbering;
+use rigid::{Pin, pins};
 use stiffness::{Cells, Stiffness};
 
 /// The load of a body at rest.
@@ -192,6 +194,10 @@ pub trait AtRest<const D: usize> {
     /// Unknowns, and entries of their matrix.
     fn size(&self) -> [usize; 2];
 
+    /// Places next to coefficients that have the values of the given displacement, so that the body cannot move as a whole: as many as its
+    /// sides leave rigid motions free.
+    fn held(&self) -> Vec<SVector<f64, D>>;
+
     /// Goes from the undeformed body to the whole load, in so many steps or more; `seen` is called after each step of Newton's, with the
     /// load factor and the norms of the residual.
     ///
@@ -240,6 +246,10 @@ macro_rules! at_rest {
                     [self.pattern.unknowns(), self.pattern.entries()]
                 }
 
+                fn held(&self) -> Vec<SVector<f64, $D>> {
+                    self.pins.iter().map(|pin| pin.X).collect()
+                }
+
                 fn solve(
                     &mut self,
                     loads: &Loads<'_, $D>,
@@ -267,6 +277,7 @@ struct Statics<const D: usize> {
     /// Fits of what is given on sides; none where nothing is.
     fits: Option<[[Fit; D]; D]>,
     faces: Vec<Face<D>>,
+    pins: Vec<Pin<D>>,
     components: [Component<D>; D],
     at: Quadrature<D>,
     particles: Particles<f64, D>,
@@ -301,11 +312,12 @@ impl<const D: usize> Statics<D> {
         let bases = bases(grid, degree, &lines)?;
         let faces = faces(grid, &lines);
         let singular = |axis: usize| SetupError::SingularMass { axis, per_cell: grid.per_cell };
-        let fits = match faces.iter().any(|face| face.moved) {
+        let pins = pins(grid, &bases, &lines);
+        let fits = match faces.iter().any(|face| face.moved) || !pins.is_empty() {
             true => Some(fits(grid, &bases, &lines).map_err(singular)?),
             false => None,
         };
-        let numbering = Numbering::new(&grid.axes, &bases, &faces);
+        let numbering = Numbering::new(&grid.axes, &bases, &faces, &pins);
         let unknowns = numbering.count;
         let pattern = numbering.pattern().map_err(|_| StaticsError::Memory { unknowns })?;
         let components = array::from_fn(|index| Component::new(index, &bases));
@@ -326,6 +338,7 @@ impl<const D: usize> Statics<D> {
             bases,
             fits,
             faces,
+            pins,
             components,
             at,
             particles,
@@ -337,9 +350,10 @@ impl<const D: usize> Statics<D> {
 
     /// Forms the forces of the whole load, and the displacements of sides under it.
     fn load(&mut self, loads: &Loads<'_, D>) {
-        let Self { bases, fits, faces, components, at, density, forces, given, .. } = self;
+        let Self { bases, fits, faces, pins, numbering, components, at, forces, given, .. } = self;
+        let density = self.density;
         for (p, X) in at.X.iter().enumerate() {
-            let b = at.in_frame(p, &(loads.body_force)(X)) * (*density * at.volume[p]);
+            let b = at.in_frame(p, &(loads.body_force)(X)) * (density * at.volume[p]);
             components.iter_mut().for_each(|own| own.values[p] = b[own.index]);
         }
         for (component, forces) in components.iter_mut().zip(forces.iter_mut()) {
@@ -361,6 +375,16 @@ impl<const D: usize> Statics<D> {
                     }
                     _ => {}
                 }
+            }
+        }
+        let Some(fits) = fits else { return };
+        for Pin { component: c, index, face, .. } in pins {
+            face.ask(loads.boundary, Quantity::Displacement, loads.time);
+            let axis = |k: usize| (&fits[k][*c], along(bases, k, *c));
+            let mut of_body = vec![0.0; given[*c].len()];
+            face.set(&components[*c].functions(bases), &face.fit(*c, axis), &mut of_body);
+            for place in numbering.copies(*c, index) {
+                given[*c][place] = of_body[place];
             }
         }
     }

@@ -10,12 +10,14 @@ use mmsmith_galerkin::{AtRest, Equilibrium, Factors, Loads, StaticsError};
 use mmsmith_measure::Comparison;
 use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_runtime::{AnySolution, Domain, Law, Solution};
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, CflSpeed, law_of};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
 use crate::frames::{FrameOutput, write_at_rest};
+use crate::inverse::determinant;
 use crate::order::Order;
 use crate::points;
 use crate::precision::Precision;
@@ -104,6 +106,10 @@ pub struct StaticRow {
     pub wall_s: f64,
     /// Why it did not get there; `None` where it did.
     pub stopped: Option<String>,
+    /// Places next to coefficients of the displacement that have the exact value, so that the body cannot move as a whole; none where its
+    /// sides hold it.
+    #[serde(default)]
+    pub held: Vec<Vec<f64>>,
     /// Load steps that were begun anew with half their length.
     pub cut_backs: usize,
     /// The load steps; of a case that did not get there the last one that failed.
@@ -293,6 +299,30 @@ where
     let begun = Instant::now();
     let mut body = f64::at_rest(&grid, case.total.degree, law, exact.density())?;
     let time = case.moment * exact.period();
+    let [unknowns, entries] = body.size();
+    let mut row = StaticRow {
+        cells: case.case.cells,
+        h: scene.spacing,
+        points: body.positions().len(),
+        unknowns,
+        entries,
+        wall_s: 0.0,
+        stopped: None,
+        held: body.held().iter().map(|X| rounded(X, scene.reach())).collect(),
+        cut_backs: 0,
+        load_steps: Vec::new(),
+        errors: None,
+    };
+    let J = |X: &SVector<f64, D>| determinant(&exact.deformation_gradient(X, time));
+    if let Some(X) = body.positions().iter().find(|X| J(X) <= 0.0) {
+        let place: Vec<f64> = X.iter().copied().collect();
+        row.stopped = Some(format!(
+            "the exact state is turned inside out: J = {:.3e} at X = {place:.6?}, so that no load step gets there; another --moment or smaller \
+             parameters may be a state of a body",
+            J(X)
+        ));
+        return Ok(row);
+    }
     let boundary = ExactBoundary::new(exact);
     let moves = !is_static(exact);
     let loads = Loads {
@@ -306,24 +336,12 @@ where
         time,
     };
     let outcome = body.solve(&loads, case.load_steps, seen);
-    let wall_s = begun.elapsed().as_secs_f64();
-    let [unknowns, entries] = body.size();
-    let points = body.positions().len();
-    let mut row = StaticRow {
-        cells: case.case.cells,
-        h: scene.spacing,
-        points,
-        unknowns,
-        entries,
-        wall_s,
-        stopped: None,
-        cut_backs: 0,
-        load_steps: Vec::new(),
-        errors: None,
-    };
+    row.wall_s = begun.elapsed().as_secs_f64();
     match outcome {
         Ok(found) => {
-            row.errors = Some(errors(exact, body.as_mut(), time));
+            let errors = errors(exact, body.as_mut(), time);
+            row.stopped = elsewhere(exact, body.positions(), time, &errors);
+            row.errors = Some(errors);
             row.cut_backs = found.cut_backs;
             row.load_steps = steps(&found);
             if let Some(output) = output {
@@ -374,6 +392,42 @@ where
     let comparison = Comparison::new(exact, body.positions());
     let PerField { u, F, P, .. } = comparison.measure(body.observe(), time, 0.0);
     StaticErrors { u, F, P }
+}
+
+/// A place in a body of this size, zero where rounding left something of a coordinate.
+fn rounded<const D: usize>(X: &SVector<f64, D>, size: f64) -> Vec<f64> {
+    X.iter().map(|x| if x.abs() > 1e-12 * size { *x } else { 0.0 }).collect()
+}
+
+/// Why the state that was reached is not the one that was sought, if it is not.
+fn elsewhere<const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    positions: &[SVector<f64, D>],
+    time: f64,
+    errors: &StaticErrors<PerNorm<f64>>,
+) -> Option<String> {
+    /// A state of the same stress: the error of P is at most this part of that of F, both relative.
+    const SAME_STRESS: f64 = 1e-4;
+    /// Errors of F below this part of the strain are those of the discretisation.
+    const OTHER: f64 = 0.02;
+    let largest =
+        |of: &dyn Fn(&SVector<f64, D>) -> f64| positions.iter().map(of).fold(0.0, f64::max);
+    let motion = largest(&|X| exact.displacement(X, time).amax());
+    let strain = largest(&|X| (exact.deformation_gradient(X, time) - SMatrix::identity()).amax());
+    let stress = largest(&|X| exact.first_piola_kirchhoff(X, time).amax());
+    let [u, F, P] = [errors.u.linf, errors.F.linf, errors.P.linf];
+    if F > OTHER * strain && P * strain <= SAME_STRESS * F * stress {
+        return Some(format!(
+            "Newton's method reached another equilibrium under the same loads: the stress is the exact one to {P:.1e}, and F differs by {F:.3e}. \
+             The law has both states; a smaller strain may have one alone"
+        ));
+    }
+    // What a coarse grid leaves is less than the motion.
+    (u > motion && F > strain).then(|| {
+        format!(
+            "the state that Newton's method reached is not the exact one: u differs by {u:.3e}, more than the motion, {motion:.3e}"
+        )
+    })
 }
 
 /// Orders of a series of grids, and verdicts on them.

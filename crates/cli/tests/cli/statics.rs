@@ -137,3 +137,98 @@ fn options_without_a_meaning_are_refused_by_their_names() {
         refuses(place.path(), call, &[expected]);
     }
 }
+
+/// A static solution between these sides: its coordinates, displacement, domain, and conditions by surface.
+fn stated(
+    coordinates: (&str, usize),
+    displacement: &[&str],
+    law: &str,
+    domain: &str,
+    sides: &[(&str, &str)],
+) -> String {
+    let (coordinates, dimension) = coordinates;
+    let mut text = format!(
+        "name = 'made'\ntitle = 'made'\ncoordinates = '{coordinates}'\ndimension = {dimension}\n[parameters]\nA = {{ default = 0.1 }}\n\
+         E = {{ default = 1000 }}\nnu = {{ default = 0.3 }}\nrho0 = {{ default = 2 }}\n[displacement]\n{}\n[material]\nlaw = '{law}'\n\
+         [domain]\n{domain}\n",
+        displacement.join("\n")
+    );
+    for (surface, conditions) in sides {
+        text += &format!("[[boundary]]\nsurface = '{surface}'\n{conditions}\n");
+    }
+    text
+}
+
+#[test]
+fn bodies_that_nothing_holds_have_the_orders_of_held_ones() {
+    const TRACTION: &str = "condition = 'prescribed-traction'";
+    const ROLLER: &str = "normal = 'prescribed-motion'\ntangential = 'prescribed-traction'";
+    let square = ["X = 'A*sin(2*X)*Y'", "Y = 'A*X*Y^2'"];
+    let sides = ["X-lower", "X-upper", "Y-lower", "Y-upper"];
+    let all = sides.map(|side| (side, TRACTION));
+    let mut on_roller = all;
+    on_roller[2].1 = ROLLER;
+    let unit = "shape = 'box'\nlower = [0, 0]\nupper = [1, 1]";
+    let rims = [("inner", TRACTION), ("outer", TRACTION)];
+    let cases: [(String, usize); 4] = [
+        (stated(("cartesian", 2), &square, "neo-hookean", unit, &all), 3),
+        (stated(("cartesian", 2), &square, "neo-hookean", unit, &on_roller), 1),
+        (
+            stated(
+                ("cartesian", 1),
+                &["X = '-A*X + A/5*sin(3*X)'"],
+                "neo-hookean",
+                "shape = 'box'\nlower = [0]\nupper = [1]",
+                &all[..2],
+            ),
+            1,
+        ),
+        (
+            stated(
+                ("polar", 2),
+                &["R = 'A/R'"],
+                "neo-hookean",
+                "shape = 'annulus'\ninner = 1\nouter = 2",
+                &rims,
+            ),
+            3,
+        ),
+    ];
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    for (text, held) in cases {
+        std::fs::write(at.join("made.toml"), &text).unwrap();
+        let called =
+            mms(at, "converge made.toml --static --cells 8,16 --shape bspline2 --json made.json");
+        assert_eq!(called.status, 0, "{text}{}{}", called.stdout, called.stderr);
+        assert!(called.stdout.contains("free to move as a whole"), "{}", called.stdout);
+        let made = read_json(&at.join("made.json"));
+        assert_eq!(made["rows"][0]["held"].as_array().unwrap().len(), held, "{text}");
+        let order = made["orders"]["u"]["l2"]["fit"].as_f64().unwrap();
+        assert!((2.7..3.3).contains(&order), "{order}\n{text}");
+    }
+}
+
+#[test]
+fn a_state_that_is_not_the_exact_one_is_not_ok() {
+    let bar = "shape = 'box'\nlower = [0]\nupper = [1]";
+    let sides = [
+        ("X-lower", "condition = 'prescribed-motion'"),
+        ("X-upper", "condition = 'prescribed-traction'"),
+    ];
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    for (law, motion, said) in [
+        // Under pressure the stress of this law falls again, so that two strains have the same.
+        ("st-venant-kirchhoff", "X = '-0.58*X - 0.02*X^2'", "another equilibrium"),
+        ("neo-hookean", "X = '-1.2*X - 0.02*X^2'", "the exact state is turned inside out"),
+    ] {
+        let text = stated(("cartesian", 1), &[motion], law, bar, &sides);
+        std::fs::write(at.join("made.toml"), &text).unwrap();
+        let called = mms(at, "run made.toml --static --cells 8");
+        assert_eq!(called.status, 1, "{text}{}{}", called.stdout, called.stderr);
+        let is_said = called.stdout.contains("NOT REACHED") && called.stdout.contains(said);
+        assert!(is_said && !called.stdout.contains("status: ok"), "{}", called.stdout);
+        assert!(!called.stdout.contains("--load-steps"), "{}", called.stdout);
+    }
+}

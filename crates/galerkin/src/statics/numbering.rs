@@ -8,6 +8,7 @@ use crate::axis::{Axis, End};
 use crate::basis::{Basis, ValueOrSlope};
 use crate::boundary::Face;
 use crate::component::along;
+use crate::statics::rigid::Pin;
 
 /// The functions of one kind of component along an axis that do not vanish in its cells.
 #[derive(Clone, Debug)]
@@ -60,7 +61,12 @@ pub(super) struct Numbering<const D: usize> {
 }
 
 impl<const D: usize> Numbering<D> {
-    pub(super) fn new(axes: &[Axis; D], bases: &[[Basis; 2]; D], faces: &[Face<D>]) -> Self {
+    pub(super) fn new(
+        axes: &[Axis; D],
+        bases: &[[Basis; 2]; D],
+        faces: &[Face<D>],
+        pins: &[Pin<D>],
+    ) -> Self {
         let windows: [[Window; 2]; D] =
             array::from_fn(|k| array::from_fn(|kind| Window::new(&axes[k], &bases[k][kind])));
         let functions: [[usize; D]; D] =
@@ -70,11 +76,15 @@ impl<const D: usize> Numbering<D> {
             let functions = functions[c];
             let own: [usize; D] = array::from_fn(|k| along(&windows, k, c).own);
             let is_given = |index: &[usize; D]| {
-                faces.iter().filter(|face| face.moves(c)).any(|face| {
-                    let axis = face.side.axis;
-                    let end = if face.side.upper { functions[axis] - 1 } else { 0 };
-                    index[axis] == end
-                })
+                let is_pinned = |pin: &Pin<D>| pin.component == c && pin.index == *index;
+                let on_faces = || {
+                    faces.iter().filter(|face| face.moves(c)).any(|face| {
+                        let axis = face.side.axis;
+                        let end = if face.side.upper { functions[axis] - 1 } else { 0 };
+                        index[axis] == end
+                    })
+                };
+                pins.iter().any(is_pinned) || on_faces()
             };
             let mut unknown: Vec<Option<usize>> = Vec::with_capacity(functions.iter().product());
             for place in 0..functions.iter().product() {
@@ -93,6 +103,17 @@ impl<const D: usize> Numbering<D> {
             unknown
         });
         Self { unknown, count, windows, functions }
+    }
+
+    /// The places of a coefficient and of its copies.
+    pub(super) fn copies(&self, c: usize, index: &[usize; D]) -> Vec<usize> {
+        let own: [usize; D] = array::from_fn(|k| along(&self.windows, k, c).own);
+        let functions = &self.functions[c];
+        let is_copy = |place: &usize| {
+            let other = split(*place, functions);
+            (0..D).all(|k| other[k] % own[k] == index[k])
+        };
+        (0..functions.iter().product()).filter(is_copy).collect()
     }
 
     /// The matrix that has a place for all coefficients that share a cell.

@@ -32,21 +32,23 @@ pub(super) fn run(problem: &Problem, row: &StaticRow) -> Report {
         row.entries,
     );
     let mut sections = Vec::new();
-    match (&row.stopped, &row.errors) {
-        (Some(why), _) => said += &stopped(problem, row, why),
-        (None, None) => {}
-        (None, Some(errors)) => {
-            said += "status: ok\n";
-            let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
-            for (field, norms) in errors.iter() {
-                let cells = norms.iter().map(|(_, value)| table::error(*value));
-                table.row(std::iter::once(named(field, units)).chain(cells));
-            }
-            said += &table.text();
+    said += &held(row);
+    match &row.stopped {
+        Some(why) => said += &stopped(problem, row, why),
+        None => said += "status: ok\n",
+    }
+    if let Some(errors) = &row.errors {
+        let mut table = Table::new(1, ["error", "linf", "l2", "l1"]);
+        for (field, norms) in errors.iter() {
+            let cells = norms.iter().map(|(_, value)| table::error(*value));
+            table.row(std::iter::once(named(field, units)).chain(cells));
         }
+        said += &table.text();
     }
     sections.push(Section::Note(said));
-    sections.push(Section::Table("residuals of Newton's method".into(), residuals(row)));
+    if !row.load_steps.is_empty() {
+        sections.push(Section::Table("residuals of Newton's method".into(), residuals(row)));
+    }
     sections.push(Section::Note(format!("{}took {:.3} s\n", on_convergence(row), row.wall_s)));
     Report {
         command: "static",
@@ -64,11 +66,36 @@ pub(super) fn run(problem: &Problem, row: &StaticRow) -> Report {
 
 /// Why a load was not reached, and the line to write instead.
 fn stopped(problem: &Problem, row: &StaticRow, why: &str) -> String {
+    // Load steps lead to a state that there is and that was not reached.
+    if row.errors.is_some() || row.load_steps.is_empty() {
+        return format!("NOT REACHED: {why}\n");
+    }
     let more = (4 * problem.case.load_steps).max(8);
     format!(
         "NOT REACHED: {why}\nSmaller steps may get there, finer cells where the motion is steep within one:\n  mms run {} --static --cells {} \
          --load-steps {more}\n",
         problem.line, row.cells,
+    )
+}
+
+/// A sentence on a body whose sides leave it free to move.
+fn held(row: &StaticRow) -> String {
+    let mut places: Vec<String> = Vec::new();
+    for X in &row.held {
+        let coordinates: Vec<String> = X.iter().map(|x| number::rounded(*x, 4)).collect();
+        let place = format!("({})", coordinates.join(", "));
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    if places.is_empty() {
+        return String::new();
+    }
+    format!(
+        "The sides leave the body free to move as a whole: {} of the displacement, next to X = {}, {} the exact value, so that it cannot.\n",
+        number::counted(row.held.len(), "coefficient"),
+        places.join(", "),
+        if row.held.len() == 1 { "has" } else { "have" },
     )
 }
 
@@ -124,6 +151,10 @@ fn on_convergence(row: &StaticRow) -> String {
     };
     let told = match row.exponent() {
         _ if row.stopped.is_some() => String::new(),
+        // From the undeformed body on, an exponent takes four residuals.
+        None if row.load_steps.iter().any(|step| step.residuals.len() > 5) => {
+            "NO EXPONENT: the last residuals above rounding do not fall one after the other, as those of Newton's method do.\n".into()
+        }
         None => "Newton's method was at rounding before an exponent showed: the body is linear, or the load steps are small.\n".into(),
         Some(found) if found >= QUADRATIC => {
             format!("Newton's method converged quadratically: exponent {found:.2} of the last three residuals above rounding.\n")
@@ -150,7 +181,7 @@ pub(super) fn orders(problem: &Problem, study: &StaticStudy) -> Report {
         sections.push(Section::Table(title, errors(study, field).with_unit(&["h"], length)));
     }
     sections.push(Section::Table("verdicts".into(), verdicts(study)));
-    let mut notes = String::new();
+    let mut notes = study.rows.last().map(held).unwrap_or_default();
     for row in &study.rows {
         if let Some(why) = &row.stopped {
             notes += &format!("{} cells: {}", row.cells, stopped(problem, row, why));
