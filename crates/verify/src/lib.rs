@@ -134,7 +134,7 @@ pub use tangent::{
 };
 pub use temporal::{Temporal, TemporalRow};
 pub use timing::Timing;
-pub use total::POLAR_ANGLES;
+pub use total::{POLAR_ANGLES, has_uneven_density};
 pub use tradeoff::{
     Against, Cheapest, Chosen, Effect, Entry, Goal, LADDER, MARGIN, Machine, Range, Repeat,
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,

@@ -327,6 +327,18 @@ impl<const D: usize> BoundaryData<D> for ExactBoundary<'_, D> {
     }
 }
 
+/// Whether the density of a body differs from place to place.
+#[must_use]
+pub fn has_uneven_density(exact: &AnySolution<f64>) -> bool {
+    in_dimension!(exact, |s| is_uneven(s), else false)
+}
+
+fn is_uneven<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
+    let domain = exact.domain();
+    let mut places = (0..64).filter_map(|n| points::interior(&domain, 1.0, n));
+    places.any(|(X, _)| exact.density_at(&X) != exact.density())
+}
+
 /// The solver at time zero with steps of `time_step`.
 pub(crate) fn set_up<'a, T: Precision<D>, const D: usize>(
     exact: &'a dyn Solution<f64, D>,
@@ -340,9 +352,8 @@ where
 {
     let Total { degree, mass, composition, .. } = *total;
     // The mass matrix is a product over the axes.
-    let places = (0..64).filter_map(|n| points::interior(&scene.domain, 1.0, n));
-    if places.into_iter().any(|(X, _)| exact.density_at(&X) != exact.density()) {
-        let instead = "updated-lagrangian for a density that differs from place to place";
+    if is_uneven(exact) {
+        let instead = "updated-lagrangian, with --layout clipped where sides are no walls, for a density that differs from place to place";
         return Err(CaseError::setting("formulation", "total-lagrangian", instead));
     }
     let set_up = SetUp {

@@ -27,6 +27,8 @@ pub(super) struct Settled {
     pub(super) precision: Precision,
     /// The choice made because the usual scheme would not do, and its reason.
     pub(super) chosen: Option<Choice>,
+    /// Whether particles are clipped because the density differs from place to place.
+    clips: bool,
     /// Conditions in whose place the traction of the exact motion acts.
     pub(super) loaded: Vec<Boundary>,
     /// The CFL number of the fastest P-waves with the usual step, where a shorter one was taken for that.
@@ -56,6 +58,7 @@ impl Settled {
             case,
             precision: Precision::F64,
             chosen: None,
+            clips: false,
             loaded: Vec::new(),
             too_long: None,
             cfl_is_given: true,
@@ -71,15 +74,20 @@ impl Settled {
     pub(super) fn settle(options: &SchemeOptions, exact: &AnySolution<f64>) -> Result<Self> {
         let needed = verify::needs_total_frame(exact);
         let needs_space = verify::needs_space(exact);
+        // The mass matrix of splines is a product over the axes.
+        let uneven = verify::has_uneven_density(exact);
         let is_total = match options.formulation {
             Some(formulation) => formulation == Formulation::Total,
-            None => (needed.is_some() || needs_space.is_some()) && !says_updated(options),
+            None => {
+                (needed.is_some() || needs_space.is_some()) && !says_updated(options) && !uneven
+            }
         };
+        let clips = !is_total && uneven && needed.is_some() && options.layout.is_none();
         refuse_start(options, is_total)?;
         let scheme = if is_total {
             Scheme::Total(total(options, exact)?)
         } else {
-            Scheme::Updated(updated(options)?)
+            Scheme::Updated(updated(options, clips)?)
         };
         let speed = options.cfl_speed;
         let said = UsualStep {
@@ -108,6 +116,7 @@ impl Settled {
             case,
             precision: options.precision,
             chosen: None,
+            clips,
             loaded,
             too_long: step.too_long,
             cfl_is_given: options.cfl.is_some(),
@@ -142,7 +151,14 @@ impl Settled {
     /// A line that says what was chosen and why, and one with the options that say the same; empty where all is as usual.
     pub(super) fn choice(&self) -> String {
         let Some(Choice { scheme, reason }) = &self.chosen else {
-            return self.loads() + &self.step();
+            let clipped = match self.clips {
+                true => {
+                    "updated Lagrangian, particles clipped with the boundary: the density differs from place to place\n  as with \
+                     --formulation updated-lagrangian --layout clipped\n"
+                }
+                false => "",
+            };
+            return clipped.to_owned() + &self.loads() + &self.step();
         };
         let Case { cfl, cfl_speed, per_cell, .. } = self.case;
         let degree = match scheme.degree {
@@ -242,7 +258,7 @@ fn per_cell(scheme: &Scheme) -> usize {
     }
 }
 
-fn updated(options: &SchemeOptions) -> Result<Updated> {
+fn updated(options: &SchemeOptions, clips: bool) -> Result<Updated> {
     let total_only = [
         ("--mass consistent", options.mass == Some(MassMatrix::Consistent)),
         ("--composition", options.composition.is_some_and(|order| order != Composition::Order2)),
@@ -257,7 +273,7 @@ fn updated(options: &SchemeOptions) -> Result<Updated> {
         );
     }
     let layout = match options.layout {
-        None if is_moved(options) => Layout::Clipped,
+        None if clips || is_moved(options) => Layout::Clipped,
         layout => layout.unwrap_or(Layout::Lattice),
     };
     // The boxes of GIMP lie along the axes.
