@@ -65,8 +65,11 @@ where
         // First, since no other scheme would mend it.
         law_of_body::<f64, D>(exact)?;
         let scene = Scene::new(exact, case, end)?;
-        let waves =
-            Waves { speed: case.cfl_speed.on_grid(exact, scene.spacing)?, spacing: scene.spacing };
+        let spacing = match &case.scheme {
+            Scheme::Total(total) => total.spacing_of_waves(&scene, case.per_cell),
+            Scheme::Updated(_) => scene.spacing,
+        };
+        let waves = Waves { speed: case.cfl_speed.on_grid(exact, spacing)?, spacing };
         let steps = Steps::new(case.cfl, end, waves)?;
         prepare_until(exact, model, end)?;
         if let Scheme::Updated(updated) = &case.scheme {

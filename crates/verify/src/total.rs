@@ -95,6 +95,26 @@ impl Total {
         )
     }
 
+    /// The length that CFL numbers refer to: the spacing of a scene, unless the cells across a curved body or along its axis are much
+    /// narrower, as where few of them fit in.
+    pub(crate) fn spacing_of_waves<const D: usize>(
+        &self,
+        scene: &Scene<D>,
+        per_cell: usize,
+    ) -> f64 {
+        /// The part of the spacing down to which usual CFL numbers leave room.
+        const ROOM: f64 = 0.75;
+        let lengths: &[usize] = match self.coordinates {
+            Coordinates::Cartesian => &[],
+            Coordinates::Polar | Coordinates::Spherical => &[0],
+            Coordinates::Cylindrical => &[0, 2],
+        };
+        // Scenes without a grid are refused where it is set up.
+        let Ok(grid) = self.grid(scene, per_cell) else { return scene.spacing };
+        let axes = grid.axes.iter().enumerate().filter(|(k, _)| lengths.contains(k));
+        axes.map(|(_, axis)| axis.spacing() / ROOM).fold(scene.spacing, f64::min)
+    }
+
     /// The grid that covers the body of a scene.
     pub(crate) fn grid<const D: usize>(
         &self,
@@ -234,7 +254,11 @@ fn narrowest<const D: usize>(exact: &dyn Solution<f64, D>) -> f64 {
             let around = inner / (0.5 * (inner + outer));
             if D == 3 { around * POLAR_ANGLES[0].sin() } else { around }
         }
-        Domain::Tube { around: Around::Axisymmetric, .. } => 1.0,
+        Domain::Tube { around: Around::Axisymmetric, inner, outer, .. } => {
+            // Next to the axis the stress around it works on short circles: cubic splines of a solid cylinder are stable up to CFL numbers
+            // of 0.2 on P-waves, not 0.49, on 4 and on 8 cells.
+            0.55 + 0.45 * (4.0 * inner / (outer - inner)).min(1.0)
+        }
         Domain::Tube { inner, outer, .. } => inner / (0.5 * (inner + outer)),
         _ => 1.0,
     }
