@@ -155,7 +155,8 @@ impl Total {
                 return Err(CaseError::setting(
                     "extent",
                     "full",
-                    "quarter on a spherical grid, between planes of symmetry that the solution declares",
+                    "quarter on a spherical grid, between three planes of symmetry that the file has to declare, also of an axisymmetric shell: \
+                     [[boundary]] with condition = 'symmetry' and surface = 'X-lower', with surface = 'Y-lower', and with surface = 'Z-lower'",
                 ));
             }
             (Domain::Annulus { inner, outer }, Coordinates::Spherical) if D == 3 => {

@@ -111,6 +111,8 @@ fn every_command_keeps_to_its_schema() {
         ("converge axis-aligned-1d --cells 4,8 --cfl 4", 1),
         ("converge shear-wave --cells 4,8", 0),
         ("run skew-2d --static --cells 4", 0),
+        ("run thick-cylinder --static --cells 4", 0),
+        ("run thick-cylinder --formulation total-lagrangian --cells 4 --periods 0.05", 0),
         ("converge skew-2d --static --cells 4,8", 0),
         (
             "stability axis-aligned-1d --cells 4 --width 0.3 --over shape=gimp,linear --over nu=0,0.3",
