@@ -317,7 +317,8 @@ impl<const D: usize> Statics<D> {
             true => Some(fits(grid, &bases, &lines).map_err(singular)?),
             false => None,
         };
-        let numbering = Numbering::new(&grid.axes, &bases, &faces, &pins);
+        let pinned: Vec<_> = pins.iter().map(|pin| pin.coefficient).collect();
+        let numbering = Numbering::new(&grid.axes, &bases, &faces, &pinned);
         let unknowns = numbering.count;
         let pattern = numbering.pattern().map_err(|_| StaticsError::Memory { unknowns })?;
         let components = array::from_fn(|index| Component::new(index, &bases));
@@ -378,13 +379,14 @@ impl<const D: usize> Statics<D> {
             }
         }
         let Some(fits) = fits else { return };
-        for Pin { component: c, index, face, .. } in pins {
+        for Pin { coefficient, face, .. } in pins {
             face.ask(loads.boundary, Quantity::Displacement, loads.time);
-            let axis = |k: usize| (&fits[k][*c], along(bases, k, *c));
-            let mut of_body = vec![0.0; given[*c].len()];
-            face.set(&components[*c].functions(bases), &face.fit(*c, axis), &mut of_body);
-            for place in numbering.copies(*c, index) {
-                given[*c][place] = of_body[place];
+            let c = coefficient.component;
+            let of_side = face.fit(c, |k| (&fits[k][c], along(bases, k, c)));
+            let mut of_body = vec![0.0; given[c].len()];
+            face.set(&components[c].functions(bases), &of_side, &mut of_body);
+            for place in numbering.copies(coefficient) {
+                given[c][place] = of_body[place];
             }
         }
     }

@@ -8,7 +8,6 @@ use crate::axis::{Axis, End};
 use crate::basis::{Basis, ValueOrSlope};
 use crate::boundary::Face;
 use crate::component::along;
-use crate::statics::rigid::Pin;
 
 /// The functions of one kind of component along an axis that do not vanish in its cells.
 #[derive(Clone, Debug)]
@@ -48,6 +47,13 @@ impl Window {
     }
 }
 
+/// A coefficient of a component, by its index along each axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Coefficient<const D: usize> {
+    pub(super) component: usize,
+    pub(super) index: [usize; D],
+}
+
 /// The unknowns among the coefficients.
 #[derive(Clone, Debug)]
 pub(super) struct Numbering<const D: usize> {
@@ -65,7 +71,7 @@ impl<const D: usize> Numbering<D> {
         axes: &[Axis; D],
         bases: &[[Basis; 2]; D],
         faces: &[Face<D>],
-        pins: &[Pin<D>],
+        pinned: &[Coefficient<D>],
     ) -> Self {
         let windows: [[Window; 2]; D] =
             array::from_fn(|k| array::from_fn(|kind| Window::new(&axes[k], &bases[k][kind])));
@@ -76,7 +82,7 @@ impl<const D: usize> Numbering<D> {
             let functions = functions[c];
             let own: [usize; D] = array::from_fn(|k| along(&windows, k, c).own);
             let is_given = |index: &[usize; D]| {
-                let is_pinned = |pin: &Pin<D>| pin.component == c && pin.index == *index;
+                let own = Coefficient { component: c, index: *index };
                 let on_faces = || {
                     faces.iter().filter(|face| face.moves(c)).any(|face| {
                         let axis = face.side.axis;
@@ -84,7 +90,7 @@ impl<const D: usize> Numbering<D> {
                         index[axis] == end
                     })
                 };
-                pins.iter().any(is_pinned) || on_faces()
+                pinned.contains(&own) || on_faces()
             };
             let mut unknown: Vec<Option<usize>> = Vec::with_capacity(functions.iter().product());
             for place in 0..functions.iter().product() {
@@ -106,7 +112,8 @@ impl<const D: usize> Numbering<D> {
     }
 
     /// The places of a coefficient and of its copies.
-    pub(super) fn copies(&self, c: usize, index: &[usize; D]) -> Vec<usize> {
+    pub(super) fn copies(&self, coefficient: &Coefficient<D>) -> Vec<usize> {
+        let &Coefficient { component: c, index } = coefficient;
         let own: [usize; D] = array::from_fn(|k| along(&self.windows, k, c).own);
         let functions = &self.functions[c];
         let is_copy = |place: &usize| {

@@ -14,13 +14,11 @@ use crate::boundary::{Face, Side};
 use crate::component::along;
 use crate::fit::Line;
 use crate::set_up::{Given, Grid, face};
-use crate::statics::numbering::split;
+use crate::statics::numbering::{Coefficient, split};
 
 /// A coefficient that is given, so that the body cannot move as a whole.
 pub(super) struct Pin<const D: usize> {
-    pub(super) component: usize,
-    /// Its index along each axis.
-    pub(super) index: [usize; D],
+    pub(super) coefficient: Coefficient<D>,
     /// The side on which it lies; its motion is asked for as if it were given.
     pub(super) face: Face<D>,
     /// The place next to it, Cartesian.
@@ -65,7 +63,7 @@ impl<'a, const D: usize> RigidMotions<'a, D> {
         all
     }
 
-    /// What the ends of the axes ask for: combinations of the motions that have to vanish.
+    /// Combinations of the motions that have to vanish at the ends of the axes.
     fn conditions(&self) -> Vec<Vector6<f64>> {
         let mut all = Vec::new();
         for (k, axis) in self.grid.axes.iter().enumerate() {
@@ -100,12 +98,13 @@ impl<'a, const D: usize> RigidMotions<'a, D> {
     }
 }
 
-/// Lower ends, middles and upper ends of all axes.
+/// The ends of all axes, and places between them, of which no two lie across from each other on a circle.
 fn places<const D: usize>(grid: &Grid<D>) -> impl Iterator<Item = SVector<f64, D>> {
-    let of = |axis: &Axis| [axis.lower, 0.5 * (axis.lower + axis.upper), axis.upper];
+    const PARTS: [f64; 4] = [0.0, 0.37, 0.71, 1.0];
+    let of = |axis: &Axis| PARTS.map(|part| axis.lower + part * (axis.upper - axis.lower));
     let along = grid.axes.each_ref().map(of);
-    (0..3_usize.pow(D as u32)).map(move |n| {
-        let index: [usize; D] = split(n, &[3; D]);
+    (0..PARTS.len().pow(D as u32)).map(move |n| {
+        let index: [usize; D] = split(n, &[PARTS.len(); D]);
         SVector::from_fn(|k, _| along[k][index[k]])
     })
 }
@@ -150,8 +149,7 @@ pub(super) fn pins<const D: usize>(
         sums += own * own.transpose();
         let of_side = Given::of(&grid.axes, *side, *component, true);
         pins.push(Pin {
-            component: *component,
-            index: *index,
+            coefficient: Coefficient { component: *component, index: *index },
             face: face(grid, lines, *side, &of_side),
             X: grid.coordinates.place(place),
         });
@@ -236,8 +234,7 @@ mod tests {
         let pins = pins(&grid, &bases, &lines);
         // No coefficient is given twice.
         for (n, pin) in pins.iter().enumerate() {
-            let is_other =
-                |other: &Pin<D>| (other.component, other.index) != (pin.component, pin.index);
+            let is_other = |other: &Pin<D>| other.coefficient != pin.coefficient;
             assert!(pins[n + 1..].iter().all(is_other));
         }
         pins.len()
