@@ -116,7 +116,7 @@ pub(super) fn pins<const D: usize>(
     bases: &[[Basis; 2]; D],
     lines: &[Line; D],
 ) -> Vec<Pin<D>> {
-    /// Of a sum of squares that is one.
+    /// A motion is none whose sum of squares is below this, where a whole one has one.
     const NONE: f64 = 1e-9;
     let motions = RigidMotions::new(grid);
     // Numbers without a motion are no motions.
