@@ -378,7 +378,7 @@ where
     let Total { degree, mass, composition, .. } = *total;
     // The mass matrix is a product over the axes.
     if is_uneven(exact) {
-        let instead = "updated-lagrangian, with --layout clipped where sides are no walls, for a density that differs from place to place";
+        let instead = "updated-lagrangian for a density that differs from place to place, with --layout clipped where sides are no walls";
         return Err(CaseError::setting("formulation", "total-lagrangian", instead));
     }
     let set_up = SetUp {
