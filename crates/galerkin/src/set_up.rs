@@ -223,13 +223,16 @@ pub(super) fn face<const D: usize>(
 }
 
 /// All index tuples below `counts`, the first index fastest.
-fn products<const D: usize>(counts: [usize; D]) -> impl Iterator<Item = [usize; D]> {
-    (0..counts.iter().product()).map(move |mut rest| {
-        counts.map(|count| {
-            let index = rest % count;
-            rest /= count;
-            index
-        })
+pub(super) fn products<const D: usize>(counts: [usize; D]) -> impl Iterator<Item = [usize; D]> {
+    (0..counts.iter().product()).map(move |place| split(place, &counts))
+}
+
+/// The index tuple of a place, the first index fastest.
+pub(super) fn split<const D: usize>(mut place: usize, counts: &[usize; D]) -> [usize; D] {
+    counts.map(|count| {
+        let index = place % count;
+        place /= count;
+        index
     })
 }
 

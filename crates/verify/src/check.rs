@@ -668,7 +668,7 @@ fn traction_finding<const D: usize>(
     if places.is_empty() {
         return None;
     }
-    let stress = largest_stress(solution, places, samples);
+    let stress = largest(places, samples, &|X, t| solution.first_piola_kirchhoff(X, t).amax());
     let mut found = Comparison::new(format!("traction on {surface}"), "P N");
     for (X, N, t) in places {
         let expected = solution.first_piola_kirchhoff(X, *t) * N;
@@ -679,15 +679,15 @@ fn traction_finding<const D: usize>(
     Some(found.finding())
 }
 
-/// The largest stress in the body and on a surface, where it may be larger than at the samples within.
-fn largest_stress<const D: usize>(
-    solution: &dyn Solution<f64, D>,
+/// The largest value of a field in the body and on a surface, where it may be larger than at the samples within.
+fn largest<const D: usize>(
     places: &[(SVector<f64, D>, SVector<f64, D>, f64)],
     samples: &[(SVector<f64, D>, f64)],
+    field: &dyn Fn(&SVector<f64, D>, f64) -> f64,
 ) -> f64 {
     let within = samples.iter().map(|(X, t)| (X, *t));
     let all = within.chain(places.iter().map(|(X, _, t)| (X, *t)));
-    all.map(|(X, t)| solution.first_piola_kirchhoff(X, t).amax()).fold(0.0, f64::max)
+    all.map(|(X, t)| field(X, t)).fold(0.0, f64::max)
 }
 
 fn boundary_findings<const D: usize>(
@@ -698,16 +698,11 @@ fn boundary_findings<const D: usize>(
 ) -> Vec<Finding> {
     let name = |what: &str| format!("{what} on {}", boundary.surface);
     // Scales are those of the whole body: on the boundary itself everything may vanish.
-    let largest = |field: &dyn Fn(&SVector<f64, D>, f64) -> f64| {
-        let within = samples.iter().map(|(X, t)| (X, *t));
-        let all = within.chain(places.iter().map(|(X, _, t)| (X, *t)));
-        all.map(|(X, t)| field(X, t)).fold(0.0, f64::max)
-    };
-    let stress = largest_stress(solution, places, samples);
+    let stress = largest(places, samples, &|X, t| solution.first_piola_kirchhoff(X, t).amax());
     let traction = |X, N: &SVector<f64, D>, t| solution.first_piola_kirchhoff(X, t) * N;
     match boundary.condition {
         Condition::Sliding | Condition::Symmetry => {
-            let length = largest(&|X, t| solution.displacement(X, t).amax());
+            let length = largest(places, samples, &|X, t| solution.displacement(X, t).amax());
             let mut normal = Comparison::new(name("u.N"), "0");
             let mut shear = Comparison::new(name("shear"), "0");
             for (X, N, t) in places {

@@ -8,6 +8,7 @@ use crate::axis::{Axis, End};
 use crate::basis::{Basis, ValueOrSlope};
 use crate::boundary::Face;
 use crate::component::along;
+use crate::set_up::split;
 
 /// The functions of one kind of component along an axis that do not vanish in its cells.
 #[derive(Clone, Debug)]
@@ -166,15 +167,6 @@ impl<const D: usize> Numbering<D> {
             places.push(joined(&index, &self.functions[c]));
         }
     }
-}
-
-/// The index tuple of a place, the first index fastest.
-pub(super) fn split<const D: usize>(mut place: usize, counts: &[usize; D]) -> [usize; D] {
-    counts.map(|count| {
-        let index = place % count;
-        place /= count;
-        index
-    })
 }
 
 /// The place of an index tuple.

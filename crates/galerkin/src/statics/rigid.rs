@@ -13,8 +13,8 @@ use crate::basis::Basis;
 use crate::boundary::{Face, Side};
 use crate::component::along;
 use crate::fit::Line;
-use crate::set_up::{Given, Grid, face};
-use crate::statics::numbering::{Coefficient, split};
+use crate::set_up::{Given, Grid, face, products};
+use crate::statics::numbering::Coefficient;
 
 /// A coefficient that is given, so that the body cannot move as a whole.
 pub(super) struct Pin<const D: usize> {
@@ -103,10 +103,7 @@ fn places<const D: usize>(grid: &Grid<D>) -> impl Iterator<Item = SVector<f64, D
     const PARTS: [f64; 4] = [0.0, 0.37, 0.71, 1.0];
     let of = |axis: &Axis| PARTS.map(|part| axis.lower + part * (axis.upper - axis.lower));
     let along = grid.axes.each_ref().map(of);
-    (0..PARTS.len().pow(D as u32)).map(move |n| {
-        let index: [usize; D] = split(n, &[PARTS.len(); D]);
-        SVector::from_fn(|k, _| along[k][index[k]])
-    })
+    products([PARTS.len(); D]).map(move |index| SVector::from_fn(|k, _| along[k][index[k]]))
 }
 
 /// Coefficients that hold the body against the rigid motions that its sides leave free; none where they leave none. Fewer than there are
@@ -177,10 +174,7 @@ fn candidates<const D: usize>(grid: &Grid<D>, bases: &[[Basis; 2]; D]) -> Vec<Ca
                 End::Periodic => grid.axes[k].cells,
                 _ => along(bases, k, component).functions,
             });
-            for n in 0..3_usize.pow(D as u32 - 1) {
-                let mut parts = split::<D>(n, &[3; D]);
-                // The digits of the other axes, moved up by one from this axis on.
-                parts[side.axis..].rotate_right(1);
+            for parts in products::<D>(array::from_fn(|k| if k == side.axis { 1 } else { 3 })) {
                 let index = array::from_fn(|k| {
                     let last = counts[k] - 1;
                     match (k == side.axis, grid.axes[k].ends[0]) {

@@ -5,10 +5,11 @@ use mmsmith_sparse::Pattern;
 use mmsmith_threads::each_chunk;
 use nalgebra::{SMatrix, SVector};
 
-use super::numbering::{Numbering, joined, split};
+use super::numbering::{Numbering, joined};
 use crate::basis::{Basis, ValueOrSlope};
 use crate::component::{Component, along};
 use crate::quadrature::Quadrature;
+use crate::set_up::split;
 
 /// Terms of a gradient at a point: the value and the slopes.
 const MOST_TERMS: usize = 4;
