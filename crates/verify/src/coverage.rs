@@ -12,7 +12,7 @@ use std::fmt;
 use crate::across::Across;
 use crate::case::law;
 use crate::check::{CheckError, with};
-use crate::difference::derivative;
+use crate::difference::slope;
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
 use crate::points;
@@ -163,7 +163,7 @@ where
             let column = |s| -> SVector<f64, D> {
                 solution.first_piola_kirchhoff(&with(&X, J, s), t).column(J).into_owned()
             };
-            let slope = derivative(column, X[J], points::reach(&domain, &X, J)).value / density;
+            let slope = slope(column, X[J], points::reach(&domain, &X, J)) / density;
             for i in 0..D {
                 squares.stress[i][J] += slope[i] * slope[i];
             }

@@ -1,12 +1,12 @@
 //! `mms coverage`: which terms of the momentum balance each solution exercises, and which solutions test everything.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use mmsmith_verify::{Part, Share, coverage as measure, smallest_set};
 use serde_json::{Map, Value, json};
 
 use crate::arguments::CoverageOptions;
 use crate::json::Output;
-use crate::library::{Subject, names};
+use crate::library::{Selection, names};
 use crate::table::Table;
 use crate::terminal;
 
@@ -20,9 +20,7 @@ pub(crate) fn coverage(options: &CoverageOptions) -> Result<bool> {
     let names = if options.solutions.is_empty() { names() } else { options.solutions.clone() };
     let mut shares = Vec::new();
     for name in &names {
-        let subject = Subject::new(name, &[])?;
-        let Some(solution) = subject.solutions.first() else { bail!("{name} cannot be built") };
-        shares.push(measure(solution, POINTS)?);
+        shares.push(measure(&Selection::new(name, &[])?.build()?, POINTS)?);
     }
     let set: Vec<&String> = smallest_set(&shares, THRESHOLD).iter().map(|&i| &names[i]).collect();
     let missing: Vec<Part> = Part::all()

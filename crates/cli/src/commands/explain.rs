@@ -3,7 +3,7 @@
 mod compare;
 mod deformation;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use mmsmith_expr::{Expr, OperationCount};
 use mmsmith_solutions::CATALOGUE;
 use mmsmith_spec::{Around, Domain, Fields, SolvedCondition, Spec};
@@ -18,7 +18,7 @@ use super::problem::Problem;
 use super::{blind, predict, profile};
 use crate::arguments::{ExplainOptions, SchemeOptions};
 use crate::json::Output;
-use crate::library::{Selection, Subject, specification};
+use crate::library::{Selection, specification};
 use crate::table::Table;
 use crate::{number, terminal};
 use compare::Comparison;
@@ -86,9 +86,7 @@ impl Exercise {
 
 fn exercises(name: &str) -> Result<Vec<Exercise>> {
     let shares_of = |name: &str| -> Result<Vec<Share>> {
-        let subject = Subject::new(name, &[])?;
-        let Some(solution) = subject.solutions.first() else { bail!("{name} cannot be built") };
-        Ok(coverage(solution, POINTS)?)
+        Ok(coverage(&Selection::new(name, &[])?.build()?, POINTS)?)
     };
     let library = CATALOGUE
         .iter()
