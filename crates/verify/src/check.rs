@@ -11,6 +11,7 @@ use mmsmith_runtime::{
     Surface,
 };
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -351,6 +352,12 @@ impl<const D: usize> Comparison<D> {
         self.points.push((difference, own_error, *at.0, at.1));
     }
 
+    /// Adds the points of later samples.
+    fn join(&mut self, later: Self) {
+        self.scale = self.scale.max(later.scale);
+        self.points.extend(later.points);
+    }
+
     fn finding(self) -> Finding {
         let Self { what, against, scale, points } = self;
         let allowed = |own_error: f64| OWN_ERROR_FACTOR * own_error + TOLERANCE * scale;
@@ -415,12 +422,40 @@ pub(crate) fn with<const D: usize>(
     moved
 }
 
+/// Samples that one thread compares: histories take milliseconds each, and all else microseconds.
+const SAMPLES_AT_ONCE: usize = 4;
+
 fn field_findings<const D: usize>(
     solution: &dyn Solution<f64, D>,
     law: Option<&Law<f64, D>>,
     samples: &[(SVector<f64, D>, f64)],
     size: f64,
 ) -> Vec<Finding>
+where
+    f64: Precision<D>,
+{
+    let parts: Vec<Vec<Comparison<D>>> = samples
+        .par_chunks(SAMPLES_AT_ONCE)
+        .map(|samples| field_comparisons(solution, law, samples, size))
+        .collect();
+    let mut parts = parts.into_iter();
+    let Some(mut all) = parts.next() else { return Vec::new() };
+    for part in parts {
+        all.iter_mut().zip(part).for_each(|(all, part)| all.join(part));
+    }
+    all.into_iter()
+        .filter(|comparison| !comparison.points.is_empty())
+        .map(Comparison::finding)
+        .collect()
+}
+
+/// The comparisons of fields at some samples, each without points where nothing is compared.
+fn field_comparisons<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    law: Option<&Law<f64, D>>,
+    samples: &[(SVector<f64, D>, f64)],
+    size: f64,
+) -> Vec<Comparison<D>>
 where
     f64: Precision<D>,
 {
@@ -540,11 +575,7 @@ where
         let all = solution.fields(X, *t);
         together.add(at, disagreement(&all, &own, stiffness, terms), 0.0, 1.0);
     }
-    [v, a, H, F, J, P, W, in_time, in_space, b, together]
-        .into_iter()
-        .filter(|comparison| !comparison.points.is_empty())
-        .map(Comparison::finding)
-        .collect()
+    vec![v, a, H, F, J, P, W, in_time, in_space, b, together]
 }
 
 /// Where there is no stress across: the law in space, at the stretch that is told, has none there, and in the plane the stress of the
