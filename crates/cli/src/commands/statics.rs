@@ -5,9 +5,9 @@ mod told;
 use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    Case, Formulation, FrameOutput, Integrator, Layout as Points, Named, ORDER_TOLERANCE, Scheme,
-    Shape, Start, StaticCase, StaticErrors, StaticProblem, StaticRow, StaticStudy, Total, Transfer,
-    Volume, expected_of_statics, is_at_rest, usual_moment,
+    Case, Formulation, FrameOutput, Integrator, Layout as Points, Named, ORDER_TOLERANCE, PerNorm,
+    Scheme, Shape, Start, StaticCase, StaticErrors, StaticProblem, StaticRow, StaticStudy, Total,
+    Transfer, Volume, expected_of_statics, is_at_rest, usual_moment,
 };
 use serde_json::{Value, json};
 
@@ -227,6 +227,9 @@ pub(super) fn converge(selection: Selection, options: &ConvergeOptions) -> Resul
     let problem = Problem::new(&options.name, selection, &options.scheme, &options.statics)?;
     let cases = options.cells.iter().map(|cells| problem.on(*cells)).collect::<Result<Vec<_>>>()?;
     let expected = match options.expect.as_deref().map(expect::parse).transpose()? {
+        Some(all) if all.v != PerNorm::default() => {
+            bail!("--expect: a body at rest has no velocity v; its fields are u, F and P")
+        }
         Some(all) => StaticErrors { u: all.u, F: all.F, P: all.P },
         None => expected_of_statics(&problem.exact, &problem.case.total),
     };
@@ -244,7 +247,7 @@ pub(super) fn converge(selection: Selection, options: &ConvergeOptions) -> Resul
 struct Orders<'a> {
     problem: &'a Problem,
     cases: Vec<StaticProblem<'a>>,
-    expected: StaticErrors<mmsmith_verify::PerNorm<Option<f64>>>,
+    expected: StaticErrors<PerNorm<Option<f64>>>,
     tolerance: f64,
     /// Whether the orders are more than the promises of theory, which are no failure on two grids.
     is_strict: bool,

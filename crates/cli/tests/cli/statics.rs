@@ -159,6 +159,19 @@ fn stated(
     text
 }
 
+/// The strain of a body at rest is zero but for rounding, which is no other equilibrium.
+#[test]
+fn a_body_at_rest_under_its_initial_stress_is_reached() {
+    let place = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/data/specs/told/prestress-at-rest.toml");
+    let called = mms(place.path(), &format!("converge {} --cells 4,8", file.display()));
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+    assert!(!called.stdout.contains("NOT REACHED"), "{}", called.stdout);
+    let moving = "converge swirl --static --cells 4,8 --expect v=2";
+    refuses(place.path(), moving, &["no velocity v", "u, F and P"]);
+}
+
 #[test]
 fn bodies_that_nothing_holds_have_the_orders_of_held_ones() {
     const TRACTION: &str = "condition = 'prescribed-traction'";
