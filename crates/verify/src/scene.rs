@@ -154,6 +154,8 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) walls: [[bool; 2]; D],
     /// Conditions on the two sides along each axis of a box; for an annulus the first pair, on the inner and the outer rim.
     pub(crate) sides: [[Condition; 2]; D],
+    /// Which of these sides are walls that mirror the motion, for splines that are continued by their mirror images.
+    pub(crate) mirrors: [[bool; 2]; D],
     pub(crate) domain: Domain<f64, D>,
     /// Cosine and sine of the angle of the grid's axes against those of the body; the grid is given in its own.
     pub(crate) turn: [f64; 2],
@@ -270,7 +272,11 @@ impl<const D: usize> Scene<D> {
             _ => return Err(unknown()),
         };
         let (turn, boundary) = ([1.0, 0.0], Vec::new());
-        Ok(Self { lower, spacing, cells, walls, sides, domain, turn, boundary, size })
+        let mirrors = match case.scheme.updated() {
+            Some(_) => [[false; 2]; D],
+            None => mirrors(solution, &sides),
+        };
+        Ok(Self { lower, spacing, cells, walls, sides, mirrors, domain, turn, boundary, size })
     }
 
     /// As [`new`](Self::new) for particles that are clipped with the boundary: sides need not lie on lines of the grid.
@@ -337,7 +343,8 @@ impl<const D: usize> Scene<D> {
             }
             _ => return Err(unknown()),
         };
-        Ok(Self { lower, spacing, cells, walls, sides, domain, turn, boundary, size })
+        let mirrors = [[false; 2]; D];
+        Ok(Self { lower, spacing, cells, walls, sides, mirrors, domain, turn, boundary, size })
     }
 
     /// The largest coordinate that a particle at rest may have, and at least the size of the body: what positions are rounded
@@ -502,6 +509,54 @@ fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
         }
         _ => "",
     }
+}
+
+/// Which sides of a body are walls that mirror its motion.
+fn mirrors<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    sides: &[[Condition; 2]; D],
+) -> [[bool; 2]; D] {
+    let around = matches!(solution.domain(), Domain::Tube { .. });
+    std::array::from_fn(|axis| {
+        let both = match axis {
+            1 if around => [Surface::FirstAngle, Surface::LastAngle],
+            _ => [Surface::Lower(axis), Surface::Upper(axis)],
+        };
+        [0, 1].map(|end| sides[axis][end].is_wall() && is_mirrored(solution, both[end]))
+    })
+}
+
+/// Whether a plane side mirrors the motion: the displacement beyond it is the mirror image of that inside. A side on which a body slides need
+/// not: `u = X^2 (1 - X)` has a second slope at `X = 0`, where its mirror image has the opposite one.
+pub(crate) fn is_mirrored<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    surface: Surface,
+) -> bool {
+    const PLACES: usize = 16;
+    /// Distances from the side, as shares of the body's size.
+    const DISTANCES: [f64; 2] = [0.03, 0.11];
+    /// Rounding, as a share of the largest displacement.
+    const ROUNDING: f64 = 1e-9;
+    let domain = solution.domain();
+    let Some(size) = points::size(&domain) else { return false };
+    let (mut difference, mut largest) = (0.0_f64, 0.0_f64);
+    for n in 0..PLACES {
+        let Some((X, N)) = points::surface(&domain, surface, n) else { return false };
+        let t = solution.period() * points::quasirandom(n, D, D + 1);
+        for distance in DISTANCES.map(|share| share * size) {
+            let inside = solution.displacement(&(X - N * distance), t);
+            let beyond = solution.displacement(&(X + N * distance), t);
+            let image = inside - N * (2.0 * inside.dot(&N));
+            let here = (beyond - image).amax();
+            // Also where the formulas have no value beyond.
+            if !here.is_finite() {
+                return false;
+            }
+            difference = difference.max(here);
+            largest = largest.max(inside.amax());
+        }
+    }
+    difference <= ROUNDING * largest
 }
 
 /// Whether the planes of symmetry are modelled as walls.

@@ -17,7 +17,7 @@ use crate::kept_stress::KeptStress;
 use crate::named::Named;
 use crate::points;
 use crate::precision::Precision;
-use crate::scene::Scene;
+use crate::scene::{Scene, is_mirrored};
 use crate::scheme::Total;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
@@ -130,7 +130,7 @@ impl Total {
                     lower: lower[k],
                     upper: upper[k],
                     cells: scene.cells[k],
-                    ends: scene.sides[k].map(|side| end(k, side)),
+                    ends: ends(scene, k),
                 })
             }
             (Domain::Annulus { inner, outer }, Coordinates::Polar) if D == 2 => {
@@ -220,7 +220,7 @@ impl Total {
                         lower: *from,
                         upper: *to,
                         cells: count((to - from) * mean).max(self.degree),
-                        ends: scene.sides[1].map(|side| end(1, side)),
+                        ends: ends(scene, 1 % D),
                     },
                     Around::Whole => Axis {
                         lower: 0.0,
@@ -231,12 +231,8 @@ impl Total {
                     _ => Axis { lower: 0.0, upper: TAU, cells: 1, ends: [End::Uniform; 2] },
                 };
                 let (lower, upper) = (*lower, *upper);
-                let along = Axis {
-                    lower,
-                    upper,
-                    cells: scene.cells[2 % D],
-                    ends: scene.sides[2 % D].map(|side| end(2 % D, side)),
-                };
+                let along =
+                    Axis { lower, upper, cells: scene.cells[2 % D], ends: ends(scene, 2 % D) };
                 std::array::from_fn(|k| [across, around, along][k])
             }
             (Domain::Tube { .. }, _) => {
@@ -280,18 +276,22 @@ fn is_between_walls<const D: usize>(exact: &dyn Solution<f64, D>) -> bool {
         return false;
     }
     matches!(exact.domain(), Domain::Box { .. })
-        && exact.boundaries().iter().all(|boundary| boundary.condition.is_wall())
+        && exact
+            .boundaries()
+            .iter()
+            .all(|boundary| boundary.condition.is_wall() && is_mirrored(exact, boundary.surface))
 }
 
-/// The kind of end that a condition gives an axis.
-fn end(axis: usize, condition: Condition) -> End {
-    match condition.is_wall() {
+/// The ends of an axis: splines are continued by their mirror images beyond walls that mirror the motion. A side on which the body slides alone
+/// gives each component its condition, since mirror images would have no second slope there along the axis.
+fn ends<const D: usize>(scene: &Scene<D>, axis: usize) -> [End; 2] {
+    [0, 1].map(|end| match scene.mirrors[axis][end] {
         true => End::Wall,
-        false => open(axis, condition),
-    }
+        false => open(axis, scene.sides[axis][end]),
+    })
 }
 
-/// The end at which each component of the grid's coordinates has its own condition: on a rim, which mirrors nothing, of walls too.
+/// The end at which each component of the grid's coordinates has its own condition: of walls that mirror nothing too.
 fn open(axis: usize, condition: Condition) -> End {
     End::Open(std::array::from_fn(|component| condition.of(axis, component)))
 }
