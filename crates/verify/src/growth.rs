@@ -31,17 +31,10 @@ use crate::flow::has_memory;
 use crate::precision::Precision;
 use crate::scene::Scene;
 use crate::scheme::{Scheme, Total};
-use crate::state_of_stress::{Extremes, Rates, extremes, largest_pressure, moduli};
+use crate::state_of_stress::{Extremes, Rates, extremes, is_harmless, moduli};
 
 /// A factor by which no digit of double precision is left: growth is not followed beyond it.
 pub const MOST_GROWTH: f64 = 1e16;
-
-/// The pressure over the shear modulus up to which growth is not looked for where nobody asks for it.
-///
-/// A pressure p that varies as a half wave over a body of length l has a second gradient of `p (pi/l)^2`, and the longest wave without divergence
-/// that the sides hold has the stiffness `2 mu (pi/l)^2` by shear: it does not grow below `p = 2 mu`. Pressures of shorter waves have larger
-/// second gradients; in swirl, whose pressure has waves of a quarter of the body, `p = 5 mu` makes errors three times as large in a quarter period.
-pub const HARMLESS_PRESSURE: f64 = 2.0;
 
 /// A factor of growth that costs a digit.
 pub const A_DIGIT: f64 = 10.0;
@@ -177,8 +170,8 @@ pub struct Harm {
     pub extremes: Extremes,
 }
 
-/// The growth of errors in a motion until so many periods where it costs a digit or more: an ordinary motion, with a pressure of less than
-/// [`HARMLESS_PRESSURE`] shear moduli or rates that add up to less than a digit, takes some evaluations of the law alone. None where the law has
+/// The growth of errors in a motion until so many periods where it costs a digit or more, or where waves lose their stiffness: an ordinary motion, which is
+/// [harmless](Extremes::are_harmless) or has rates that add up to less than a digit, takes some evaluations of the law alone. None where the law has
 /// memory.
 #[must_use]
 pub fn harmful_growth(exact: &AnySolution<f64>, periods: f64) -> Option<Harm> {
@@ -207,7 +200,9 @@ pub fn harmful_growth(exact: &AnySolution<f64>, periods: f64) -> Option<Harm> {
         Some(Ok(found)) => (found.factor, true),
         _ => (estimate.min(2.0 * MOST_GROWTH), false),
     };
-    (factor >= A_DIGIT).then_some(Harm { factor, measured, extremes })
+    // Where waves are not stiff, those that are shorter than the measured ones grow more.
+    let is_harm = factor >= A_DIGIT || extremes.wave_stiffness <= 0.0;
+    is_harm.then_some(Harm { factor, measured, extremes })
 }
 
 /// The extremes of a motion and the estimate of its growth, where disturbances may grow by a digit.
@@ -216,11 +211,15 @@ where
     f64: Precision<D>,
 {
     let law = law_of_body::<f64, D>(exact).ok()?;
-    if largest_pressure(exact, &law, periods) < HARMLESS_PRESSURE {
+    if is_harmless(exact, &law, periods) {
         return None;
     }
     let (extremes, rates) = extremes(exact, &law, periods)?;
-    let estimate = estimate(&rates, exact, 1);
+    // The rates are those of pressures; where plane waves are not stiff the shortest grow without bound.
+    let estimate = match extremes.wave_stiffness > 0.0 {
+        true => estimate(&rates, exact, 1),
+        false => 2.0 * MOST_GROWTH,
+    };
     (estimate >= A_DIGIT).then_some((extremes, estimate))
 }
 

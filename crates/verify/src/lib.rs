@@ -88,8 +88,8 @@ pub use evaluate::{FieldRow, evaluate, evaluate_with_tangent};
 pub use flow::{flows_smoothly, has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};
 pub use growth::{
-    A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,
-    WaveGrowth, extremes_of, growth, harmful_growth, lambda_over_mu,
+    A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, Harm, MOST_GROWTH, WaveGrowth,
+    extremes_of, growth, harmful_growth, lambda_over_mu,
 };
 pub use half_plane::{is_axisymmetric, needs_space};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};

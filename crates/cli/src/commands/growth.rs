@@ -2,8 +2,8 @@
 
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
-    A_DIGIT, Extremes, Growth, GrowthError, GrowthSettings, HARMLESS_PRESSURE, Harm, MOST_GROWTH,
-    Volume, extremes_of, growth, harmful_growth, lambda_over_mu,
+    A_DIGIT, Extremes, Growth, GrowthError, GrowthSettings, Harm, MOST_GROWTH, Volume, extremes_of,
+    growth, harmful_growth, lambda_over_mu,
 };
 use serde_json::{Map, Value, json};
 
@@ -36,19 +36,19 @@ pub(crate) fn times(factor: f64) -> String {
 pub(crate) fn instead(selection: &Selection, periods: f64) -> String {
     let own = smaller(selection, periods);
     let own = own.map(|A| {
-        format!("--set A={} (a pressure of two shear moduli at most), or ", number::rounded(A, 1))
+        format!("--set A={} (a pressure of two shear moduli at most), or ", number::exact(A))
     });
     format!("{}a motion with J = 1, as {ISOCHORIC}", own.unwrap_or_default())
 }
 
-/// The largest amplitude, rounded down, whose pressure stays harmless.
+/// The largest amplitude, rounded down to one digit, whose pressure stays harmless.
 fn smaller(selection: &Selection, periods: f64) -> Option<f64> {
     const HALVINGS: usize = 12;
     let (_, present) = selection.parameters().iter().find(|(name, _)| *name == "A")?;
     let is_harmless = |share: f64| {
         let changed = selection.with(&[("A".to_owned(), share * present)]).ok()?;
         let found = extremes_of(&changed.build().ok()?, periods)?;
-        Some(found.pressure_over_mu <= HARMLESS_PRESSURE)
+        Some(found.are_harmless())
     };
     let (mut harmless, mut harmful) = (1e-6, 1.0);
     if !is_harmless(harmless)? || is_harmless(harmful)? {
@@ -58,7 +58,16 @@ fn smaller(selection: &Selection, periods: f64) -> Option<f64> {
         let middle = 0.5 * f64::sqrt(harmless * harmful) + 0.25 * (harmless + harmful);
         if is_harmless(middle)? { harmless = middle } else { harmful = middle }
     }
-    Some(0.9 * harmless * present)
+    Some(one_digit_of(harmless * present))
+}
+
+/// The number with one significant digit at or next below a number above zero.
+fn one_digit_of(number: f64) -> f64 {
+    let power = number.log10().floor() as i32;
+    let unit = |power: i32| format!("1e{power}").parse::<f64>().unwrap_or(number);
+    // By way of text, so that it is the nearest number to its digits.
+    let digit = (number / unit(power)).floor();
+    format!("{digit}e{power}").parse().unwrap_or(number)
 }
 
 /// Causes of errors that lie in the motion and the material, not in the scheme: disturbances that grow, and locking next to
@@ -124,10 +133,10 @@ impl Warnings {
         let mut text = String::new();
         if let Some((found, instead)) = &self.growth {
             text += &format!(
-                "warning: errors grow {} in this motion, whatever the scheme: its pressure of up to {} shear moduli drives every disturbance \
-                 on. Errors and orders below that floor tell of the motion, and are not judged.\n  Judge by {instead}; mms stability --exact tells more.\n",
+                "warning: errors grow {} in this motion, whatever the scheme: {}. Errors and orders below that floor tell of the motion, and \
+                 are not judged.\n  Judge by {instead}; mms stability --exact tells more.\n",
                 grown(found),
-                number::rounded(found.extremes.pressure_over_mu, DIGITS),
+                cause(&found.extremes),
             );
         }
         if let Some(quotient) = self.locking {
@@ -154,6 +163,18 @@ impl Warnings {
     }
 }
 
+/// What drives disturbances on.
+fn cause(extremes: &Extremes) -> String {
+    match extremes.wave_stiffness > 0.0 {
+        true => format!(
+            "its pressure of up to {} shear moduli drives every disturbance on",
+            number::rounded(extremes.pressure_over_mu, DIGITS)
+        ),
+        false => "plane waves lose their stiffness in it, so that the law is not elliptic there"
+            .to_owned(),
+    }
+}
+
 /// A factor of growth in words, and whether it is measured.
 fn grown(found: &Harm) -> String {
     match found.measured {
@@ -165,15 +186,15 @@ fn grown(found: &Harm) -> String {
 /// Pressure, shear and the growth of a coarse wave, as `check` and `explain` tell them.
 pub(crate) struct Told {
     extremes: Option<Extremes>,
-    /// None where the pressure is too small to drive a disturbance on.
-    growth: Option<Result<Growth, String>>,
+    /// None where nothing drives a disturbance on.
+    growth: Option<Result<Growth, GrowthError>>,
 }
 
 impl Told {
     /// Until so many periods, with at most so much work; beyond it it is said that it was left out.
     pub(crate) fn measure(exact: &AnySolution<f64>, periods: f64, most_work: f64) -> Self {
         let extremes = extremes_of(exact, periods);
-        if extremes.as_ref().is_some_and(|own| own.pressure_over_mu <= HARMLESS_PRESSURE) {
+        if extremes.as_ref().is_some_and(Extremes::are_harmless) {
             return Self { extremes, growth: None };
         }
         let settings = GrowthSettings {
@@ -190,7 +211,7 @@ impl Told {
             Err(GrowthError::Work { .. }) => on(Some(COARSE)),
             found => found,
         };
-        Self { extremes, growth: Some(found.map_err(|error| error.to_string())) }
+        Self { extremes, growth: Some(found) }
     }
 
     /// Lines of it.
@@ -201,7 +222,11 @@ impl Told {
         }
         text += &match &self.growth {
             None => format!(
-                "{margin}the exact motion is stable: its pressure is too small to drive a disturbance on\n"
+                "{margin}the exact motion is stable: its pressure is too small to drive a disturbance on, and all plane waves are stiff\n"
+            ),
+            Some(Ok(found)) if found.extremes.wave_stiffness <= 0.0 => format!(
+                "{margin}the exact motion is UNSTABLE: a disturbance in one wave grows {} in a period, and shorter waves grow more\n",
+                times(found.factor)
             ),
             Some(Ok(found)) if found.factor < A_DIGIT => format!(
                 "{margin}the exact motion is stable: a disturbance in one wave grows {} in a period\n",
@@ -212,9 +237,15 @@ impl Told {
                 times(found.factor),
                 found.digits
             ),
-            Some(Err(reason)) => format!(
-                "{margin}growth of disturbances of the exact motion not measured: {reason} (mms stability --exact does)\n"
-            ),
+            Some(Err(reason)) => {
+                let elsewhere = match reason {
+                    GrowthError::Work { .. } => " (mms stability --exact does)",
+                    _ => "",
+                };
+                format!(
+                    "{margin}growth of disturbances of the exact motion not measured: {reason}{elsewhere}\n"
+                )
+            }
         };
         text
     }
@@ -232,7 +263,7 @@ impl Told {
                 document.insert("digits".into(), json!(found.digits));
             }
             Some(Err(reason)) => {
-                document.insert("not_measured".into(), json!(reason));
+                document.insert("not_measured".into(), json!(reason.to_string()));
             }
         }
         document.into()
@@ -242,8 +273,15 @@ impl Told {
 /// Largest pressure and shear in words.
 pub(crate) fn of_extremes(extremes: &Extremes) -> String {
     let Extremes { pressure, pressure_over_mu, shear, change_of_volume, .. } = extremes;
+    let lost = match extremes.wave_stiffness > 0.0 {
+        true => String::new(),
+        false => format!(
+            "; plane waves lose their stiffness, which falls to {} of that at rest: the law is not elliptic there, and the shortest waves grow most",
+            number::rounded(extremes.wave_stiffness, DIGITS)
+        ),
+    };
     format!(
-        "largest pressure {}, {} shear moduli; largest shear {}; largest |J - 1| {}",
+        "largest pressure {}, {} shear moduli; largest shear {}; largest |J - 1| {}{lost}",
         number::rounded(*pressure, DIGITS),
         number::rounded(*pressure_over_mu, DIGITS),
         number::rounded(*shear, DIGITS),

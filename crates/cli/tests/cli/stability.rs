@@ -253,6 +253,29 @@ fn growth_of_the_exact_motion_is_told_as_a_table_and_as_json() {
     refuses(place, "stability block-j2 --exact", &["the law has memory"]);
 }
 
+/// A small pressure is no stability where plane waves have no stiffness left.
+#[test]
+fn motions_in_which_waves_lose_their_stiffness_are_not_called_stable() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for name in ["pressed-beyond-its-limit", "prestress-of-pressure"] {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join(format!("../../tests/data/specs/told/{name}.toml"));
+        let file = file.display();
+        for command in ["check", "explain"] {
+            let called = mms(place, &format!("{command} {file}"));
+            assert!(called.stdout.contains("the exact motion is UNSTABLE"), "{}", called.stdout);
+            assert!(called.stdout.contains("waves lose their stiffness"), "{}", called.stdout);
+        }
+        let measured = mms(place, &format!("stability {file} --exact --json growth.json"));
+        let growth = read_json(&place.join("growth.json"))["rows"][0].clone();
+        assert!(growth["factor"].as_f64().unwrap() > 10.0, "{}", measured.stdout);
+        assert!(growth["extremes"]["wave_stiffness"].as_f64().unwrap() <= 0.0, "{growth}");
+        let run = mms(place, &format!("run {file} --cells 8 --formulation total-lagrangian"));
+        assert!(run.stdout.contains("warning: errors grow"), "{}", run.stdout);
+    }
+}
+
 #[test]
 fn commands_warn_of_motions_that_are_unstable_and_of_none_that_are_not() {
     let place = tempfile::tempdir().expect("a folder");
