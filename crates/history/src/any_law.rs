@@ -116,6 +116,14 @@ impl AnyLaw {
     }
 }
 
+impl AnyLaw {
+    /// Whether variables begin with other values along X than along Y.
+    #[must_use]
+    pub fn begins_along_axes(&self) -> bool {
+        matches!(self, Self::Flow(flow) if flow.is_on_yield)
+    }
+}
+
 /// Calls a function of whatever law there is.
 macro_rules! each {
     ($own:expr, $law:ident => $call:expr) => {
@@ -140,8 +148,12 @@ impl LawWithHistory for AnyLaw {
         each!(self, law => law.variables())
     }
 
-    fn initial<N: Number>(&self, constants: &[N]) -> Vec<N> {
-        each!(self, law => law.initial(constants))
+    fn groups(&self) -> Vec<usize> {
+        each!(self, law => law.groups())
+    }
+
+    fn initial<N: Number>(&self, constants: &[N], frame: &Tensor<f64>) -> Vec<N> {
+        each!(self, law => law.initial(constants, frame))
     }
 
     #[inline]

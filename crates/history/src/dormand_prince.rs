@@ -232,10 +232,12 @@ pub(crate) struct Step<const K: usize> {
     dense: Vec<[Dual<f64, K>; 7]>,
     is_dense: bool,
     work: Vec<Dual<f64, K>>,
+    /// For each variable the group whose values are of one size.
+    groups: Vec<usize>,
 }
 
 impl<const K: usize> Step<K> {
-    pub(crate) fn new(from: Vec<Dual<f64, K>>) -> Self {
+    pub(crate) fn new(from: Vec<Dual<f64, K>>, groups: Vec<usize>) -> Self {
         let zero = Dual::constant(0.0);
         let count = from.len();
         Self {
@@ -246,6 +248,7 @@ impl<const K: usize> Step<K> {
             dense: vec![[zero; 7]; count],
             is_dense: false,
             work: vec![zero; count],
+            groups,
             from,
         }
     }
@@ -269,13 +272,13 @@ impl<const K: usize> Step<K> {
         }
     }
 
-    /// Goes a step of a length. The tolerance is relative to `scales` of values and of slopes, and to what these are at the end.
+    /// Goes a step of a length. The tolerance is relative to each group's `scales` of values and of slopes, and to what these are at the end.
     pub(crate) fn go(
         &mut self,
         rate: &mut impl Rate<K>,
         length: f64,
         tolerance: f64,
-        scales: [f64; 2],
+        scales: &[[f64; 2]],
     ) -> Errors {
         self.length = length;
         self.is_dense = false;
@@ -285,9 +288,9 @@ impl<const K: usize> Step<K> {
         }
         self.combine(A[12]);
         std::mem::swap(&mut self.to, &mut self.work);
-        let [of_values, of_slopes] = self.scales(scales);
+        let scales = self.scales(scales);
         // Two estimates; the first is small where the second is.
-        let (mut five, mut three) = ([0.0_f64; 2], [0.0_f64; 2]);
+        let mut estimates = vec![[[0.0_f64; 2]; 2]; scales.len()];
         let mut is_number = true;
         for place in 0..self.to.len() {
             let mut of_five = Dual::<f64, K>::constant(0.0);
@@ -301,6 +304,7 @@ impl<const K: usize> Step<K> {
             for &(stage, weight) in E3 {
                 add_scaled(&mut of_three, &self.stages[stage][place], -weight);
             }
+            let [five, three] = &mut estimates[self.groups[place]];
             five[0] = five[0].max(of_five.value.abs());
             three[0] = three[0].max(of_three.value.abs());
             is_number &= self.to[place].value.is_finite();
@@ -313,23 +317,27 @@ impl<const K: usize> Step<K> {
         if !is_number {
             return Errors { of_values: f64::INFINITY, of_slopes: f64::INFINITY };
         }
-        let error = |group: usize, scale: f64| {
-            let (five, three) = (five[group], three[group]);
-            if five == 0.0 {
-                return 0.0;
-            }
-            let denominator = (five * five + 0.01 * three * three).sqrt();
-            length * five * (five / denominator) / (tolerance * scale.max(f64::MIN_POSITIVE))
+        let error = |of: usize| {
+            let of_groups = estimates.iter().zip(&scales).map(|([five, three], scales)| {
+                let (five, three, scale) = (five[of], three[of], scales[of]);
+                if five == 0.0 {
+                    return 0.0;
+                }
+                let denominator = (five * five + 0.01 * three * three).sqrt();
+                length * five * (five / denominator) / (tolerance * scale.max(f64::MIN_POSITIVE))
+            });
+            of_groups.fold(0.0, f64::max)
         };
-        Errors { of_values: error(0, of_values), of_slopes: error(1, of_slopes) }
+        Errors { of_values: error(0), of_slopes: error(1) }
     }
 
-    /// The largest values and slopes so far, with those where the step ends.
-    pub(crate) fn scales(&self, [of_values, of_slopes]: [f64; 2]) -> [f64; 2] {
-        let mut scales = [of_values, of_slopes];
-        for y in &self.to {
-            scales[0] = scales[0].max(y.value.abs());
-            scales[1] = y.slopes.iter().fold(scales[1], |most, slope| most.max(slope.abs()));
+    /// The largest values and slopes of each group so far, with those where the step ends.
+    pub(crate) fn scales(&self, so_far: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let mut scales = so_far.to_vec();
+        for (y, &group) in self.to.iter().zip(&self.groups) {
+            let [of_values, of_slopes] = &mut scales[group];
+            *of_values = of_values.max(y.value.abs());
+            *of_slopes = y.slopes.iter().fold(*of_slopes, |most, slope| most.max(slope.abs()));
         }
         scales
     }
@@ -434,12 +442,12 @@ mod tests {
                 let w = one(2.0, 1.0);
                 (rates[0], rates[1]) = (y[1] * w, -(y[0] * w));
             };
-            let mut step = Step::new(vec![one(1.0, 0.0), one(0.0, 0.0)]);
+            let mut step = Step::new(vec![one(1.0, 0.0), one(0.0, 0.0)], vec![0, 0]);
             let h = 3.0 / steps as f64;
             step.begin(&mut rate, 0.0);
             let mut within = 0.0_f64;
             for k in 0..steps {
-                step.go(&mut rate, h, 1e-6, [1.0; 2]);
+                step.go(&mut rate, h, 1e-6, &[[1.0; 2]]);
                 step.finish(&mut rate);
                 step.prepare(&mut rate);
                 for share in [0.2, 0.45, 0.9] {

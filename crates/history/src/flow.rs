@@ -184,20 +184,32 @@ impl LawWithHistory for Flow {
         of_G.chain([last.into()]).collect()
     }
 
-    fn initial<N: Number>(&self, constants: &[N]) -> Vec<N> {
-        let mut z = vec![N::constant(0.0); self.entries() + 1];
-        z[..3].fill(N::constant(1.0));
+    fn initial<N: Number>(&self, constants: &[N], frame: &Tensor<f64>) -> Vec<N> {
+        let one = N::constant(1.0);
+        let mut along_axes = [one; 3];
         if self.is_on_yield {
             let stretch = self.stretch_to_yield(&Constants::of(constants));
             let square = stretch * stretch;
-            z[0] = square;
-            if self.dimension == 1 {
-                (z[1], z[2]) = (N::constant(1.0) / stretch, N::constant(1.0) / stretch);
-            } else {
-                z[1] = N::constant(1.0) / square;
-            }
+            along_axes = match self.dimension {
+                1 => [square, one / stretch, one / stretch],
+                _ => [square, one / square, one],
+            };
         }
-        z
+        let is_turned = self.is_on_yield && *frame != tensor(|i, a| f64::from(u8::from(i == a)));
+        let entry = |(a, b): (usize, usize)| match is_turned {
+            true => (0..3).fold(N::constant(0.0), |sum, i| {
+                sum + along_axes[i].times(frame[i][a] * frame[i][b])
+            }),
+            false => {
+                if a == b {
+                    along_axes[a]
+                } else {
+                    N::constant(0.0)
+                }
+            }
+        };
+        let of_G = ENTRIES[..self.entries()].iter().map(|&indices| entry(indices));
+        of_G.chain([N::constant(0.0)]).collect()
     }
 
     #[inline]
@@ -298,7 +310,7 @@ impl LawWithHistory for Flow {
         } else {
             constants[5]
         };
-        (ROOT * stress / (2.0 * own.mu)).clamp(1e-6, 1.0)
+        ROOT * stress / (2.0 * own.mu)
     }
 
     fn excess(&self, at: &Kinematics<f64>, constants: &[f64], z: &[f64]) -> f64 {

@@ -57,8 +57,15 @@ pub trait LawWithHistory: Sync {
     /// The names of the variables that are integrated, in their order.
     fn variables(&self) -> Vec<String>;
 
-    /// The values of the variables at the time zero, where the body has not moved.
-    fn initial<N: Number>(&self, constants: &[N]) -> Vec<N>;
+    /// For each variable the group of those whose values are of one size and unit, as entries of a tensor are: errors of the integrator are
+    /// relative to the largest value of the group. Default: all are of one.
+    fn groups(&self) -> Vec<usize> {
+        vec![0; self.variables().len()]
+    }
+
+    /// The values of the variables at the time zero, where the body has not moved. `frame[i][a]` is the Cartesian component i of the unit
+    /// vector a of the frame whose components kinematics and variables have.
+    fn initial<N: Number>(&self, constants: &[N], frame: &Tensor<f64>) -> Vec<N>;
 
     /// Writes the rates of the variables `z` on a branch.
     fn rate<N: Number>(

@@ -147,7 +147,7 @@ impl LawWithHistory for Maxwell {
         self.names(self.entries())
     }
 
-    fn initial<N: Number>(&self, _: &[N]) -> Vec<N> {
+    fn initial<N: Number>(&self, _: &[N], _: &Tensor<f64>) -> Vec<N> {
         vec![N::constant(0.0); self.elements * self.entries()]
     }
 

@@ -2,11 +2,17 @@
 
 use crate::law::Kinematics;
 use crate::number::Dual;
+use crate::tensor::{Tensor, tensor};
 
 /// The motion of a particle, with slopes along the particle's position.
 pub trait Motion<const K: usize>: Sync {
     /// The deformation gradient and its rate at a time.
     fn at(&self, time: f64) -> Kinematics<Dual<f64, K>>;
+
+    /// Cartesian components of the unit vectors of the frame whose components the motion has, `[i][a]`. Default: the axes.
+    fn frame(&self) -> Tensor<f64> {
+        tensor(|i, a| f64::from(u8::from(i == a)))
+    }
 
     /// Writes the constants of the law at a time, in the order of its [names](crate::LawWithHistory::constants). `constants` is empty before.
     fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, K>>);

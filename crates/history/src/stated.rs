@@ -508,7 +508,26 @@ impl LawWithHistory for StatedHistory {
         self.internal.clone()
     }
 
-    fn initial<N: Number>(&self, constants: &[N]) -> Vec<N> {
+    /// Each variable is of a size and a unit of its own, but for components of one tensor: `q11`, `q12` ...
+    fn groups(&self) -> Vec<usize> {
+        let mut stems: Vec<&str> = Vec::new();
+        let length = |name: &str| {
+            let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            if name.len() == stem.len() + 2 { stem.len() } else { name.len() }
+        };
+        let mut groups = Vec::with_capacity(self.internal.len());
+        for name in &self.internal {
+            let stem = &name[..length(name)];
+            let known = stems.iter().position(|known| *known == stem);
+            groups.push(known.unwrap_or(stems.len()));
+            if known.is_none() {
+                stems.push(stem);
+            }
+        }
+        groups
+    }
+
+    fn initial<N: Number>(&self, constants: &[N], _: &Tensor<f64>) -> Vec<N> {
         let zero = N::constant(0.0);
         let mut inputs = vec![zero; self.measures + self.internal.len()];
         inputs.extend_from_slice(constants);

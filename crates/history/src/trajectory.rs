@@ -49,6 +49,15 @@ pub enum HistoryError {
         /// The time.
         time: f64,
     },
+    /// Elastic strains are lost in the rounding of stretches.
+    #[error(
+        "the elastic strain of flow is {strain:.1e}, so that the rounding of stretches takes its digits: a yield stress, or a drag, of 1e-7 of the \
+         shear modulus and more keeps them"
+    )]
+    TooSoft {
+        /// The strain.
+        strain: f64,
+    },
     /// The body begins beyond its yield surface.
     #[error(
         "at the time 0 the stress is beyond the yield stress, by {excess:e} of it: let the motion begin with F = I, or closer to it"
@@ -102,6 +111,9 @@ const NOTHING: f64 = 1e-13;
 const ON_SURFACE: f64 = 1e-9;
 /// Errors of the divergence of stresses are at most such a part of what the estimates of steps tell (measured; see the crate's tests).
 const LENIENCE: f64 = 30.0;
+/// The least share of elastic strains in the variables whose stresses keep the digits of a table, and the least one of which tolerances are a part.
+const LEAST_RESOLUTION: f64 = 1e-8;
+const FULL_RESOLUTION: f64 = 1e-6;
 /// So many steps are shortened before their errors are compared with the rounding of rates, and so many roundings are left to a step.
 const MOST_REJECTIONS: usize = 3;
 const ROUNDINGS: f64 = 64.0;
@@ -155,9 +167,9 @@ impl<'a, L: LawWithHistory, M: Motion<K>, const K: usize> Along<'a, L, M, K> {
         self.law.halving_time(&at, &constants, &values_of(z), &values_of(rates))
     }
 
-    /// By how much rates move where the entries of `F` and its rate are off by a unit of their last place, as they are: no step
-    /// tells values apart that differ by less than this times its length.
-    fn rounding(&self, time: f64, z: &[Dual<f64, K>], branch: Branch) -> f64 {
+    /// By how much the rate of each variable moves where the entries of `F` and its rate are off by a unit of their last place, as they are: no
+    /// step tells values apart that differ by less than this times its length.
+    fn rounding(&self, time: f64, z: &[Dual<f64, K>], branch: Branch) -> Vec<f64> {
         let (at, z) = (values(&self.motion.at(time)), values_of(z));
         let constants = values_of(&self.constants(time));
         let off = |A: &Tensor<f64>| {
@@ -171,7 +183,7 @@ impl<'a, L: LawWithHistory, M: Motion<K>, const K: usize> Along<'a, L, M, K> {
             self.law.rate(at, &constants, &z, branch, &mut rates);
             rates
         });
-        rates.iter().zip(moved).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+        rates.iter().zip(moved).map(|(one, other)| (one - other).abs()).collect()
     }
 
     /// The slopes right after the onset of the flow: particles next to this one begin at another time,
@@ -360,8 +372,10 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                 law.rate(&at, &steady, z, branch, rates);
             }
         };
-        let mut step = Step::new(self.z.clone());
-        let mut scales = step.scales([0.0; 2]);
+        let groups = law.groups();
+        let mut step = Step::new(self.z.clone(), groups.clone());
+        let count = groups.iter().max().map_or(0, |last| last + 1);
+        let mut scales = step.scales(&vec![[0.0; 2]; count]);
         // Slopes may be nothing but rounding; then no step is short enough for them.
         let mut counts_slopes = true;
         let mut rejected: Option<f64> = None;
@@ -393,7 +407,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                 usual
             };
             let Errors { of_values, of_slopes } =
-                step.go(&mut rate, length, self.tolerance, scales);
+                step.go(&mut rate, length, self.tolerance, &scales);
             let mut error = if counts_slopes { of_values.max(of_slopes) } else { of_values };
             // The estimate of a lone variable may pass through zero: it is no less than a share of that of the step before, at this length.
             if let Some((before, its_length)) = last_step {
@@ -414,8 +428,11 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                 // Next to the start variables may be so small that their tolerance is less than the rounding of their rates.
                 rejections += 1;
                 if rejections >= MOST_REJECTIONS {
-                    let rounding = length * self.along.rounding(self.time, &step.from, branch);
-                    scales[0] = scales[0].max(ROUNDINGS * rounding / self.tolerance);
+                    let roundings = self.along.rounding(self.time, &step.from, branch);
+                    for (rounding, &group) in roundings.into_iter().zip(&groups) {
+                        let of_values = &mut scales[group][0];
+                        *of_values = of_values.max(ROUNDINGS * length * rounding / self.tolerance);
+                    }
                 }
                 error = if error.is_finite() { error } else { f64::INFINITY };
                 self.step = length * factor(error).min(0.7);
@@ -431,7 +448,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
             let growth = if rejected.is_some() { 1.0 } else { 6.0 };
             (rejected, trials, rejections) = (None, 0, 0);
             last_step = Some((error, length));
-            scales = step.scales(scales);
+            scales = step.scales(&scales);
             let stop = if length == rest { end } else { self.time + length };
             step.finish(&mut rate);
             // States within the step, and the margin there.
@@ -486,7 +503,7 @@ impl<L: LawWithHistory, M: Motion<K>, const K: usize> Way<'_, L, M, K> {
                     self.keep(next, z);
                 }
                 // States at the root come by a step to it.
-                step.go(&mut rate, time - self.time, self.tolerance, scales);
+                step.go(&mut rate, time - self.time, self.tolerance, &scales);
                 self.z = step.to.clone();
                 self.time = time;
                 self.step = length;
@@ -577,7 +594,7 @@ impl<const K: usize> Trajectory<K> {
         }
         let sampled = Sampled::new(motion, before);
         let along = Along::new(law, &sampled);
-        let z = law.initial(&along.steady);
+        let z = law.initial(&along.steady, &motion.frame());
         let (first, start) = (values_of(&z), values(&motion.at(0.0)));
         if first.iter().any(|value| !value.is_finite()) {
             return Err(HistoryError::NotFinite { time: 0.0 });
@@ -588,7 +605,11 @@ impl<const K: usize> Trajectory<K> {
         }
         let branch = law.first_branch(&start, &along.steady_values, &first);
         let found = Self { states: Vec::with_capacity(times.len()), ..Self::empty() };
-        let tolerance = LENIENCE * tolerance * law.resolution(&along.steady_values);
+        let resolution = law.resolution(&along.steady_values);
+        if resolution < LEAST_RESOLUTION {
+            return Err(HistoryError::TooSoft { strain: resolution });
+        }
+        let tolerance = LENIENCE * tolerance * resolution.clamp(FULL_RESOLUTION, 1.0);
         let way = Way { along, tolerance, times, time: 0.0, branch, z, step: 0.0, found };
         way.run()
     }

@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-13;
 /// That of smooth ones, whose steps are longer, and with them the errors of values between steps.
 const TOLERANCE_OF_SMOOTH: f64 = 1e-15;
 /// Where tables have larger errors each particle has series of its own.
-const LARGEST_ERROR: f64 = 1e-11;
+pub(crate) const LARGEST_ERROR: f64 = 1e-11;
 /// The part that a table may leave out, as a share of each quantity's largest value.
 const TABLE_TOLERANCE: f64 = 1e-12;
 
@@ -40,7 +40,10 @@ pub enum HistoryProblem {
     #[error(transparent)]
     Law(#[from] UnsupportedLaw),
     /// Tables are of boxes and of bodies between two radii.
-    #[error("there are no tables of histories in a body of this shape")]
+    #[error(
+        "particles of a law with memory are followed in boxes with coordinates = 'cartesian', and between two radii with 'polar' or 'spherical'; \
+         in other coordinates they are not. Write one of these, or leave [material.flow], [[material.maxwell]] or [internal] out"
+    )]
     Shape,
     /// A name in the law without a value.
     #[error(
@@ -205,6 +208,10 @@ impl<const D: usize> Motion<D> for Particle<'_, D> {
         self.kinematics(time)
     }
 
+    fn frame(&self) -> Tensor<f64> {
+        in_space(&self.frame)
+    }
+
     fn constants(&self, time: f64, constants: &mut Vec<Dual<f64, D>>) {
         constants.extend(self.all_constants(time));
     }
@@ -214,6 +221,10 @@ impl<const D: usize> Motion<D> for Particle<'_, D> {
 struct WithoutSlopes<'a, const D: usize>(&'a Particle<'a, D>);
 
 impl<const D: usize> Motion<0> for WithoutSlopes<'_, D> {
+    fn frame(&self) -> Tensor<f64> {
+        in_space(&self.0.frame)
+    }
+
     fn at(&self, time: f64) -> Kinematics<Dual<f64, 0>> {
         let Kinematics { F, rate } = self.0.kinematics(time);
         let of =
@@ -254,7 +265,9 @@ impl<const D: usize> Histories<D> {
                 },
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let uses_places = constants.iter().any(|c| matches!(c, Constant::Coordinate(_)));
+        // A start along X and Y is another one for each angle.
+        let uses_places = constants.iter().any(|c| matches!(c, Constant::Coordinate(_)))
+            || any.begins_along_axes() && !is_cartesian;
         // Coordinates of the specification that nothing depends on are those of the chart, or none is left out.
         let fits = match chart {
             Chart::Box { .. } => is_cartesian,
@@ -453,8 +466,9 @@ impl<const D: usize> Histories<D> {
             Trajectory::<D>::new(&self.law, &particle, &times, self.tolerance())
         };
         let all: Vec<_> = places.par_iter().map(follow).collect();
+        let tables = self.tables_until(end)?;
         let mut report = HistoryReport {
-            table_error: self.tables_until(end)?.error,
+            table_error: if tables.table.is_some() { tables.error } else { f64::NAN },
             least_margin: f64::INFINITY,
             flows: matches!(self.law, AnyLaw::Flow(_)),
             particles: places.len(),
@@ -527,6 +541,16 @@ pub(crate) fn first_entries(names: &[String]) -> Vec<usize> {
     firsts.filter(|(_, names)| is_tensor(names)).map(|(first, _)| first).collect()
 }
 
+/// Unit vectors of a frame with those of the axes that it leaves out.
+fn in_space<const D: usize>(frame: &[[f64; D]; D]) -> Tensor<f64> {
+    std::array::from_fn(|i| {
+        std::array::from_fn(|a| match i < D && a < D {
+            true => frame[i][a],
+            false => f64::from(u8::from(i == a)),
+        })
+    })
+}
+
 fn is_identity<const D: usize>(Q: &[[f64; D]; D]) -> bool {
     (0..D).all(|i| (0..D).all(|a| Q[i][a] == f64::from(u8::from(i == a))))
 }
@@ -536,12 +560,7 @@ fn turn_tensors<const D: usize>(firsts: &[usize], Q: &[[f64; D]; D], values: &mu
     if is_identity(Q) {
         return;
     }
-    let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| {
-        std::array::from_fn(|a| match i < D && a < D {
-            true => Q[i][a],
-            false => f64::from(u8::from(i == a)),
-        })
-    });
+    let rotation = in_space(Q);
     for own in firsts.iter().map(|first| *first..first + ENTRIES.len()) {
         let own = &mut values[own];
         let in_frame: Tensor<f64> = of_entries(own);

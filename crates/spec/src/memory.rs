@@ -350,8 +350,8 @@ impl Spec {
                 });
                 lines.push(match (is_on_yield, self.dimension) {
                     (false, _) => "start: F^p = I, alpha = 0".into(),
-                    (true, 1) => "start on the yield surface: F^p = diag(1/l, sqrt(l), sqrt(l)), ln l = k/(3 mu), alpha = 0".into(),
-                    (true, _) => "start on the yield surface: F^p = diag(1/l, l, 1), ln l = k/(2 sqrt(3) mu), alpha = 0".into(),
+                    (true, 1) => "start on the yield surface: F^p = diag(1/l, sqrt(l), sqrt(l)) along X, Y, Z, ln l = k/(3 mu), alpha = 0".into(),
+                    (true, _) => "start on the yield surface: F^p = diag(1/l, l, 1) along X, Y, Z, ln l = k/(2 sqrt(3) mu), alpha = 0".into(),
                 });
             }
             Some(Memory::Maxwell(elements)) => {

@@ -1,7 +1,5 @@
 //! The solver's laws, which share no formula with the rate equations, against histories at a material point.
 
-#![allow(non_snake_case, clippy::unwrap_used)]
-
 use mmsmith_history::Motion;
 use mmsmith_history::{
     AnyLaw, Dual, Kinematics, LawWithHistory, Number, Tensor, Trajectory, divergence,
