@@ -3,7 +3,9 @@
 //! All words and numbers are separated by white space, and each kind of thing begins a line of its own, so that a list-directed read in
 //! Fortran and `fscanf` in C are enough. Positions come first and coefficients last, in the order in which they are used.
 
-use crate::history::{Chart, Histories, HistoryProblem, OverAxes, Tables, first_entries};
+use crate::history::{
+    Chart, Histories, HistoryProblem, LARGEST_ERROR, OverAxes, Tables, first_entries,
+};
 use crate::{InterpretError, Interpreted, resolve};
 use mmsmith_history::{AtPoint, HistoryError, Table};
 use mmsmith_spec::{Coordinates, Spec};
@@ -91,11 +93,22 @@ pub enum TableFileError {
     /// A history cannot be followed.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// Fields that no polynomial follows.
+    /// Fields with a front, which no polynomial follows.
     #[error(
-        "no table is accurate: particles begin or stop to flow on the way, or fields are rough"
+        "no table over the body is accurate, because particles begin or stop to flow on the way"
     )]
-    Rough,
+    Front,
+    /// Fields with finer waves than the polynomials of a table.
+    #[error(
+        "no table over the body is accurate: its polynomials miss the fields by {error:.1e} of their largest values, where {most:.0e} are allowed, \
+         because the motion or the density has finer waves than they"
+    )]
+    Rough {
+        /// The error.
+        error: f64,
+        /// The largest error of a table.
+        most: f64,
+    },
     /// A table has an end.
     #[error(
         "a table ends at some time, and here the end is {0}: write a finite period in [time], such as period = 1"
@@ -164,7 +177,11 @@ impl TableFile {
             (error, None)
         } else {
             let tables = Tables::new(&histories, end, histories.tolerance_of_files())?;
-            let table = tables.table.as_ref().ok_or(TableFileError::Rough)?;
+            let why = || match tables.error.is_nan() {
+                true => TableFileError::Front,
+                false => TableFileError::Rough { error: tables.error, most: LARGEST_ERROR },
+            };
+            let table = tables.table.as_ref().ok_or_else(why)?;
             measures(&mut content, D, [end, tables.error], &fields);
             let of = (&histories, spec.coordinates);
             let in_time = match table {

@@ -113,10 +113,9 @@ fn tabulate(options: &GenerateOptions, spec: &Spec, staged: &Staged) -> Result<T
     let points = points.as_deref();
     let periods = options.periods.unwrap_or(1.0);
     TableFile::new(spec, staged, [], periods, points).map_err(|error| match error {
-        TableFileError::Rough => anyhow::anyhow!(
-            "no table over the body is accurate, because particles begin or stop to flow on the way, or layers are thin; give the points of your \
-             host, and the file has a series for each: mms gen {} --target {} --out DIR --points points.csv, a line X,Y,Z and then a position a \
-             line",
+        why @ (TableFileError::Front | TableFileError::Rough { .. }) => anyhow::anyhow!(
+            "{why}; give the points of your host, and the file has a series for each: mms gen {} --target {} --out DIR --points points.csv, a \
+             line X,Y,Z and then a position a line",
             options.name,
             options.target.name
         ),
