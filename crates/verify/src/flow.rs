@@ -57,12 +57,16 @@ pub fn flows_smoothly(solution: &AnySolution<f64>) -> bool {
 /// Whether the stress depends on more than the deformation gradient.
 #[must_use]
 pub fn has_memory(solution: &AnySolution<f64>) -> bool {
-    let is_such = |law: Law<f64>| match law {
+    in_dimension!(solution, |s| is_of_memory(&s.law()), else false)
+}
+
+/// Whether the stress of a law depends on more than the deformation.
+pub(crate) fn is_of_memory(law: &Law<f64>) -> bool {
+    match law {
         Law::WithMemory(_) => true,
         Law::Stated(stated) => stated.has_memory(),
         Law::Library(_) => false,
-    };
-    in_dimension!(solution, |s| is_such(s.law()), else false)
+    }
 }
 
 /// Prepares the fields of solutions that follow from histories of particles, up to a time.

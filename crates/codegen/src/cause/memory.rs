@@ -80,11 +80,17 @@ pub(super) fn scale_elements(spec: &mut Spec, time: [i64; 2], share: [i64; 2]) {
     });
 }
 
-/// An elastic material, where the body starts without stress.
+/// An elastic material. A body that starts on its yield surface keeps the stretch of the start, and hardens so steeply that it hardly flows.
 pub(super) fn forget(spec: &mut Spec) {
+    const STEEP: i64 = 10_000_000_000;
     if !matches!(spec.memory, Some(Memory::Flow(Flow { is_on_yield: true, .. }))) {
         spec.memory = None;
     }
+    flow(spec, |graph, flow| {
+        let factor = fraction(graph, STEEP, 1);
+        flow.modulus = graph.mul(factor, flow.yield_stress);
+        flow.exponent = fraction(graph, 1, 1);
+    });
 }
 
 /// Rates of the internal variables of a stated law times a fraction.

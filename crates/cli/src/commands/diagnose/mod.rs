@@ -28,7 +28,7 @@ use crate::processes::with_threads;
 use crate::table::{self, Table};
 use crate::terminal;
 use runs::{Errors, Run, Solver, written_step};
-use search::{Expected, Search, Tried};
+use search::{Expected, NO_RESULT, Search, Tried};
 
 /// Densities that cannot be told from a factor of another origin, and one that can.
 const LIKE_FACTORS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
@@ -340,6 +340,9 @@ impl Told {
         }
         for note in &self.notes {
             text += &format!("note: {note}\n");
+        }
+        for (name, why) in self.not_tried.iter().filter(|(_, why)| why.starts_with(NO_RESULT)) {
+            text += &format!("{name}: {why}\n");
         }
         if !self.tried.is_empty() {
             text += &format!(

@@ -133,15 +133,25 @@ impl Solver<'_> {
         let out = folder.join(format!("cells-{cells}"));
         fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
         if input::kind_of(&fields)?.is_none() {
+            let files = match (self.files(trial, cells), trial) {
+                // Histories of a mistaken material may not be followed, as where it softens to nothing.
+                (Err(why), Some(_)) => {
+                    return Ok(Run::failed(format!("its fields cannot be formed: {why:#}"), out));
+                }
+                (files, _) => files?,
+            };
             fs::create_dir_all(&fields).with_context(|| fields.display().to_string())?;
-            for (name, text) in self.files(trial, cells)? {
+            for (name, text) in files {
                 let path = fields.join(name);
                 fs::write(&path, text).with_context(|| path.display().to_string())?;
             }
             if let Some(build) = self.build
                 && let Err(failure) = self.command(build, &fields, cells, &out)
             {
-                bail!("--build failed: {failure}");
+                match trial {
+                    None => bail!("--build failed: {failure}"),
+                    Some(_) => return Ok(Run::failed(failure, out)),
+                }
             }
         }
         let failure = self.command(self.run, &fields, cells, &out).err();

@@ -90,6 +90,9 @@ pub(super) struct Search<'a> {
     pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
 }
 
+/// The reason where a solver that ran with the right fields fails with others.
+pub(super) const NO_RESULT: &str = "no result with the fields that counter it";
+
 impl Search<'_> {
     fn leave_out(&self, cause: &Cause, why: &str) {
         if let Ok(mut left_out) = self.not_tried.lock() {
@@ -134,6 +137,7 @@ impl Search<'_> {
             let shows = self.solver.shows(trial, self.cells[0]);
             if !shows {
                 let why = match self.solver.spec.has_history() {
+                    _ if trial.cause.is_of_memory() => "the material has no such memory",
                     true => {
                         "the fields follow from histories, in which it is not planted: an elastic solution shows it"
                     }
@@ -152,6 +156,10 @@ impl Search<'_> {
             return Ok(None);
         }
         let run = self.solver.errors(Some(&trial), cells)?;
+        if let Some(failure) = &run.failure {
+            self.leave_out(trial.cause, &format!("{NO_RESULT}: {failure}"));
+            return Ok(None);
+        }
         Ok(Some(Tried { trial, errors: BTreeMap::from([(cells, run.errors)]) }))
     }
 

@@ -22,6 +22,7 @@ use self::moduli::{Known, Lame};
 use super::data::FrameData;
 use super::findings::Remarks;
 use super::quantity::Quantity;
+use crate::flow::is_of_memory;
 use crate::precision::Precision;
 
 /// Particles of all frames that are looked at, spread evenly; at most about as many.
@@ -167,8 +168,9 @@ where
 {
     let places = &witnesses.places;
     let mut rows = vec![];
-    // A recording of a half plane does not hold the stretch around the axis that the law needs.
-    let known = (!exact.is_half_plane()).then(|| Known::new(exact.law())).flatten();
+    // A recording of a half plane does not hold the stretch around the axis that the law needs, and none what internal variables went through.
+    let is_left_out = exact.is_half_plane() || is_of_memory(&exact.law());
+    let known = (!is_left_out).then(|| Known::new(exact.law())).flatten();
     if let Some(known) = known {
         let of_field = STRESSES.into_iter().enumerate();
         rows.extend(of_field.filter_map(|(n, quantity)| {
