@@ -26,7 +26,7 @@ fn bits<T: Scalar<D>, const D: usize>(
     // Of two layers in the plane, of two layers of three tiles in space.
     let cells = if D == 3 { 5 } else { 21 };
     let spacing = number(1.0 / cells as f64);
-    let along = [cells, 12, 16];
+    let along = [3, 12, 16];
     let cells = std::array::from_fn(|a| if D == 3 { along[a] } else { cells });
     let walls = [[true; 2]; D];
     let grid = Grid { lower: SVector::zeros(), spacing, cells, walls };

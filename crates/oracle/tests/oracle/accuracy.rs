@@ -18,7 +18,7 @@ const POINTS_OF_FURTHER: usize = 6;
 /// asks for by a variable of the environment.
 fn points() -> usize {
     let asked = std::env::var("MMSMITH_POINTS");
-    asked.map_or(20, |count| count.parse().expect("MMSMITH_POINTS is a number of points"))
+    asked.map_or(12, |count| count.parse().expect("MMSMITH_POINTS is a number of points"))
 }
 
 /// How much is judged, and in which classes.
