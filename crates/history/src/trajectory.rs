@@ -599,16 +599,16 @@ impl<const K: usize> Trajectory<K> {
         if first.iter().any(|value| !value.is_finite()) {
             return Err(HistoryError::NotFinite { time: 0.0 });
         }
+        let resolution = law.resolution(&along.steady_values);
+        if resolution < LEAST_RESOLUTION {
+            return Err(HistoryError::TooSoft { strain: resolution });
+        }
         let excess = law.excess(&start, &along.steady_values, &first);
         if excess > ON_SURFACE {
             return Err(HistoryError::BeyondYield { excess });
         }
         let branch = law.first_branch(&start, &along.steady_values, &first);
         let found = Self { states: Vec::with_capacity(times.len()), ..Self::empty() };
-        let resolution = law.resolution(&along.steady_values);
-        if resolution < LEAST_RESOLUTION {
-            return Err(HistoryError::TooSoft { strain: resolution });
-        }
         let tolerance = LENIENCE * tolerance * resolution.clamp(FULL_RESOLUTION, 1.0);
         let way = Way { along, tolerance, times, time: 0.0, branch, z, step: 0.0, found };
         way.run()

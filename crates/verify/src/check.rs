@@ -32,6 +32,8 @@ pub const TOLERANCE: f64 = 1e-10;
 pub const BLUNT: f64 = 1e-6;
 /// Points at which a body is looked for.
 const BODY_POINTS: usize = 300;
+/// Points at which its stress has to be a number.
+const MATERIAL_POINTS: usize = 4;
 /// Longest difference step, as a share of the body's size and of the period.
 const REACH: f64 = 0.1;
 
@@ -262,6 +264,10 @@ fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
                 let mut on = Surface::all(D).filter_map(|at| points::surface(&domain, at, n));
                 keeps_volume(&X, t) && on.all(|(X, _)| keeps_volume(&X, t))
             })
+        // Constants without a stated range may make no material that flows, whose histories end in no number.
+        && (0..MATERIAL_POINTS)
+            .filter_map(|n| points::interior(&domain, solution.period(), n))
+            .all(|(X, t)| solution.first_piola_kirchhoff(&X, t).iter().all(|P| P.is_finite()))
 }
 
 /// The least ratio of volumes of a body that is checked: below it, it may be turned inside
