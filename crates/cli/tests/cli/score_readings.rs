@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::command::{mms, read_json};
+use crate::command::{mms, read_json, refuses};
 use mmsmith_solutions::nalgebra::{SVector, Vector2};
 use mmsmith_solutions::{AnySolution, Solution, build};
 use serde_json::Value;
@@ -351,4 +351,52 @@ fn errors_that_fall_at_the_nodes_alone_do_not_pass() {
         (X, u + Vector2::repeat(0.05 * X.x / (cells * cells) as f64))
     });
     assert_eq!(right["passed"], true, "{}", verdict(&right));
+}
+
+/// What is said of an order that there is none of is the case.
+#[test]
+fn the_reason_for_no_order_is_the_one() {
+    let place = tempfile::tempdir().unwrap();
+    for cells in CELLS {
+        let mut text = "t,X,Y,ux,uy\n".to_owned();
+        for number in 0..cells * cells {
+            let at = |k: usize| (k as f64 + 0.5) / cells as f64;
+            let [X, Y] = [number % cells, number / cells].map(at);
+            writeln!(text, "0.0,{X:?},{Y:?},0.0,0.0").unwrap();
+        }
+        fs::write(place.path().join(format!("n{cells}.csv")), text).unwrap();
+    }
+    let [coarse, fine] = CELLS;
+    let call =
+        format!("score axis-aligned n{coarse}.csv n{fine}.csv --cells {coarse},{fine} --set A=0");
+    let said = mms(place.path(), &call).stdout;
+    assert!(said.contains("its errors are zero, and all frames are at t = 0"), "{said}");
+    assert!(!said.contains("their h is the same"), "{said}");
+}
+
+/// Advice holds: an order of axes that the file has, and nothing of numbers that count particles.
+#[test]
+fn advice_fits_the_columns_that_there_are() {
+    let (place, exact) = (tempfile::tempdir().unwrap(), exact());
+    let write = |cells: usize| {
+        table("id,t,X,Y,ux,uy", &particles(&exact, cells, 2), |p| {
+            vec![p.number as f64, p.t, p.X.x, p.X.y, p.u.x, p.u.y]
+        })
+    };
+    let told = score(place.path(), "--axes y,x", write);
+    let message = finding(&told, "other-place").unwrap();
+    assert!(message.contains("with --axes x,y"), "{message}");
+    let told = score(place.path(), "--axes x,y", write);
+    assert!(order(&told, "u") > 1.7, "{told}");
+    assert_eq!(finding(&told, "few-digits"), None);
+}
+
+#[test]
+fn a_run_beside_recordings_advises_no_option_that_score_has_not() {
+    let place = tempfile::tempdir().unwrap();
+    let called = mms(place.path(), "run bar-j2 --cells 4 --periods 0.05 --vtk own --frames 2");
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let call = "score bar-j2 own --cells 4 --periods 0.05 --against mms:gimp,cd";
+    refuses(place.path(), call, &["--against runs the updated", "mms converge"]);
+    assert!(!mms(place.path(), call).stderr.contains("--formulation"));
 }

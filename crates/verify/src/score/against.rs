@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mmsmith_measure::norms::PerNorm;
-use mmsmith_runtime::AnySolution;
+use mmsmith_runtime::{AnySolution, Condition, Surface};
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::case::{Arithmetic, Case};
 use crate::discretized::Discretized;
-use crate::error::CaseError;
+use crate::error::{CaseError, SceneError};
 use crate::frames::FrameOutput;
 use crate::run::{Outputs, Row, Status};
 
@@ -37,6 +37,17 @@ pub enum AgainstError {
     /// The run cannot be made.
     #[error(transparent)]
     Case(#[from] CaseError),
+    /// The updated Lagrangian formulation, in which the runs beside recordings are, does not model a condition.
+    #[error(
+        "--against runs the updated Lagrangian formulation, which does not model the condition {condition} on {surface}; leave --against \
+         out, and measure a run of this solution with mms converge, which takes the total Lagrangian formulation for it"
+    )]
+    Unmodelled {
+        /// Where.
+        surface: Surface,
+        /// The condition.
+        condition: Condition,
+    },
     /// Its frames cannot be read.
     #[error(transparent)]
     Score(#[from] ScoreError),
@@ -84,7 +95,13 @@ pub fn against(
     folder: &Path,
     options: &ScoreOptions,
 ) -> Result<Agreement, AgainstError> {
-    let prepared = Discretized::new(exact, Arithmetic::Double, case)?;
+    let prepared =
+        Discretized::new(exact, Arithmetic::Double, case).map_err(|error| match error {
+            CaseError::Scene(SceneError::Unmodelled { surface, condition, .. }) => {
+                AgainstError::Unmodelled { surface, condition }
+            }
+            error => error.into(),
+        })?;
     let steps = prepared.plan().steps;
     let frames = FrameOutput {
         folder: folder.to_owned(),

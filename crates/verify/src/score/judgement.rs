@@ -417,9 +417,26 @@ impl Series<'_> {
                 )),
                 _ => Shown::Order(order),
             },
-            (_, None) => {
-                unknown(format!("the recordings show no order of {field}: their h is the same"))
-            }
+            (_, None) => unknown(format!(
+                "the recordings show no order of {field}: {}",
+                self.why_no_order(field)
+            )),
+        }
+    }
+
+    /// What two recordings need for an order and these do not have, in words.
+    fn why_no_order(&self, field: Quantity) -> String {
+        let errors = self.errors(field, Norm::L2);
+        let known: Vec<f64> = errors.into_iter().flatten().filter(|e| e.is_finite()).collect();
+        if !known.is_empty() && known.iter().all(|error| *error == 0.0) {
+            let at_start = self.rows.iter().all(|row| row.last_time == 0.0);
+            let where_to = if at_start { ", and all frames are at t = 0" } else { "" };
+            return format!("its errors are zero{where_to}");
+        }
+        let steps = self.steps();
+        match steps.iter().all(|h| *h == steps[0]) {
+            true => "their h is the same".into(),
+            false => "fewer than two of different h have an error above zero".into(),
         }
     }
 

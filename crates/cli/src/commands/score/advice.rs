@@ -246,7 +246,10 @@ impl Case<'_> {
             let option = format!("--time-unit {}", number::exact(unit));
             all.push(self.place(words, option, |placing| placing.time_unit = unit));
         }
-        for axes in axes(self.selection.dimension()) {
+        let dimension = self.selection.dimension();
+        // The usual order comes first where another one was asked for: files without a third axis are read so too.
+        let usual = (!self.how.placing.axes.is_empty()).then(|| (0..dimension).collect());
+        for axes in usual.into_iter().chain(axes(dimension)) {
             let names: Vec<_> = axes.iter().map(|axis| ["x", "y", "z"][*axis]).collect();
             let option = format!("--axes {}", names.join(","));
             all.push(
