@@ -82,6 +82,19 @@ pub(crate) fn check(scope: &Scope<'_>, document: &Document, spec: &Spec) -> Resu
             let help = "a radius is not negative".to_owned();
             return Err(scope.source.error(message, span, Some(help)));
         }
+        if low == 0.0 && matches!(spec.domain, Domain::Annulus { .. }) {
+            let message = "the body contains its centre, where the directions of its coordinates have no meaning";
+            let span = place(text_below, document.domain.span());
+            let help = match spec.dimension {
+                2 => {
+                    "give it a hole, as inner = '1/100'; or, where nothing depends on the angle, state it as the solid cylinder that it is a \
+                     section of: coordinates = 'axisymmetric' and, under [domain], shape = 'solid-cylinder', lower = 0 and upper = 1, with \
+                     condition = 'sliding' on Z-lower and Z-upper"
+                }
+                _ => "give it a hole, as inner = '1/100'",
+            };
+            return Err(scope.source.error(message, span, Some(help.into())));
+        }
         // A rounding more than a turn is one.
         if below == "from" && high - low > std::f64::consts::TAU * (1.0 + 1e-12) {
             let message = format!("the sector reaches around by {} radians", figure(high - low));

@@ -87,7 +87,7 @@ pub enum SceneError {
     #[error(
         "{cells} cells make the spacing {spacing:?}, which does not divide the box's sides {sides:?}; \
          {}",
-        suggestion(fitting)
+        suggestion(fitting, *cell_length)
     )]
     Misfit {
         /// The cell count asked for.
@@ -98,6 +98,8 @@ pub enum SceneError {
         sides: Vec<f64>,
         /// The nearest cell counts that would fit.
         fitting: Vec<usize>,
+        /// A length that so many cells divide, and the sides with it, where there is one.
+        cell_length: Option<f64>,
     },
     /// The solver has no model for a boundary condition.
     #[error("the solver does not model the condition {} on {}{instead}", condition, surface)]
@@ -117,8 +119,18 @@ pub enum SceneError {
         lines(surfaces)
     )]
     Undeclared {
-        /// Where.
-        surfaces: Vec<Surface>,
+        /// Where, and what holds there: the motion of the solution, or symmetry.
+        surfaces: Vec<(Surface, Condition)>,
+    },
+    /// A body with the centre or the axis of its curvilinear coordinates in it.
+    #[error(
+        "the body contains {what}, which no grid of the solver has cells for; {instead} (mms eval and mms gen serve it all the same)"
+    )]
+    Centre {
+        /// The centre or the axis.
+        what: &'static str,
+        /// Lines of a specification that runs.
+        instead: &'static str,
     },
     /// A body of revolution that the updated Lagrangian formulation has no half plane of.
     #[error(
@@ -173,20 +185,25 @@ pub enum SceneError {
     },
 }
 
-fn list(surfaces: &[Surface]) -> String {
-    surfaces.iter().map(Surface::to_string).collect::<Vec<_>>().join(", ")
+fn list(surfaces: &[(Surface, Condition)]) -> String {
+    surfaces.iter().map(|(surface, _)| surface.to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Lines of a specification for surfaces that move as the solution does.
-fn lines(surfaces: &[Surface]) -> String {
-    let one = |surface: &Surface| {
-        let condition = Condition::PrescribedMotion;
-        format!("\n[[boundary]]\nsurface = '{}'\ncondition = '{condition}'\n", surface)
+/// Lines of a specification for surfaces and their conditions.
+fn lines(surfaces: &[(Surface, Condition)]) -> String {
+    let one = |(surface, condition): &(Surface, Condition)| {
+        format!("\n[[boundary]]\nsurface = '{surface}'\ncondition = '{condition}'\n")
     };
     surfaces.iter().map(one).collect::<String>().trim_end().to_owned()
 }
 
-fn suggestion(fitting: &[usize]) -> String {
+fn suggestion(fitting: &[usize], cell_length: Option<f64>) -> String {
+    if let (true, Some(length)) = (fitting.is_empty(), cell_length) {
+        return format!(
+            "no cell count near it does; they do with cell-length = {length:?} under [domain] of its specification, or with the \
+             parameter that is this length, as cell-length = 'L'"
+        );
+    }
     if fitting.is_empty() {
         return "no cell count near it does".into();
     }

@@ -97,9 +97,12 @@ pub(crate) fn named_in_space(error: CaseError) -> CaseError {
         SceneError::Unmodelled { surface, condition, instead } => {
             SceneError::Unmodelled { surface: named(surface), condition, instead }
         }
-        SceneError::Undeclared { surfaces } => {
-            SceneError::Undeclared { surfaces: surfaces.into_iter().map(named).collect() }
-        }
+        SceneError::Undeclared { surfaces } => SceneError::Undeclared {
+            surfaces: surfaces
+                .into_iter()
+                .map(|(surface, condition)| (named(surface), condition))
+                .collect(),
+        },
         other => other,
     })
 }

@@ -20,6 +20,7 @@
 
 mod across;
 mod blind;
+mod body;
 mod case;
 mod check;
 mod checkpoint;
@@ -66,6 +67,7 @@ mod temporal;
 mod timing;
 mod total;
 mod tradeoff;
+mod unit_system;
 mod updated;
 mod usual_step;
 mod verdict;
@@ -73,6 +75,7 @@ mod waves;
 mod whole_file;
 
 pub use blind::{BlindSpot, blind_spots};
+pub use body::forgotten_cell_length;
 pub use case::{Arithmetic, Case, CflSpeed, Extent};
 pub use check::{
     BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
@@ -140,6 +143,7 @@ pub use tradeoff::{
     RepeatOutcome, RunOutcome, Setting, SettingName, Skip, TOLERANCES, TimeEffect, Tradeoff,
     differences, extrapolate, families, leading, list, listed, median, pareto, tradeoff,
 };
+pub use unit_system::UnitPowers;
 pub use usual_step::{
     LARGEST_USUAL_CFL, OnPWaves, USUAL_CFL, UsualStep, on_p_waves, stiffest, usual_step,
 };

@@ -7,6 +7,7 @@ use mmsmith_runtime::{
 };
 use nalgebra::SVector;
 
+use crate::body::{refuse_centre, undeclared_planes};
 use crate::case::{Case, Extent};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
@@ -85,7 +86,9 @@ fn fitted_cells<const D: usize>(
     fitting.sort_by_key(|count| count.abs_diff(cells));
     fitting.truncate(4);
     fitting.sort_unstable();
-    Err(SceneError::Misfit { cells, spacing, sides: sides.iter().copied().collect(), fitting })
+    let cell_length = Some(sides.min()).filter(|side| are_multiples(sides, side / cells as f64));
+    let sides = sides.iter().copied().collect();
+    Err(SceneError::Misfit { cells, spacing, sides, fitting, cell_length })
 }
 
 /// The lower corner and the cells of a grid that reaches beyond every face of a box that is no wall: as far as the exact motion goes
@@ -181,6 +184,7 @@ impl<const D: usize> Scene<D> {
         end: f64,
     ) -> Result<Self, SceneError> {
         let domain = solution.domain();
+        refuse_centre(&domain)?;
         let spacing = solution.cell_length() / case.cells as f64;
         let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
         let size = points::size(&domain).ok_or_else(unknown)?;
@@ -198,7 +202,10 @@ impl<const D: usize> Scene<D> {
         let declared = |s: &Surface| solution.boundaries().iter().any(|b| b.surface == *s);
         let surfaces: Vec<_> = surfaces.into_iter().filter(|surface| !declared(surface)).collect();
         if !surfaces.is_empty() {
-            return Err(SceneError::Undeclared { surfaces });
+            let moved = surfaces.into_iter().map(|surface| (surface, Condition::PrescribedMotion));
+            let planes = undeclared_planes(solution, case).into_iter();
+            let planes = planes.map(|plane| (plane, Condition::Symmetry));
+            return Err(SceneError::Undeclared { surfaces: moved.chain(planes).collect() });
         }
         if matches!(domain, Domain::Tube { .. }) && case.scheme.updated().is_some() {
             let why = "the updated formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
@@ -575,7 +582,7 @@ fn quarter<const D: usize>(
     };
     match extent {
         Some(_) if !is_annulus => Err(SceneError::Extent(
-            "the extent can be chosen for an annulus only, and this is a box",
+            "the extent can be chosen for a body between two radii only, a ring or a shell: leave --extent out",
         )),
         Some(Extent::Full) => Ok(false),
         Some(Extent::Quarter) if moved => Err(SceneError::Extent(

@@ -155,8 +155,9 @@ impl Total {
                 return Err(CaseError::setting(
                     "extent",
                     "full",
-                    "quarter on a spherical grid, between three planes of symmetry that the file has to declare, also of an axisymmetric shell: \
-                     [[boundary]] with condition = 'symmetry' and surface = 'X-lower', with surface = 'Y-lower', and with surface = 'Z-lower'",
+                    "quarter on a spherical grid, which is the eighth of the shell between three planes of symmetry: leave --extent out where \
+                     the file declares them, or declare them, also of an axisymmetric shell: [[boundary]] with condition = 'symmetry' and \
+                     surface = 'X-lower', with surface = 'Y-lower', and with surface = 'Z-lower'",
                 ));
             }
             (Domain::Annulus { inner, outer }, Coordinates::Spherical) if D == 3 => {
@@ -190,15 +191,6 @@ impl Total {
                     "grid",
                     name,
                     "spherical for a shell in the total Lagrangian formulation",
-                ));
-            }
-            (Domain::Tube { inner, around, .. }, Coordinates::Cylindrical)
-                if *inner == 0.0 && !matches!(around, Around::Axisymmetric) =>
-            {
-                return Err(CaseError::setting(
-                    "grid",
-                    name,
-                    "cylindrical for a body that is hollow or axisymmetric: cells at the axis have no width",
                 ));
             }
             (Domain::Tube { inner, outer, lower, upper, around }, Coordinates::Cylindrical)
@@ -247,6 +239,9 @@ impl Total {
 /// The width of the narrowest cells of the grid that fits a body, as a share of that of the others.
 fn narrowest<const D: usize>(exact: &dyn Solution<f64, D>) -> f64 {
     match exact.domain() {
+        // Refused where it is put on a grid.
+        Domain::Annulus { inner: 0.0, .. }
+        | Domain::Tube { inner: 0.0, around: Around::Whole | Around::Sector { .. }, .. } => 1.0,
         Domain::Annulus { inner, outer } => {
             let around = inner / (0.5 * (inner + outer));
             if D == 3 { around * POLAR_ANGLES[0].sin() } else { around }

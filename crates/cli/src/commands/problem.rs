@@ -4,7 +4,7 @@ use anyhow::Result;
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Arithmetic, Case, CaseError, Coordinates, Discretized, Extent, Integrator, Named, POLAR_ANGLES,
-    Volume,
+    Volume, forgotten_cell_length,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -43,7 +43,17 @@ impl Model {
         let admit = |case: &Case| {
             let found = self.discretized(case)?;
             let parts = processes::ranks().map_or(1, |ranks| ranks.count());
-            memory::require(found.plan().bytes / parts as f64, case.cells)?;
+            memory::require(found.plan().bytes / parts as f64, case.cells).map_err(|error| {
+                match forgotten_cell_length(&self.exact) {
+                    Some([side, length]) => error.context(format!(
+                        "the cells divide a length of {}, and the body has a side of {}: with cell-length = {side:?} under [domain] of its \
+                         specification, or with the parameter that is this length, as cell-length = 'L', they divide that",
+                        number::exact(length),
+                        number::exact(side)
+                    )),
+                    None => error,
+                }
+            })?;
             Ok(found)
         };
         cases.iter().map(admit).collect()

@@ -20,6 +20,7 @@ mod score_readings;
 mod shards;
 mod simulate;
 mod stability;
+mod stated_bodies;
 mod statics;
 #[cfg(unix)]
 mod terminal;
