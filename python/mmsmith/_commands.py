@@ -448,9 +448,11 @@ def stability(
         upper: CFL number that is expected to be unstable; raised until a run is. Default: the number at which a P-wave crosses one cell in
             one step.
         error_multiple: A run is unstable if its error of u exceeds this multiple of the error of the reference run, at CFL 0.125 on
-            P-waves. Default: 10.
+            P-waves. The part of that error which its steps cause grows with the order of the integrator first: accuracy lost in time is no
+            instability. Default: 10.
         energy_rate: A run is unstable if its energy, in excess of the exact energy and of the reference run's excess, grows faster than
-            this multiple of the largest exact energy per period. Default: 1.
+            this multiple of the largest exact energy per period. Laws without a strain energy, as those with memory, have no such limit.
+            Default: 1.
         at: Run at this CFL number only; exit status 1 if the run is unstable.
         search: Look for unstable runs among random settings with CFL numbers up to cfl on P-waves, which should be stable; exit status 1 if
             there are any.

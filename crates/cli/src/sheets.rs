@@ -48,10 +48,12 @@ pub(crate) fn temporal(temporal: &Temporal) -> Sheet {
 }
 
 /// A run's history: a line that says what is what, the header, and a line for each moment; `nan` where there is no number.
-pub(crate) fn history(history: &[Moment]) -> Sheet {
+/// Momenta are by axis; of a body of revolution along the radius, around the axis and along it.
+pub(crate) fn history(history: &[Moment], is_of_revolution: bool) -> Sheet {
     let axes = history.first().map_or(0, |moment| moment.exact.momentum.len());
+    let names = if is_of_revolution { ["R", "theta", "Z"] } else { ["x", "y", "z"] };
     let sums = |of: &'static str| {
-        let momenta = ["x", "y", "z"].into_iter().take(axes).map(|axis| format!("momentum_{axis}"));
+        let momenta = names.into_iter().take(axes).map(|axis| format!("momentum_{axis}"));
         let energies = ["kinetic_energy", "strain_energy"].map(str::to_owned);
         energies.into_iter().chain(momenta).map(move |name| format!("{of}{name}"))
     };

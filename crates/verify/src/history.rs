@@ -3,11 +3,15 @@
 //! The body force of a manufactured solution does work, so that the energy of the exact motion is not constant. What a scheme
 //! gains or loses is the difference between the two.
 
+use std::f64::consts::TAU;
+
 use bytemuck::Pod;
+use mmsmith_laws::{ElasticInSpace, with_hoop_stretch};
 use mmsmith_measure::norms::PerNorm;
 use mmsmith_measure::{Homes, each_group, joined, joined_over};
 use mmsmith_mpm::{Law, Particles};
 use mmsmith_runtime::{Real, Solution};
+use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use crate::precision::Precision;
@@ -34,14 +38,16 @@ pub struct Moment {
     pub exact: Sums,
 }
 
-/// Sums over all particles, per unit of what the dimension leaves out: of length in a plane, of area on a line.
+/// Sums over all particles, per unit of what the dimension leaves out: of length in a plane, of area on a line. Of a body of revolution they
+/// are those of all of it, whichever formulation runs it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sums {
     /// `sum m_p |v_p|^2 / 2`.
     pub kinetic_energy: f64,
-    /// `sum V0_p W(F_p)`; not a number where a particle is inside out.
+    /// `sum V0_p W(F_p)`; not a number where a particle is inside out, and of laws that have no strain energy, as those with memory.
     pub strain_energy: f64,
-    /// `sum m_p v_p`, by axis.
+    /// `sum m_p v_p`, by axis; of a body of revolution the sums of the components along the radius, around the axis and along it, of which
+    /// the last alone is a momentum of the body.
     pub momentum: Vec<f64>,
 }
 
@@ -106,6 +112,38 @@ impl<const D: usize> From<Motion<D>> for Sums {
     }
 }
 
+/// The strain energy per reference volume, of a body of revolution too.
+struct StrainEnergy<'a, const D: usize> {
+    law: &'a Law<f64, D>,
+    /// The law of space, where the law is that of a half plane.
+    in_space: Option<Law<f64, 3>>,
+}
+
+impl<'a, const D: usize> StrainEnergy<'a, D>
+where
+    f64: Precision<D>,
+{
+    fn new(law: &'a Law<f64, D>) -> Self {
+        let in_space = match law {
+            Law::WithMemory(own) => own.of_half_plane().map(|elastic| match elastic {
+                ElasticInSpace::Library(material) => Law::Library(*material),
+                ElasticInSpace::Own(own) => Law::Own(own.clone()),
+            }),
+            Law::Library(_) | Law::Own(_) => None,
+        };
+        Self { law, in_space }
+    }
+
+    /// Of a particle that was at `X` and is at `x`; not a number where it is inside out, or the law has no energy.
+    fn at(&self, F: &SMatrix<f64, D, D>, X: &SVector<f64, D>, x: &SVector<f64, D>) -> f64 {
+        let energy = match &self.in_space {
+            Some(law) => law.strain_energy(&with_hoop_stretch(F, x[0] / X[0])),
+            None => self.law.strain_energy(F),
+        };
+        energy.unwrap_or(f64::NAN)
+    }
+}
+
 impl<const D: usize> Totals<D> {
     /// Totals of no particles yet, the first of which is to be `worst`.
     fn of_none(worst: usize) -> Self {
@@ -166,13 +204,18 @@ impl<const D: usize> Totals<D> {
     where
         f64: Precision<D>,
     {
+        let energy = StrainEnergy::new(law);
+        // Particles of a half plane have the volume and the mass of a radian.
+        let radians = if exact.is_half_plane() { TAU } else { 1.0 };
         let group = |g: usize| {
             let mut totals = Self::of_none(g * GROUP);
             for p in g * GROUP..particles.len().min((g + 1) * GROUP) {
                 let X = particles.X[p].map(Real::to_f64);
-                let (mass, volume) = (particles.mass[p].to_f64(), particles.volume[p].to_f64());
-                let u = particles.x[p].map(Real::to_f64) - X;
-                let error = (u - exact.displacement(&X, time)).norm();
+                let [mass, volume] =
+                    [particles.mass[p], particles.volume[p]].map(|own| own.to_f64() * radians);
+                let x = particles.x[p].map(Real::to_f64);
+                let exact_u = exact.displacement(&X, time);
+                let error = (x - X - exact_u).norm();
                 if error > totals.error || error.is_nan() {
                     (totals.error, totals.worst) = (error, p);
                 }
@@ -180,11 +223,12 @@ impl<const D: usize> Totals<D> {
                 let exact_v = exact.velocity(&X, velocity_time);
                 let F = particles.F[p].map(Real::to_f64);
                 let exact_F = exact.deformation_gradient(&X, time);
-                for (motion, v, F) in
-                    [(&mut totals.computed, v, F), (&mut totals.exact, exact_v, exact_F)]
-                {
+                for (motion, x, v, F) in [
+                    (&mut totals.computed, x, v, F),
+                    (&mut totals.exact, X + exact_u, exact_v, exact_F),
+                ] {
                     // A particle that is inside out has no energy; the solver stops at its next step.
-                    let strain = volume * law.strain_energy(&F).unwrap_or(f64::NAN);
+                    let strain = volume * energy.at(&F, &X, &x);
                     let kinetic = 0.5 * mass * v.norm_squared();
                     let momentum = std::array::from_fn(|axis| mass * v[axis]);
                     motion.add(&Motion { kinetic, strain, momentum });
@@ -283,7 +327,15 @@ impl<'a, const D: usize> Recorder<'a, D> {
             None => Totals::of(particles, law, exact, time, velocity_time),
             Some(homes) => Totals::of_all(homes, particles, law, exact, time, velocity_time),
         };
-        let (computed, exact) = (totals.computed.into(), totals.exact.into());
+        let is_half_plane = exact.is_half_plane();
+        let [computed, exact] = [totals.computed, totals.exact].map(|motion| {
+            let mut sums = Sums::from(motion);
+            if is_half_plane {
+                // Nothing turns about the axis there.
+                sums.momentum.insert(1, 0.0);
+            }
+            sums
+        });
         self.moments.push(Moment { step, time, velocity_time, u, computed, exact });
     }
 }

@@ -60,7 +60,7 @@ pub struct Observed {
     /// The largest error of `u`, a length.
     pub error: Option<f64>,
     /// The largest difference between the energy and that of the exact motion, gain or loss, in units of the exact
-    /// motion's largest.
+    /// motion's largest; none where the law has no strain energy.
     pub energy_drift: Option<f64>,
     /// The largest difference between the momentum and that of the exact motion, in units of the largest sum of all
     /// particles' exact momenta's magnitudes.
@@ -106,7 +106,7 @@ where
 pub(crate) struct Limits {
     pub(crate) error: f64,
     pub(crate) energy_rate: f64,
-    /// The reference run's largest difference of energy.
+    /// The reference run's largest difference of energy; infinite where no energies are known.
     pub(crate) energy_drift: f64,
     /// The case's period.
     pub(crate) period: f64,
@@ -163,8 +163,12 @@ impl<const D: usize> Run<'_, D> {
             let particles = solver.observe().0;
             let totals = Totals::of(particles, &law, self.exact, time, time - lag);
             error = error.max(totals.error);
-            let gain = (totals.computed.energy() - totals.exact.energy()) / scales.0;
-            energy = energy.max(gain.abs());
+            let gain = match totals.computed.energy() - totals.exact.energy() {
+                0.0 => 0.0,
+                gain => gain / scales.0,
+            };
+            // The last step of a run may have no energy, where a particle is inside out.
+            energy = if scales.0.is_nan() { f64::NAN } else { energy.max(gain.abs()) };
             let momenta = totals.computed.momentum.iter().zip(&totals.exact.momentum);
             let length = momenta.map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt();
             momentum = momentum.max(length / scales.1);
@@ -218,7 +222,7 @@ impl<const D: usize> Run<'_, D> {
         None
     }
 
-    /// The largest energy of the exact motion, and the largest sum of its momenta's magnitudes.
+    /// The largest energy of the exact motion, not a number where its law has none, and the largest sum of its momenta's magnitudes.
     fn largest<T: Real>(&self, particles: &Particles<T, D>, law: &Law<f64, D>) -> (f64, f64)
     where
         f64: Precision<D>,
@@ -228,7 +232,8 @@ impl<const D: usize> Run<'_, D> {
         for moment in 0..MOMENTS {
             let time = period * moment as f64 / MOMENTS as f64;
             let totals = Totals::of(particles, law, self.exact, time, time);
-            largest.0 = largest.0.max(totals.exact.energy());
+            let energy = totals.exact.energy();
+            largest.0 = if energy <= largest.0 || largest.0.is_nan() { largest.0 } else { energy };
             largest.1 = largest.1.max(totals.exact_momenta);
         }
         largest

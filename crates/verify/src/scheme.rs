@@ -228,6 +228,14 @@ impl Scheme {
         }
     }
 
+    /// The order with which errors of time stepping grow; those of the updated formulation at most.
+    pub(crate) fn order_in_time(&self) -> i32 {
+        match self {
+            Self::Updated(_) => 2,
+            Self::Total(total) => total.composition.order() as i32,
+        }
+    }
+
     /// Whether the first velocities are those of half a step before the start.
     pub(crate) fn starts_early(&self) -> bool {
         self.updated().is_some_and(|updated| updated.start != Start::Halved)

@@ -24,9 +24,9 @@ pub(crate) struct RunOptions {
     /// Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium
     #[arg(long, value_name = "DIR")]
     pub(crate) vtk: Option<PathBuf>,
-    /// Number of particle files, spread evenly from the first state to the last
-    #[arg(long, value_name = "N", default_value_t = 20, requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
-    pub(crate) frames: u64,
+    /// Number of particle files, spread evenly from the first state to the last. Default: 20
+    #[arg(long, value_name = "N", requires = "vtk", value_parser = clap::value_parser!(u64).range(2..))]
+    pub(crate) frames: Option<u64>,
     /// Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one
     #[arg(long, value_name = "DIR")]
     pub(crate) checkpoint: Option<PathBuf>,

@@ -39,11 +39,13 @@ pub(crate) struct StabilityOptions {
     /// cell in one step
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) upper: Option<f64>,
-    /// A run is unstable if its error of u exceeds this multiple of the error of the reference run, at CFL 0.125 on P-waves
+    /// A run is unstable if its error of u exceeds this multiple of the error of the reference run, at CFL 0.125 on P-waves. The
+    /// part of that error which its steps cause grows with the order of the integrator first: accuracy lost in time is no
+    /// instability
     #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().error_multiple, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) error_multiple: f64,
     /// A run is unstable if its energy, in excess of the exact energy and of the reference run's excess, grows faster than this
-    /// multiple of the largest exact energy per period
+    /// multiple of the largest exact energy per period. Laws without a strain energy, as those with memory, have no such limit
     #[arg(long, value_name = "X", default_value_t = verify::Criteria::default().energy_rate, allow_negative_numbers = true, value_parser = positive_number)]
     pub(crate) energy_rate: f64,
     /// Run at this CFL number only; exit status 1 if the run is unstable

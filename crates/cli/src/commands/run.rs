@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Case, Checkpoints, Discretized, FrameOutput, Moment, Outputs, Profile, Row, RunTraffic, Scheme,
-    Status, energy_drift,
+    Status, energy_drift, is_axisymmetric,
 };
 use serde_json::{Map, Value, json};
 
@@ -28,6 +28,9 @@ use crate::table::{self, Table};
 use crate::units::{self, Units};
 use crate::{number, processes, sheets, terminal};
 
+/// Particle files of a run where their number is not said.
+const USUAL_FRAMES: u64 = 20;
+
 /// A run, by the words of its command line.
 pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
     let selection = Selection::new(&options.name, &options.scheme.parameters.set)?;
@@ -36,6 +39,8 @@ pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
         ("--history", options.history.is_some()),
         ("--plot", options.plot.is_some()),
         ("--picture", options.picture.file.is_some()),
+        ("--frames", options.frames.is_some()),
+        ("--profile", options.profile),
     ];
     if statics::is_asked(&selection, &options.statics, &options.scheme, &of_time)? {
         return statics::run(selection, options);
@@ -81,7 +86,8 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
         let report = ran.report(options, problem, case)?;
         terminal::say(&report.text())?;
         if let Some(file) = history {
-            file.write_text(&sheets::history(ran.moments()).csv()?)?;
+            let is_of_revolution = is_axisymmetric(&problem.model.exact);
+            file.write_text(&sheets::history(ran.moments(), is_of_revolution).csv()?)?;
         }
         if let Some(file) = plot {
             file.write_text(&ran.drift(problem, case.case()))?;
@@ -122,7 +128,7 @@ fn simulate(
     let frames = options.vtk.as_ref().map(|folder| FrameOutput {
         folder: folder.clone(),
         name: problem.selection.name().to_owned(),
-        count: options.frames,
+        count: options.frames.unwrap_or(USUAL_FRAMES),
         provenance: Some(problem.selection.provenance()),
     });
     let mut traffic = RunTraffic::default();
@@ -199,6 +205,9 @@ impl Ran {
             results.insert("profile".into(), profile::document(profile));
         }
         if let Some(moments) = moments {
+            if moments.first().is_some_and(|start| start.exact.strain_energy.is_nan()) {
+                said += "The law has no strain energy: --history has nan for it, and --plot no curve.\n";
+            }
             results.insert("history".into(), history_document(moments));
         }
         let (extent, Case { cells, cfl, .. }) = (case.plan().extent, *case.case());

@@ -308,3 +308,132 @@ fn commands_warn_of_motions_that_are_unstable_and_of_none_that_are_not() {
     assert!(called.stdout.contains("error exceeds the motion"), "{}", called.stdout);
     assert_eq!(called.status, 1);
 }
+
+/// A square of a motion, with the same condition on all sides.
+fn square(place: &Path, name: &str, displacement: &str, condition: &str, units: &str) {
+    let side =
+        |name: &str| format!("[[boundary]]\nsurface = '{name}'\ncondition = '{condition}'\n");
+    let sides: String = ["X-lower", "X-upper", "Y-lower", "Y-upper"].map(side).concat();
+    let text = format!(
+        "name = '{name}'\ntitle = '{name}'\ncoordinates = 'cartesian'\ndimension = 2\n[parameters]\nA = {{ default = 0.1{units} }}\n\
+         E = {{ default = 1000 }}\nnu = {{ default = 0.3 }}\nrho0 = {{ default = 2 }}\n[let]\nc = 'sqrt(E/rho0)'\n[displacement]\n\
+         {displacement}\n[material]\nlaw = 'neo-hookean'\n[domain]\nshape = 'box'\nlower = [0, 0]\nupper = [1, 1]\n{sides}\
+         [time]\nperiod = '2/c'\n"
+    );
+    std::fs::write(place.join(format!("{name}.toml")), text).expect("a specification");
+}
+
+/// Where the grid contains the motion, errors are those of the steps alone, and grow by far more than ten below the limit.
+#[test]
+fn accuracy_lost_in_time_is_no_instability() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let affine = "X = 'A*X*cos(c*t)'\nY = '-A*Y*cos(c*t)'";
+    square(place, "affine", affine, "prescribed-motion", "");
+    let rigid = "X = 'A*cos(c*t)'\nY = 'A*sin(c*t)'";
+    square(place, "rigid", rigid, "traction-free", "");
+    // Beside the limit that runs without a criterion of the error have, which end inside out from there on.
+    for (name, least) in [("affine", 0.4), ("rigid", 0.24)] {
+        let call = format!(
+            "stability {name}.toml --cells 4 --periods 0.5 --formulation total-lagrangian --width 0.05 --json l.json"
+        );
+        let called = mms(place, &call);
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        let row = read_json(&place.join("l.json"))["rows"][0].clone();
+        let number = |value: &Value| value.as_f64().expect("a number");
+        assert!(number(&row["cfl_max"]) > least, "{name}: {row}");
+        let times = number(&row["at_limit"]["error"]) / number(&row["reference"]["error"]);
+        assert!(times > 10.0, "{name}: {times}");
+    }
+}
+
+#[test]
+fn without_a_strain_energy_there_is_no_drift_and_that_is_said() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let call = "stability bar-j2 --cells 4 --periods 0.1 --width 0.2 --json m.json";
+    let called = mms(place, call);
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let row = read_json(&place.join("m.json"))["rows"][0].clone();
+    assert!(
+        row["at_limit"]["energy_drift"].is_null() && row["reference"]["energy_drift"].is_null(),
+        "{row}"
+    );
+    assert!(called.stdout.contains("The law has no strain energy"), "{}", called.stdout);
+    let called = mms(place, "stability bar-j2 --cells 4 --periods 0.1 --at 0.2");
+    assert!(called.stdout.contains("The law has no strain energy"), "{}", called.stdout);
+
+    // A law of space has one in the half plane, too.
+    let half = "thick-cylinder --cells 4 --periods 0.1 --formulation updated-lagrangian --shape cpdi2 --layout clipped";
+    let called = mms(place, &format!("stability {half} --width 0.3 --json m.json"));
+    let row = read_json(&place.join("m.json"))["rows"][0].clone();
+    assert!(row["reference"]["energy_drift"].as_f64().is_some_and(|drift| drift > 0.0), "{row}");
+    assert!(!called.stdout.contains("no strain energy"), "{}", called.stdout);
+}
+
+#[test]
+fn units_are_varied_where_parameters_have_them_and_refused_by_name_elsewhere() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let motion = "X = 'A*sin(Pi*X)*sin(c*t)'\nY = '0'";
+    square(place, "bare", motion, "prescribed-motion", ", unit = 'm'");
+    let call = "stability bare.toml --cells 4 --width 0.2 --over units=0,3";
+    refuses(place, call, &["units=3", "E, nu, rho0", "E = { default = 1000.0, unit = 'Pa' }"]);
+    let file = place.join("bare.toml");
+    let text = std::fs::read_to_string(&file).expect("a specification");
+    let text = text.replace("default = 1000 ", "default = 1000, unit = 'Pa' ");
+    std::fs::write(&file, text.replace("default = 2 ", "default = 2, unit = 'kg/m^3' "))
+        .expect("a file");
+    let called = mms(place, &format!("{call} --json m.json"));
+    assert_eq!(called.status, 0, "{}", called.stderr);
+    let rows = read_json(&place.join("m.json"))["rows"].clone();
+    assert_eq!(rows[0]["bracket"], rows[1]["bracket"]);
+}
+
+#[test]
+fn options_without_an_effect_are_refused() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    refuses(place, "stability bar --cells 4 --cfl 0.2", &["--cfl 0.2", "--at 0.2", "--lower"]);
+    refuses(place, "stability bar --cells 4 --at 0.3 --cfl 0.2", &["--cfl 0.2"]);
+    for option in ["--cfl 0.2", "--layout gauss", "--ppc 3", "--precision f32", "--energy-rate 2"] {
+        let name = option.split(' ').next().unwrap_or_default();
+        let call = format!("stability swirl --exact --cells 4 {option}");
+        refuses(place, &call, &[&format!("--exact {name}"), "leave"]);
+    }
+    refuses(place, "run bar --static --cells 4 --vtk v --frames 3", &["--frames"]);
+    refuses(place, "run bar --static --cells 4 --profile", &["--profile"]);
+}
+
+/// Both formulations tell of the whole body, in columns of the same names.
+#[test]
+fn a_body_of_revolution_has_one_energy_in_both_formulations() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let of = |scheme: &str| {
+        let call = format!(
+            "run thick-cylinder --cells 8 --periods 0.2 {scheme} --history h.csv --json r.json"
+        );
+        let called = mms(place, &call);
+        assert_eq!(called.status, 0, "{}", called.stderr);
+        let text = std::fs::read_to_string(place.join("h.csv")).expect("a history");
+        let header = text.lines().nth(1).expect("a header").to_owned();
+        let history = read_json(&place.join("r.json"))["history"].clone();
+        let last = |name: &str| {
+            history[name].as_array().and_then(|all| all.last().cloned()).expect("a list")
+        };
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let start = number(&history["strain_energy"][0]);
+        (header, start, number(&last("kinetic_energy")), number(&last("momentum")[2]))
+    };
+    let updated = of("--formulation updated-lagrangian --shape cpdi2 --layout clipped --cfl 0.05");
+    let total = of("--formulation total-lagrangian --shape bspline3 --cfl 0.1");
+    assert_eq!(updated.0, total.0);
+    assert!(updated.0.contains(",momentum_R,momentum_theta,momentum_Z,"), "{}", updated.0);
+    for (one, other) in [(updated.1, total.1), (updated.2, total.2), (updated.3, total.3)] {
+        assert!((one - other).abs() < 0.05 * other.abs(), "{updated:?} {total:?}");
+    }
+    // A law with memory has no strain energy.
+    let called = mms(place, "run bar-j2 --cells 4 --periods 0.05 --history h.csv");
+    assert!(called.stdout.contains("no strain energy"), "{}", called.stdout);
+}

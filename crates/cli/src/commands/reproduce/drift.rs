@@ -62,7 +62,7 @@ pub(super) fn section(out: &Path, paces: &[Pace], agenda: &Agenda) -> Result<Sec
             let row = one.run(&mut outputs)?;
             let report = Report {
                 settings: known.settings(one.plan().extent, CELLS, base.cfl),
-                sections: vec![Part::Sheet(sheets::history(&history))],
+                sections: vec![Part::Sheet(sheets::history(&history, false))],
                 ..Report::new("run")
             };
             let report = report.with("result", json!(row));

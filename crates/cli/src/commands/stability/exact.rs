@@ -1,7 +1,7 @@
 //! `mms stability --exact`: how much disturbances of the exact motion grow, whatever the scheme.
 
 use anyhow::{Context, Result, bail};
-use mmsmith_verify::{A_DIGIT, Grown, Growth, GrowthSettings, growth};
+use mmsmith_verify::{A_DIGIT, Criteria, Grown, Growth, GrowthSettings, growth};
 use serde_json::{Map, Value, json};
 
 use super::{Point, request, vary};
@@ -41,6 +41,7 @@ pub(super) fn exact(options: &StabilityOptions) -> Result<bool> {
             "--exact --over {name}=...: the exact motion has no {name}; parameters of the solution, cells and periods can be varied"
         );
     }
+    refuse_scheme(options)?;
     let SchemeOptions { parameters, periods, .. } = options.scheme.clone();
     let scheme = SchemeOptions { parameters, periods, ..SchemeOptions::open() };
     let points = vary::points(options, &scheme, &selection)?;
@@ -65,6 +66,41 @@ pub(super) fn exact(options: &StabilityOptions) -> Result<bool> {
         let found = points.iter().map(measure).collect::<Result<Vec<_>>>()?;
         report(options, &points, &found)?.publish(files)
     })
+}
+
+/// Refuses options of a scheme: the exact motion has none of them.
+fn refuse_scheme(options: &StabilityOptions) -> Result<()> {
+    let (scheme, usual) = (&options.scheme, SchemeOptions::open());
+    let criteria = Criteria::default();
+    let given = [
+        ("--formulation", scheme.formulation.is_some()),
+        ("--mass", scheme.mass.is_some()),
+        ("--composition", scheme.composition.is_some()),
+        ("--return-map", scheme.return_map.is_some()),
+        ("--volume", scheme.volume != usual.volume),
+        ("--layout", scheme.layout.is_some()),
+        ("--grid", scheme.grid.is_some()),
+        ("--cfl-speed", scheme.cfl_speed.is_some()),
+        ("--integrator", scheme.integrator != usual.integrator),
+        ("--transfer", scheme.transfer != usual.transfer),
+        ("--start", scheme.start != usual.start),
+        ("--ppc", scheme.ppc.is_some()),
+        ("--cfl", scheme.cfl.is_some()),
+        ("--extent", scheme.extent.is_some()),
+        ("--offset", scheme.offset != usual.offset),
+        ("--grid-angle", scheme.grid_angle != usual.grid_angle),
+        ("--grid-shift", scheme.grid_shift != usual.grid_shift),
+        ("--precision", scheme.precision != usual.precision),
+        ("--error-multiple", options.error_multiple != criteria.error_multiple),
+        ("--energy-rate", options.energy_rate != criteria.energy_rate),
+    ];
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => bail!(
+            "--exact {option}: the exact motion has no scheme; of the options of schemes --exact takes --periods, and --shape for the degree \
+             of its splines; leave {option} out"
+        ),
+        None => Ok(()),
+    }
 }
 
 /// The degree of the splines that are asked for by a shape.

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Error, Result, bail};
 use clap::ValueEnum;
-use mmsmith_verify::{Named, names};
+use mmsmith_verify::{Named, UnitPowers, names};
 
 use super::Point;
 use crate::arguments::{Precision, SchemeOptions, StabilityOptions};
@@ -110,21 +110,98 @@ fn word<V: ValueEnum>(text: &str) -> Result<V> {
 /// divides is among the parameters, as L.
 fn in_units(selection: &Selection, power: i32) -> Result<Selection> {
     let units = selection.units();
-    let length = if units.contains_key("L") { power } else { 0 };
-    let (mass, time) = (5 * power, power);
+    let is_length = |unit: &String| matches!(kind(unit), Some(Kind::Length));
+    let length = if units.get("L").is_some_and(is_length) { power } else { 0 };
+    let powers = UnitPowers { mass: 5 * power, length, time: power };
     let mut values = Vec::new();
     for (name, value) in selection.parameters() {
         let unit = units.get(name).map_or("", String::as_str);
-        let exponent = match unit {
-            "" => 0,
-            "m" => length,
-            "1/m" => -length,
-            "s" => time,
-            "Pa" => mass - length - 2 * time,
-            "kg/m^3" => mass - 3 * length,
-            _ => bail!("the unit '{unit}' of {name} is not known here"),
+        let exponent = match kind(unit) {
+            Some(Kind::Number) => 0,
+            Some(Kind::Length) => length,
+            Some(Kind::PerLength) => -length,
+            Some(Kind::Time) => power,
+            Some(Kind::PerTime) => -power,
+            Some(Kind::Stress) => powers.stress(),
+            Some(Kind::Density) => powers.density(),
+            None => bail!("the unit '{unit}' of {name} is not known here"),
         };
         values.push((name.clone(), value * 2.0_f64.powi(exponent)));
     }
-    selection.with(&values)
+    let changed = selection.with(&values)?;
+    if powers.relate(&selection.build()?, &changed.build()?) {
+        return Ok(changed);
+    }
+    let without = selection
+        .parameters()
+        .iter()
+        .filter(|(name, _)| units.get(*name).is_none_or(String::is_empty));
+    let without: Vec<_> = without.collect();
+    let Some((name, value)) = without.first() else {
+        bail!(
+            "the motion is another one in other units: its specification has numbers that are lengths, times or stresses; make parameters of \
+             them, with their units"
+        );
+    };
+    let names: Vec<_> = without.iter().map(|(name, _)| name.as_str()).collect();
+    bail!(
+        "the motion is another one in other units: of the parameters without a unit, {}, not all are pure numbers; write in the \
+         specification the unit of each that is none, one of 'm', '1/m', 's', '1/s', 'Pa' and 'kg/m^3', as\n\n{name} = {{ default = {value:?}, unit = '{}' }}",
+        names.join(", "),
+        usual_unit(name),
+    )
+}
+
+/// The unit that a parameter of this name mostly has.
+fn usual_unit(name: &str) -> &'static str {
+    match name {
+        "E" | "K" | "G" | "mu" | "lambda" | "kappa" => "Pa",
+        name if name.starts_with("rho") => "kg/m^3",
+        _ => "m",
+    }
+}
+
+/// Kinds of units that are known here.
+enum Kind {
+    Number,
+    Length,
+    PerLength,
+    Time,
+    PerTime,
+    Stress,
+    Density,
+}
+
+/// The kind of a unit, whatever its size.
+fn kind(unit: &str) -> Option<Kind> {
+    Some(match unit {
+        "" | "1" | "rad" => Kind::Number,
+        "m" | "mm" => Kind::Length,
+        "1/m" | "1/mm" => Kind::PerLength,
+        "s" | "ms" => Kind::Time,
+        "1/s" | "1/ms" => Kind::PerTime,
+        "Pa" | "kPa" | "MPa" | "GPa" => Kind::Stress,
+        "kg/m^3" | "t/m^3" | "t/mm^3" | "g/mm^3" | "kg/mm^3" => Kind::Density,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmsmith_solutions::CATALOGUE;
+
+    /// The parameters of the library without a unit are pure numbers.
+    #[test]
+    fn every_solution_of_the_library_is_the_same_motion_in_other_units_or_has_one_that_is_not_known()
+     {
+        let mut refused = Vec::new();
+        for description in CATALOGUE {
+            let selection = Selection::new(description.name, &[]).expect("a solution");
+            if let Err(error) = in_units(&selection, 3) {
+                refused.push(format!("{}: {error}", description.name));
+            }
+        }
+        assert_eq!(refused, Vec::<String>::new());
+    }
 }
