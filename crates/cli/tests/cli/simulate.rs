@@ -432,7 +432,7 @@ fn bad_input_is_met_with_what_would_be_right() {
     refuses(place, "run ring --cfl 1e-300", &["steps"]);
     refuses(place, "run ring --cells 99999999", &["--cells 99999999", "GiB"]);
     refuses(place, "run ring --extent full --cells 18446744073709551615", &["steps"]);
-    refuses(place, "run axis-aligned --extent full", &["annulus"]);
+    refuses(place, "run axis-aligned --extent full", &["a ring or a shell"]);
     refuses(place, "run ring --shape cubic", &["linear", "ugimp", "gimp"]);
     refuses(place, "run ring --frames 5", &["--vtk"]);
     let total = "run axis-aligned --frame total --shape bspline3";

@@ -187,7 +187,7 @@ fn an_extent_is_for_rings_only() {
         until: None,
     };
     let error = run(&axis_aligned(), Arithmetic::Double, &case, &mut outputs).unwrap_err();
-    assert!(error.to_string().contains("annulus"), "{error}");
+    assert!(error.to_string().contains("a ring or a shell"), "{error}");
 }
 
 #[test]
