@@ -267,6 +267,14 @@ impl Planted {
         self.0.is_some()
     }
 
+    /// Does work on another thread as on the one where this was found.
+    pub fn carried<R>(self, work: impl FnOnce() -> R) -> R {
+        match self.0 {
+            Some(fault) => with(fault, work),
+            None => work(),
+        }
+    }
+
     /// The law as stresses are formed of it; energies keep their own.
     pub fn law_in_stresses<T: RealField + Copy>(self, material: Material<T>) -> Material<T> {
         if !self.is_any() {
@@ -304,6 +312,12 @@ impl Planted {
     #[must_use]
     pub const fn is_any(self) -> bool {
         false
+    }
+
+    /// Does the work.
+    #[inline(always)]
+    pub fn carried<R>(self, work: impl FnOnce() -> R) -> R {
+        work()
     }
 
     /// `material` as it is.

@@ -440,10 +440,9 @@ fn field_findings<const D: usize>(
 where
     f64: Precision<D>,
 {
-    let parts: Vec<Vec<Comparison<D>>> = samples
-        .par_chunks(SAMPLES_AT_ONCE)
-        .map(|samples| field_comparisons(solution, law, samples, size))
-        .collect();
+    let planted = mmsmith_laws::fault::Planted::here();
+    let compare = |samples| planted.carried(|| field_comparisons(solution, law, samples, size));
+    let parts: Vec<Vec<Comparison<D>>> = samples.par_chunks(SAMPLES_AT_ONCE).map(compare).collect();
     let mut parts = parts.into_iter();
     let Some(mut all) = parts.next() else { return Vec::new() };
     for part in parts {

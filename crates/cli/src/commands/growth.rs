@@ -163,7 +163,7 @@ impl Warnings {
     }
 }
 
-/// What drives disturbances on.
+/// The cause that drives disturbances on.
 fn cause(extremes: &Extremes) -> String {
     match extremes.wave_stiffness > 0.0 {
         true => format!(
