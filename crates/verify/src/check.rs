@@ -20,6 +20,7 @@ use crate::case::law_of_body;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
+use crate::flow::is_of_memory;
 use crate::inverse::determinant;
 use crate::points;
 use crate::precision::Precision;
@@ -265,9 +266,10 @@ fn has_body_in<const D: usize>(solution: &dyn Solution<f64, D>) -> bool {
                 keeps_volume(&X, t) && on.all(|(X, _)| keeps_volume(&X, t))
             })
         // Constants without a stated range may make no material that flows, whose histories end in no number.
-        && (0..MATERIAL_POINTS)
-            .filter_map(|n| points::interior(&domain, solution.period(), n))
-            .all(|(X, t)| solution.first_piola_kirchhoff(&X, t).iter().all(|P| P.is_finite()))
+        && (!is_of_memory(&solution.law())
+            || (0..MATERIAL_POINTS)
+                .filter_map(|n| points::interior(&domain, solution.period(), n))
+                .all(|(X, t)| solution.first_piola_kirchhoff(&X, t).iter().all(|P| P.is_finite())))
 }
 
 /// The least ratio of volumes of a body that is checked: below it, it may be turned inside
