@@ -574,12 +574,19 @@ fn along_lines<const D: usize, E: Send>(
     of: &(impl Fn([f64; D], &[f64]) -> Result<Series, E> + Sync),
 ) -> Result<usize, E> {
     const LINES: usize = 6;
-    const MOST: [usize; 3] = [16, 28, 40];
+    /// The last one is for lines around a body in the plane, on which a motion has waves; files for hosts have room for no more.
+    const MOST: [usize; 4] = [16, 28, 40, 64];
     const LEAST: usize = 4;
+    /// Where so many more polynomials leave out more than this share of what fewer do, the field is not smooth.
+    const STALLED: f64 = 0.1;
     /// The number of polynomials for a field that is not smooth.
     const ROUGH: usize = 24;
     let mut rough = 1.0;
-    for count in MOST {
+    let counts = if D < 3 { &MOST[..] } else { &MOST[..3] };
+    let mut most = counts[0];
+    for &count in counts {
+        let before = std::mem::replace(&mut rough, 0.0);
+        most = count;
         let (at, transform) = (roots(count), Transform::new(count));
         let [low, high] = range[axis];
         let samples: Vec<Result<Series, E>> = (0..LINES * count)
@@ -597,7 +604,6 @@ fn along_lines<const D: usize, E: Send>(
         let samples = samples.into_iter().collect::<Result<Vec<Series>, E>>()?;
         let quantities = samples.first().map_or(0, Vec::len);
         let mut needed = LEAST;
-        rough = 0.0;
         let largest = kinds.scales(&largest_in(&samples));
         for quantity in 0..quantities {
             let largest = largest[quantity];
@@ -614,8 +620,10 @@ fn along_lines<const D: usize, E: Send>(
         if rough <= tolerance {
             return Ok(needed);
         }
+        if count >= MOST[2] && rough > STALLED * before {
+            break;
+        }
     }
-    let most = MOST[MOST.len() - 1];
     Ok(if rough < 1e-9 { most } else { ROUGH })
 }
 

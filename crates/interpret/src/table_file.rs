@@ -101,7 +101,7 @@ pub enum TableFileError {
     /// Fields with finer waves than the polynomials of a table.
     #[error(
         "no table over the body is accurate: its polynomials miss the fields by {error:.1e} of their largest values, where {most:.0e} are allowed, \
-         because the motion or the density has finer waves than they"
+         because the motion or the density has finer waves than these polynomials follow"
     )]
     Rough {
         /// The error.

@@ -16,6 +16,8 @@ use crate::terminal;
 
 /// Tables with larger errors are worth a word.
 const CLOSE: f64 = 1e-11;
+/// Bytes of a table from which on hosts take long to read it.
+const LARGE: usize = 64 << 20;
 
 pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let found = locate(&options.name)?;
@@ -45,6 +47,12 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
                 ));
             }
             let (code, text) = tabulated::beside(Code::of(&spec, fields, origin), &file);
+            if text.len() > LARGE && options.points.is_none() {
+                terminal::note(format_args!(
+                    "the table has {} MB; where the points of your host are few, series of these alone are smaller: --points points.csv",
+                    text.len() >> 20
+                ));
+            }
             table = Some(text);
             code
         }
