@@ -134,7 +134,7 @@ where
         Self { law, in_space }
     }
 
-    /// Of a particle that was at `X` and is at `x`; not a number where it is inside out, or the law has no energy.
+    /// Strain energy density of a particle that was at `X` and is at `x`; not a number where it is inside out, or the law has no energy.
     fn at(&self, F: &SMatrix<f64, D, D>, X: &SVector<f64, D>, x: &SVector<f64, D>) -> f64 {
         let energy = match &self.in_space {
             Some(law) => law.strain_energy(&with_hoop_stretch(F, x[0] / X[0])),

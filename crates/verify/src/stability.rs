@@ -276,7 +276,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// What runs are held against, by a reference run and by one of twice its step.
+    /// The standard of runs, by a reference run and by one of twice its step.
     fn standard(&self, criteria: &Criteria, reference: &Observed) -> Result<Standard, CaseError> {
         let order = self.case.case().scheme.order_in_time();
         let error = match reference {
@@ -302,7 +302,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// What runs of a case are held against.
+/// The standard that runs of a case are held against.
 struct Standard {
     criteria: Criteria,
     scales: Scales,

@@ -12,22 +12,22 @@ const ROUNDING: f64 = 1e-9;
 /// Powers of two by which numbers of one quantity change between two systems of units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnitPowers {
-    /// Of masses.
+    /// The power of masses.
     pub mass: i32,
-    /// Of lengths.
+    /// The power of lengths.
     pub length: i32,
-    /// Of times.
+    /// The power of times.
     pub time: i32,
 }
 
 impl UnitPowers {
-    /// Of stresses.
+    /// Powers of stresses.
     #[must_use]
     pub fn stress(self) -> i32 {
         self.mass - self.length - 2 * self.time
     }
 
-    /// Of masses per volume.
+    /// Powers of masses per volume.
     #[must_use]
     pub fn density(self) -> i32 {
         self.mass - 3 * self.length

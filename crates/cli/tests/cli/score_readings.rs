@@ -353,7 +353,7 @@ fn errors_that_fall_at_the_nodes_alone_do_not_pass() {
     assert_eq!(right["passed"], true, "{}", verdict(&right));
 }
 
-/// What is said of an order that there is none of is the case.
+/// The reason why there is no order is the true one.
 #[test]
 fn the_reason_for_no_order_is_the_one() {
     let place = tempfile::tempdir().unwrap();

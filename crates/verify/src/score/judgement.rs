@@ -424,7 +424,7 @@ impl Series<'_> {
         }
     }
 
-    /// What two recordings need for an order and these do not have, in words.
+    /// The reason why two recordings have no order, in words.
     fn why_no_order(&self, field: Quantity) -> String {
         let errors = self.errors(field, Norm::L2);
         let known: Vec<f64> = errors.into_iter().flatten().filter(|e| e.is_finite()).collect();
