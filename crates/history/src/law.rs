@@ -23,6 +23,23 @@ pub enum Branch {
     Flowing,
 }
 
+/// For each variable its kind: components of one tensor, as `q11` and `q12`, are of one, and each other variable has a size and a unit of its own.
+#[must_use]
+pub fn kinds_of(variables: &[String]) -> Vec<usize> {
+    let mut stems: Vec<&str> = Vec::new();
+    let mut kinds = Vec::with_capacity(variables.len());
+    for name in variables {
+        let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let stem = if name.len() == letters.len() + 2 { letters } else { name };
+        let known = stems.iter().position(|known| *known == stem);
+        kinds.push(known.unwrap_or(stems.len()));
+        if known.is_none() {
+            stems.push(stem);
+        }
+    }
+    kinds
+}
+
 /// By how much the variables of a particle miss conditions that exact ones keep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Residuals {

@@ -32,7 +32,7 @@ mod trajectory;
 
 pub use any_law::{AnyLaw, UnsupportedLaw};
 pub use flow::Flow;
-pub use law::{Branch, Kinematics, LawWithHistory, Residuals};
+pub use law::{Branch, Kinematics, LawWithHistory, Residuals, kinds_of};
 pub use maxwell::{ElasticPart, Maxwell};
 pub use motion::Motion;
 pub use number::{Dual, Number};

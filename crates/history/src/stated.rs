@@ -12,7 +12,7 @@ use mmsmith_scalar_functions::ScalarFunctions;
 use mmsmith_vocabulary::{Components, Response, Stated};
 use thiserror::Error;
 
-use crate::law::{Branch, Kinematics, LawWithHistory};
+use crate::law::{Branch, Kinematics, LawWithHistory, kinds_of};
 use crate::number::has_derivative;
 use crate::number::{Dual, Number};
 use crate::tensor::{Space, Tensor, symmetric_product, tensor, trace};
@@ -508,23 +508,8 @@ impl LawWithHistory for StatedHistory {
         self.internal.clone()
     }
 
-    /// Each variable is of a size and a unit of its own, but for components of one tensor: `q11`, `q12` ...
     fn groups(&self) -> Vec<usize> {
-        let mut stems: Vec<&str> = Vec::new();
-        let length = |name: &str| {
-            let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-            if name.len() == stem.len() + 2 { stem.len() } else { name.len() }
-        };
-        let mut groups = Vec::with_capacity(self.internal.len());
-        for name in &self.internal {
-            let stem = &name[..length(name)];
-            let known = stems.iter().position(|known| *known == stem);
-            groups.push(known.unwrap_or(stems.len()));
-            if known.is_none() {
-                stems.push(stem);
-            }
-        }
-        groups
+        kinds_of(&self.internal)
     }
 
     fn initial<N: Number>(&self, constants: &[N], _: &Tensor<f64>) -> Vec<N> {

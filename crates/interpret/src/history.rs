@@ -3,7 +3,7 @@
 use mmsmith_expr::Program;
 use mmsmith_history::{
     AnyLaw, AtPoint, AtTime, Dual, ENTRIES, HistoryError, Kinematics, LawWithHistory, Motion,
-    Number, Table, Tensor, Trajectory, UnsupportedLaw, divergence, place,
+    Number, Table, Tensor, Trajectory, UnsupportedLaw, divergence, kinds_of, place,
 };
 use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness};
 use mmsmith_stage::History;
@@ -313,17 +313,7 @@ impl<const D: usize> Histories<D> {
 
     /// The kind of each quantity, in the order of [`in_frame`](Self::in_frame): components of one tensor are of one kind.
     fn kinds(&self) -> Vec<usize> {
-        let mut stems: Vec<&str> = Vec::new();
-        let of_variables = self.names.iter().map(|name| {
-            let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-            let stem = if name.len() == stem.len() + 2 { stem } else { name };
-            let place = stems.iter().position(|known| *known == stem);
-            2 + place.unwrap_or_else(|| {
-                stems.push(stem);
-                stems.len() - 1
-            })
-        });
-        let of_variables: Vec<usize> = of_variables.collect();
+        let of_variables = kinds_of(&self.names).into_iter().map(|kind| 2 + kind).collect();
         [vec![0; D], vec![1; D * D], of_variables].concat()
     }
 
