@@ -27,7 +27,7 @@ pub(crate) struct DiagnoseOptions {
     /// Numbers of cells along the cell length, the coarsest first
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "8,16", value_parser = positive_count)]
     pub(crate) cells: Vec<usize>,
-    /// Expected orders, by field
+    /// Expected orders, by field: of the largest error, or of one norm, as u.l2=2
     #[arg(long, value_name = "ORDERS", default_value = "u=2")]
     pub(crate) expect: String,
     /// By how much an order may fall short of the expected one

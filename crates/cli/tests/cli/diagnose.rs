@@ -55,6 +55,24 @@ fn a_right_solver_is_told_that_nothing_is_wrong_and_a_wrong_one_what_is() {
     names_mistakes("axis-aligned-1d", "bar.c", &mistakes);
 }
 
+/// Every norm that is asked for is judged, and a search that was cut short says so.
+#[test]
+fn a_wrong_solver_passes_by_no_norm() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    script(place, "bar.c", "s/+ b);/ - b);/");
+    let line =
+        format!("diagnose axis-aligned-1d --target c --jobs 2 --run {}/run.sh", place.display());
+    for norm in ["u.l2=2", "u.l1=2", "u=2"] {
+        let called = mms(place, &format!("{line} --seconds 0.001s --expect {norm}"));
+        assert_eq!(called.status, 1, "{norm}: {}{}", called.stdout, called.stderr);
+        assert!(!called.stdout.contains("nothing is wrong"), "{}", called.stdout);
+        assert!(called.stdout.contains("the time was up"), "{norm}: {}", called.stdout);
+    }
+    refuses(place, &format!("{line} --expect P=1"), &["the recordings have no P", "they have"]);
+    refuses(place, &format!("{line} --expect u.l2=2,u.linf=1"), &["one norm of u"]);
+}
+
 #[test]
 fn mistakes_in_the_memory_of_a_material_are_named() {
     // One of three that differ in a factor: each takes a table for each of them.

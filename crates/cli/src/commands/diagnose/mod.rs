@@ -4,7 +4,7 @@ mod runs;
 mod search;
 mod tangent;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -14,7 +14,7 @@ use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{CAUSES, Cause, Origin, Unused};
 use mmsmith_solutions::AnySolution;
 use mmsmith_spec::Condition;
-use mmsmith_verify::{Quantity, TANGENT_MISTAKES, TangentMistake};
+use mmsmith_verify::{Norm, Quantity, TANGENT_MISTAKES, TangentMistake};
 use serde_json::{Value, json};
 
 use super::growth::Warnings;
@@ -28,7 +28,7 @@ use crate::processes::with_threads;
 use crate::table::{self, Table};
 use crate::terminal;
 use runs::{Errors, Run, Solver, written_step};
-use search::{Expected, NO_RESULT, Search, Tried};
+use search::{Expected, NO_RESULT, NO_TIME, Search, Tried};
 
 /// Densities that cannot be told from a factor of another origin, and one that can.
 const LIKE_FACTORS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
@@ -70,6 +70,7 @@ pub(crate) fn diagnose(options: &DiagnoseOptions) -> Result<bool> {
             run,
             folder: fresh(&folder.join(part))?,
             until,
+            norms: expected.norms.clone(),
             dt: options.cells.iter().copied().zip(options.dt.iter().copied()).collect(),
         })
     };
@@ -101,9 +102,21 @@ fn refuse(options: &DiagnoseOptions) -> Result<()> {
 }
 
 fn expected(options: &DiagnoseOptions) -> Result<Expected> {
-    let orders = expect::of_recordings(&options.expect)?;
-    let orders = orders.into_iter().filter_map(|(field, norms)| Some((field, norms.linf?)));
-    Ok(Expected { orders: orders.collect(), tolerance: options.tolerance })
+    let mut expected =
+        Expected { orders: BTreeMap::new(), norms: BTreeMap::new(), tolerance: options.tolerance };
+    for (field, orders) in expect::of_recordings(&options.expect)? {
+        let given = orders.iter().filter_map(|(norm, order)| Some((norm, (*order)?)));
+        let given: Vec<(Norm, f64)> = given.collect();
+        let Some(&(norm, order)) = given.first() else { continue };
+        if given.iter().any(|(_, other)| *other != order) {
+            bail!(
+                "--expect: the search looks at one norm of {field}; give one order, as {field}={order} or {field}.l2={order}"
+            );
+        }
+        expected.orders.insert(field, order);
+        expected.norms.insert(field, norm);
+    }
+    Ok(expected)
 }
 
 /// An empty folder. Fields of an earlier search would be taken for those of this one.
@@ -156,6 +169,8 @@ struct Told {
     not_tried: BTreeMap<&'static str, String>,
     notes: Vec<String>,
     field: Quantity,
+    /// The norm by which its errors are told.
+    norm: Norm,
 }
 
 /// Runs the solver with the right fields on all grids, and learns its time steps where it tells them.
@@ -208,6 +223,13 @@ fn examine<'a>(
         bail!("--run: with the right fields no run left a result: {failure}");
     }
     let mut right = by_cells(cells, &runs);
+    let recorded = |field: &Quantity| right.values().any(|errors| errors.contains_key(field));
+    if let Some(field) = expected.orders.keys().find(|field| !recorded(field)) {
+        let names: BTreeSet<String> =
+            right.values().flat_map(|errors| errors.keys()).map(Quantity::to_string).collect();
+        let names: Vec<String> = names.into_iter().collect();
+        bail!("--expect: the recordings have no {field}; they have {}", names.join(", "));
+    }
     let mut passed = expected.is_met(&right, 0.0);
     let mut notes = vec![];
     let mut runs = runs;
@@ -237,6 +259,7 @@ fn examine<'a>(
         not_tried: BTreeMap::new(),
         notes,
         field,
+        norm: expected.norms.get(&field).copied().unwrap_or(Norm::Linf),
     };
     if !passed {
         told.search(&given, &runs[0], options, expected)?;
@@ -290,10 +313,25 @@ impl Told {
                 shift: None,
             }));
         }
-        if self.causes.is_empty() {
-            self.notes.push("no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into());
-        }
         self.not_tried = search.not_tried.into_inner().unwrap_or_default();
+        let is_finite =
+            |errors: &Errors| errors.get(&self.field).is_some_and(|error| error.is_finite());
+        if self.causes.is_empty() && !self.right.values().any(is_finite) {
+            self.notes.push(format!(
+                "the errors of {} are no finite numbers on any grid: mms score tells where the results are none",
+                self.field
+            ));
+        }
+        let late = self.not_tried.values().filter(|why| *why == NO_TIME).count();
+        if self.causes.is_empty() {
+            self.notes.push(match late {
+                0 => "no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into(),
+                _ => format!(
+                    "the time was up before {late} mistakes were tried, and none of the {} others explains it: give more with --seconds",
+                    self.tried.len()
+                ),
+            });
+        }
         Ok(())
     }
 
@@ -311,7 +349,12 @@ impl Told {
                 Some(Expected::order(&coarser, self.field)).filter(|order| order.is_finite());
             table.row([cells.to_string(), table::error(error), table::rate(order)]);
         }
-        let mut text = format!("error of {} with the right fields\n{}\n", self.field, table.text());
+        let norm = match self.norm {
+            Norm::Linf => "largest error".to_owned(),
+            norm => format!("error ({norm})"),
+        };
+        let mut text =
+            format!("{norm} of {} with the right fields\n{}\n", self.field, table.text());
         if self.passed {
             text += "nothing is wrong: the errors fall as expected\n";
         }

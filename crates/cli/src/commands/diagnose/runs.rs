@@ -12,12 +12,12 @@ use mmsmith_interpret::TableFile;
 use mmsmith_solutions::AnySolution;
 use mmsmith_spec::Spec;
 use mmsmith_stage::Staged;
-use mmsmith_verify::{Input, Quantity, Resolution, ScoreOptions as Reading, score};
+use mmsmith_verify::{Input, Norm, Quantity, Resolution, ScoreOptions as Reading, score};
 
 use crate::commands::tabulated;
 use crate::input;
 
-/// Errors of a run: the largest at any point, by field.
+/// Errors of a run by field: the largest at any point, or of the norm that is asked for.
 pub(super) type Errors = BTreeMap<Quantity, f64>;
 
 /// Trial of a solver: fields against a mistake.
@@ -49,6 +49,8 @@ pub(super) struct Solver<'a> {
     pub(super) run: &'a str,
     pub(super) folder: PathBuf,
     pub(super) until: Instant,
+    /// The norm by which errors of a field are told, where it is not the largest error.
+    pub(super) norms: BTreeMap<Quantity, Norm>,
     /// Its time steps by the number of cells, as far as they are known.
     pub(super) dt: BTreeMap<usize, f64>,
 }
@@ -225,7 +227,8 @@ impl Solver<'_> {
         match score(&self.exact, &inputs, &Reading::default()) {
             Ok(score) => {
                 let row = &score.rows[0];
-                let of = |field: &Quantity| (*field, row.errors[field].linf);
+                let norm = |field: &Quantity| self.norms.get(field).copied().unwrap_or(Norm::Linf);
+                let of = |field: &Quantity| (*field, row.errors[field][norm(field)]);
                 let recorded = row.errors.keys().filter(|field| row.fields.contains(field));
                 Run {
                     errors: recorded.map(of).collect(),

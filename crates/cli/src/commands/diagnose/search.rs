@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use anyhow::Result;
 use mmsmith_codegen::{CAUSES, Cause, Counter, Timed, Unused};
 use mmsmith_spec::ComponentCondition;
-use mmsmith_verify::Quantity;
+use mmsmith_verify::{Norm, Quantity};
 use rayon::prelude::*;
 
 use super::runs::{Errors, Run, Solver, Trial};
@@ -33,6 +33,8 @@ const SMALLEST_SHIFT: f64 = 1e-4;
 /// Orders that are expected of a solver, and their tolerance.
 pub(super) struct Expected {
     pub(super) orders: BTreeMap<Quantity, f64>,
+    /// The norm of each of them.
+    pub(super) norms: BTreeMap<Quantity, Norm>,
     pub(super) tolerance: f64,
 }
 
@@ -90,6 +92,8 @@ pub(super) struct Search<'a> {
     pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
 }
 
+/// The reason where the time was up.
+pub(super) const NO_TIME: &str = "there was no time for it; give more with --seconds";
 /// The reason where a solver that ran with the right fields fails with others.
 pub(super) const NO_RESULT: &str = "no result with the fields that counter it";
 
@@ -152,7 +156,7 @@ impl Search<'_> {
 
     fn run(&self, trial: Trial, cells: usize) -> Result<Option<Tried>> {
         if !self.solver.has_time() {
-            self.leave_out(trial.cause, "there was no time for it; give more with --seconds");
+            self.leave_out(trial.cause, NO_TIME);
             return Ok(None);
         }
         let run = self.solver.errors(Some(&trial), cells)?;
