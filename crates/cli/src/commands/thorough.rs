@@ -250,12 +250,18 @@ struct Shown {
 impl Shown {
     fn new(accuracy: &Accuracy<'_>, class: Class, worst: &Worst) -> Self {
         let Worst { field, entry, result, factor, units, exact, .. } = worst;
+        let of = |number: f64| match number < 1e6 {
+            true => format!("{number:.3}"),
+            false => format!("{number:.3e}"),
+        };
         Shown {
             factor: worst.factor,
             text: format!(
-                "{}{}: {field}[{entry}] = {result:?} has K = {factor:.3}, {units:.3} units, exact {exact}, found by {}, at {}",
+                "{}{}: {field}[{entry}] = {result:?} has K = {}, {} units, exact {exact}, found by {}, at {}",
                 class.name(),
                 if worst.outside { ", outside of the body" } else { "" },
+                of(*factor),
+                of(*units),
                 found(worst.found),
                 accuracy.place(&worst.inputs)
             ),
