@@ -80,6 +80,7 @@ fn constants_of_laws_with_memory_are_refused_where_parameters_are_set() {
         (any, "tau=-1", "tau > 0 (time of the material)"),
         (any, "m=0.5", "m >= 1 (exponent of the material)"),
         (any, "sy=-1", "sy >= 0 (the yield stress at the start of the material)"),
+        ("mms-specs/with-memory/bar-j2.toml", "sy=1e-6", "the elastic strain of flow is 1.1e-10"),
         (elements, "g1=0.9 --set g2=0.3", "<= 1 (the sum of the shares of the material)"),
     ] {
         let call = format!("check {} --set {set}", data(file).display());
