@@ -195,7 +195,7 @@ impl LawWithHistory for Flow {
                 _ => [square, one / square, one],
             };
         }
-        let is_turned = self.is_on_yield && *frame != tensor(|i, a| f64::from(u8::from(i == a)));
+        let is_turned = self.is_on_yield && *frame != identity();
         let entry = |(a, b): (usize, usize)| match is_turned {
             true => (0..3).fold(N::constant(0.0), |sum, i| {
                 sum + along_axes[i].times(frame[i][a] * frame[i][b])

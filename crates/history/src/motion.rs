@@ -2,7 +2,7 @@
 
 use crate::law::Kinematics;
 use crate::number::Dual;
-use crate::tensor::{Tensor, tensor};
+use crate::tensor::{Tensor, identity};
 
 /// The motion of a particle, with slopes along the particle's position.
 pub trait Motion<const K: usize>: Sync {
@@ -11,7 +11,7 @@ pub trait Motion<const K: usize>: Sync {
 
     /// Cartesian components of the unit vectors of the frame whose components the motion has, `[i][a]`. Default: the axes.
     fn frame(&self) -> Tensor<f64> {
-        tensor(|i, a| f64::from(u8::from(i == a)))
+        identity()
     }
 
     /// Writes the constants of the law at a time, in the order of its [names](crate::LawWithHistory::constants). `constants` is empty before.

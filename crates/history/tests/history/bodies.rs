@@ -6,8 +6,6 @@ use nalgebra::Matrix3;
 pub(crate) const MU: f64 = 3846.0;
 pub(crate) const BULK: f64 = 8333.0;
 pub(crate) const YIELD: f64 = 50.0;
-/// The frame of the axes.
-pub(crate) const AXES: Tensor<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Flow without regard to its rate, and its constants.
 pub(crate) fn flow(

@@ -1,9 +1,9 @@
 //! Histories against closed forms, differences and the conditions that they have to keep.
 
-use crate::bodies::{AXES, BULK, MU, YIELD, along, block, creep, elements, flow, number, times};
+use crate::bodies::{BULK, MU, YIELD, along, block, creep, elements, flow, number, times};
 use mmsmith_history::{
     AnyLaw, AtPoint, Branch, Dual, ElasticPart, Flow, HistoryError, Kinematics, LawWithHistory,
-    Maxwell, Motion, Number, Table, Tensor, Trajectory, divergence,
+    Maxwell, Motion, Number, Table, Tensor, Trajectory, divergence, identity,
 };
 use mmsmith_vocabulary::{Smoothness, Volumetric};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -585,7 +585,7 @@ fn rates_of_the_plastic_part_of_the_deformation_give_the_same() {
         (Fe.try_inverse().unwrap() * n * Fe * Fp * gamma, (2.0_f64 / 3.0).sqrt() * gamma)
     };
     let solve = |steps: usize| {
-        let z: Vec<f64> = law.observables(&constants, &law.initial(&constants, &AXES));
+        let z: Vec<f64> = law.observables(&constants, &law.initial(&constants, &identity()));
         let mut Fp =
             Matrix3::from_diagonal(&nalgebra::vector![z[0], z[1], z[2]].map(|g| g.powf(-0.5)));
         let (mut alpha, h) = (0.0, 1.0 / steps as f64);
@@ -673,6 +673,6 @@ fn times_have_to_ascend() {
     let found = Trajectory::new(&law, &motion, &[0.0, 0.0, 0.5, 0.5], 1e-12).unwrap();
     assert_eq!(found.states.len(), 4);
     assert_eq!(found.states[2], found.states[3]);
-    assert_eq!(found.states[0], law.initial(&motion.1, &AXES));
+    assert_eq!(found.states[0], law.initial(&motion.1, &identity()));
     let _: Kinematics<Dual<f64, 2>> = motion.at(0.0);
 }
