@@ -466,7 +466,9 @@ impl Spec {
         }
         let document: Document = toml::from_str(text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
-            source.error(e.message().to_owned(), span, meant_field(e.message()))
+            let (message, help) = missing_fields(e.message(), text)
+                .unwrap_or_else(|| (e.message().to_owned(), meant_field(e.message())));
+            source.error(message, span, help)
         })?;
         document.check_sizes(&source)?;
         // Escapes may hide them, too.
@@ -1141,6 +1143,46 @@ fn meant_field(message: &str) -> Option<String> {
     let mut names = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
     let name = names.next()?;
     nearest(name, names).map(|near| format!("did you mean '{near}'?"))
+}
+
+/// Fields that have no default, in the order in which a specification has them, each with a line that states it; those of the
+/// document itself first.
+const LINES: [(&str, &str); 16] = [
+    ("name", "name = 'my-solution'"),
+    ("title", "title = 'A square that swings'"),
+    ("coordinates", "coordinates = 'cartesian'"),
+    ("dimension", "dimension = 2"),
+    ("displacement", "[displacement] and below it X = 'A*sin(Pi*X)*cos(c*Pi*t)', Y = '0'"),
+    ("material", "[material] and below it law = 'neo-hookean'"),
+    ("domain", "[domain] and below it shape = 'box', lower = [0, 0], upper = [1, 1]"),
+    ("default", "default = 0.1, as in A = { default = 0.1 }"),
+    ("law", "law = 'neo-hookean'"),
+    ("shape", "shape = 'box', lower = [0, 0], upper = [1, 1]"),
+    ("surface", "surface = 'X-lower'"),
+    ("kind", "kind = 'j2'"),
+    ("share", "share = 'g1'"),
+    ("time", "time = 'tau1'"),
+    ("rate", "rate = '(J - 1 - q)/tau'"),
+    ("angle", "angle = 'omega*t'"),
+];
+/// The number of those of the document itself.
+const LINES_OF_DOCUMENT: usize = 7;
+
+/// Message and help for the reader's message about one field that is not there; where it is one of the document itself, for all of these.
+fn missing_fields(message: &str, text: &str) -> Option<(String, Option<String>)> {
+    let name = message.strip_prefix("missing field `")?.strip_suffix('`')?;
+    let (of_document, of_tables) = LINES.split_at(LINES_OF_DOCUMENT);
+    if let Some((_, line)) = of_tables.iter().find(|(own, _)| *own == name) {
+        return Some((message.to_owned(), Some(format!("write {line}"))));
+    }
+    of_document.iter().find(|(own, _)| *own == name)?;
+    let document: toml::Table = text.parse().ok()?;
+    let missing = of_document.iter().filter(|(own, _)| !document.contains_key(*own));
+    let (names, lines): (Vec<_>, Vec<_>) =
+        missing.map(|(own, line)| (format!("`{own}`"), *line)).unzip();
+    let fields = if names.len() == 1 { "field" } else { "fields" };
+    let message = format!("missing {fields} {}", names.join(", "));
+    Some((message, Some(format!("write for example {}", lines.join("; ")))))
 }
 
 /// The line that states a law's constant in Young's modulus and Poisson's ratio, where `key` is one of these and the law has Lame's
