@@ -25,6 +25,10 @@ pub(crate) enum Function {
     LogRatioSlope,
     /// The slope of the latter.
     LogRatioCurvature,
+    /// `max(x, 0)`.
+    PositivePart,
+    /// Its slope: one where `x > 0`, else zero.
+    PositivePartSlope,
 }
 
 /// A number by its value at rest, its deviation from there, and its value.
@@ -54,6 +58,8 @@ impl Function {
             Self::LogRatioSquared => x.log_ratio_squared(),
             Self::LogRatioSlope => x.log_ratio_slope(),
             Self::LogRatioCurvature => x.log_ratio_curvature(),
+            Self::PositivePart => x.positive_part(),
+            Self::PositivePartSlope => x.positive_part_slope(),
         }
     }
 
@@ -85,6 +91,8 @@ impl Function {
                 let slope = |s: f64| std::f64::consts::FRAC_2_SQRT_PI * (-s * s).exp();
                 self.by_slope(x, 0.5 / (1.0 + r.abs()), slope)
             }
+            Self::PositivePart if r > 0.0 && v > 0.0 => d,
+            Self::PositivePart | Self::PositivePartSlope => self.value(v) - self.value(r),
             Self::LogRatioSquared => self.by_slope(x, 0.25, |s| 2.0 * (1.0 + s.log_ratio_slope())),
             Self::LogRatioSlope => self.by_slope(x, 0.25, f64::log_ratio_curvature),
             Self::LogRatioCurvature => self.by_slope(x, 0.25 * r.abs().min(1.0), |s| {

@@ -55,6 +55,9 @@ impl Function {
                 tape.sum(&[(2.0, Value::ONE), (2.0, slope)])
             }
             Self::LogRatioSlope => tape.call(Self::LogRatioCurvature, x),
+            Self::PositivePart => tape.call(Self::PositivePartSlope, x),
+            // Where it is none, at x = 0, the law has a kink.
+            Self::PositivePartSlope => Value::constant(0.0),
             Self::LogRatioCurvature => {
                 // From z (z + 2) s' = 1 - (1 + z)(1 + s) for the slope s, differentiated once more.
                 let slope = tape.call(Self::LogRatioSlope, x);

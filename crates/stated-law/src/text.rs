@@ -7,7 +7,7 @@ use mmsmith_expr::{Ast, AstKind, nearest_f64};
 use std::collections::BTreeMap;
 
 /// The functions by their names; `expm1`, `log1p` and those of two numbers are made of others.
-const FUNCTIONS: [(&str, Function); 20] = [
+const FUNCTIONS: [(&str, Function); 22] = [
     ("sin", Function::Sin),
     ("cos", Function::Cos),
     ("tan", Function::Tan),
@@ -28,6 +28,8 @@ const FUNCTIONS: [(&str, Function); 20] = [
     ("lnratio2", Function::LogRatioSquared),
     ("lnratio2_slope", Function::LogRatioSlope),
     ("lnratio2_curvature", Function::LogRatioCurvature),
+    ("positive_part", Function::PositivePart),
+    ("positive_part_slope", Function::PositivePartSlope),
 ];
 
 /// Meanings of names in a text.
