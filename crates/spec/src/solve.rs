@@ -12,6 +12,7 @@ mod polynomial;
 
 use self::factored::{Along, Joined, Solution};
 use self::polynomial::{Fraction, Polynomial};
+use crate::coordinates::Coordinates;
 use crate::derivation::Derivation;
 use crate::diagnostic::nearest;
 use crate::document::{SolveTable, Text};
@@ -75,6 +76,7 @@ struct Solver<'a> {
     /// Fields in the specification's own components, by their names in conditions.
     fields: BTreeMap<String, Expr>,
     has_lambda: bool,
+    is_axisymmetric: bool,
     /// Where conditions hold, by coordinate.
     places: BTreeMap<Expr, BTreeSet<Expr>>,
 }
@@ -209,7 +211,18 @@ impl<'a> Solver<'a> {
         let Derivation { graph, geometry, variables, .. } = derivation;
         let coordinates = geometry.coordinates;
         let places = BTreeMap::new();
-        Ok(Solver { scope, graph, coordinates, variables, unknowns, fields, has_lambda, places })
+        let is_axisymmetric = spec.coordinates == Coordinates::Axisymmetric;
+        Ok(Solver {
+            scope,
+            graph,
+            coordinates,
+            variables,
+            unknowns,
+            fields,
+            has_lambda,
+            is_axisymmetric,
+            places,
+        })
     }
 
     /// The linear equations that a condition comes to.
@@ -383,7 +396,10 @@ impl<'a> Solver<'a> {
         }
         let mut place = BTreeMap::new();
         let names = self.scope.names();
-        for (coordinate, argument) in self.coordinates.iter().zip(arguments) {
+        // Nothing of an axisymmetric body depends on the angle, so that a place is a radius and a height.
+        let is_left_out = |k: usize| self.is_axisymmetric && arguments.len() < 3 && k == 1;
+        let coordinates = self.coordinates.iter().enumerate().filter(|(k, _)| !is_left_out(*k));
+        for ((_, coordinate), argument) in coordinates.zip(arguments) {
             let value = self
                 .graph
                 .build(argument, &mut |_, name| {

@@ -961,12 +961,11 @@ impl<'a> Reader<'a> {
         density: Expr,
         table: std::ops::Range<usize>,
     ) -> Result<Expr, Diagnostic> {
+        let help = "write [time] and below it wave-speed = '...', the speed that CFL numbers refer to, such as 'sqrt(E/rho0)'";
         let moduli = match material {
             Law::Library(material) if material.values().iter().any(|&c| self.scope.is_field(c)) => {
                 let message =
                     "the constants of the law depend on the place, and so does the speed of waves";
-                let help =
-                    "give wave-speed = '...' under [time], the speed that CFL numbers refer to";
                 return Err(self.scope.source.error(message, table, Some(help.into())));
             }
             Law::Library(material) => material.moduli(),
@@ -974,7 +973,6 @@ impl<'a> Reader<'a> {
         };
         let Some(Moduli { lambda, mu }) = moduli else {
             let message = format!("the law '{}' does not tell the speed of waves", material.name());
-            let help = "give wave-speed = '...' here, the speed that CFL numbers refer to";
             return Err(self.scope.source.error(message, table, Some(help.into())));
         };
         let graph = &mut self.scope.graph;
