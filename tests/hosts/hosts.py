@@ -65,6 +65,8 @@ class Case:
         self.module = name.replace("-", "_")
         self.folder.mkdir(parents=True, exist_ok=True)
         self.points_file = None
+        # A body of revolution has points in its half plane.
+        self.of_revolution = str(self.given).endswith(".toml") and "'axisymmetric'" in Path(self.given).read_text()
         module = self.first_module()
         self.calls_erf = "math.erf" in module.read_text()
         solution = loaded(module).Solution()
@@ -85,7 +87,9 @@ class Case:
         self.exact["rho0_b"] = self.density * self.exact["b"]
         self.exact["static_force"] = self.density * (self.exact["b"] - self.exact["a"])
         P, F, J = (self.exact[field] for field in "PFJ")
-        self.exact["sigma"] = np.einsum("nik,njk->nij", P, F) / J[:, None, None]
+        # In plane or uniaxial stress volumes change along the directions left out as well.
+        across = np.array([row.get("F_zz", 1.0) for row in rows]) ** (3 - self.dimension)
+        self.exact["sigma"] = np.einsum("nik,njk->nij", P, F) / (J * across)[:, None, None]
         self.exact["S"] = np.linalg.solve(F, P)
 
     def generate(self, target, ending):
@@ -103,7 +107,11 @@ class Case:
             return self.generate("numpy", "_numpy.py")
 
     def write_points(self, X):
-        rows = [",".join("XYZ"[: X.shape[1]]), *(",".join(repr(float(x)) for x in row) for row in X)]
+        if self.of_revolution:
+            names, X = "RZ", X[:, [0, 2]]
+        else:
+            names = "XYZ"[: X.shape[1]]
+        rows = [",".join(names), *(",".join(repr(float(x)) for x in row) for row in X)]
         self.points_file.write_text("\n".join(rows) + "\n")
 
     @property
@@ -126,6 +134,14 @@ class Case:
             lower = np.array([solution.inner(), 0.0, solution.lower()])
             upper = np.array([solution.outer(), 2.0 * np.pi, solution.upper()])
             X = lower + shares * (upper - lower)
+            if self.points_file:
+                X[:, 1] = 0.0
+        elif hasattr(solution, "lower") and hasattr(solution, "inner"):
+            ends = [solution.first_angle(), solution.last_angle()] if hasattr(solution, "first_angle") else [0.0, 2.0 * np.pi]
+            lower = np.array([solution.inner(), ends[0], solution.lower()])
+            upper = np.array([solution.outer(), ends[1], solution.upper()])
+            radius, angle, height = (lower + shares * (upper - lower)).T
+            X = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
         elif hasattr(solution, "lower"):
             lower, upper = np.array(solution.lower()), np.array(solution.upper())
             X = lower + shares * (upper - lower)

@@ -69,7 +69,8 @@ impl<'a> Code<'a> {
         Ok(Code { is_of_half_plane, ..Code::of(spec, fields, origin) })
     }
 
-    /// Stages `fields` with a fault planted in them, which the head of the code states.
+    /// Stages `fields` in space with a fault planted in them, which the head of the code states; of the half plane of a body of revolution where
+    /// the host has it there.
     ///
     /// # Errors
     ///
@@ -78,18 +79,26 @@ impl<'a> Code<'a> {
         spec: &'a Spec,
         mut fields: Fields,
         origin: Origin,
-        fault: Fault,
+        (fault, in_half_plane): (Fault, bool),
     ) -> Result<Self, NoEffect> {
         fault.plant(spec, &mut fields)?;
         let wrong =
             format!("the fault {fault} is planted ({}); a test must find it", fault.about());
-        Ok(Code::wrong_on_purpose(spec, fields, origin, wrong))
+        Ok(Code::changed(spec, fields, origin, in_half_plane).wrong_on_purpose(wrong))
     }
 
-    /// Stages `fields` that are wrong on purpose, which the head of the code states.
+    /// Stages `fields` in space that were changed, in the components in which a host computes, as [`for_host`](Self::for_host) does.
     #[must_use]
-    pub fn wrong_on_purpose(spec: &'a Spec, fields: Fields, origin: Origin, why: String) -> Self {
-        Code { wrong: Some(why), ..Code::of(spec, fields, origin) }
+    pub fn changed(spec: &'a Spec, fields: Fields, origin: Origin, in_half_plane: bool) -> Self {
+        let is_of_half_plane = in_half_plane && spec.coordinates == Coordinates::Axisymmetric;
+        let fields = if is_of_half_plane { fields.at_angle_zero() } else { fields };
+        Code { is_of_half_plane, ..Code::of(spec, fields, origin) }
+    }
+
+    /// This, wrong on purpose, which the head of the code states.
+    #[must_use]
+    pub fn wrong_on_purpose(self, why: String) -> Self {
+        Code { wrong: Some(why), ..self }
     }
 
     /// Lines about the file itself, for its head.

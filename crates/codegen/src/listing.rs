@@ -100,6 +100,15 @@ impl Code<'_> {
         }
     }
 
+    /// The ratio of volumes by calls of the fields `J` and `F_zz`.
+    pub(crate) fn volume_by(&self, [J, F_zz]: [&str; 2]) -> String {
+        match (self.staged.across, self.spec.dimension) {
+            (None, _) => J.to_owned(),
+            (Some(_), 1) => format!("({J} * {F_zz} * {F_zz})"),
+            (Some(_), _) => format!("({J} * {F_zz})"),
+        }
+    }
+
     /// A sentence on the directions left out.
     fn assumption(&self) -> &'static str {
         match (self.staged.across, self.spec.dimension) {
@@ -213,8 +222,8 @@ impl Code<'_> {
                 ]);
                 if let Some([from, to]) = around.angles() {
                     all.extend([
-                        constant("from", "the body's smallest angle", &[from]),
-                        constant("to", "the body's largest angle", &[to]),
+                        constant("first_angle", "the body's smallest angle", &[from]),
+                        constant("last_angle", "the body's largest angle", &[to]),
                     ]);
                 }
             }

@@ -1,6 +1,6 @@
 //! The table beside a file, as the file knows it.
 
-use mmsmith_spec::Surface;
+use mmsmith_spec::{Domain, Spec, Surface};
 
 /// The table beside a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,20 +43,31 @@ pub(crate) const FIRST_INTERNAL: usize = 2;
 pub(crate) enum Normal {
     /// Along an axis, in this sense.
     Axis(usize, f64),
-    /// Along the position, in this sense.
-    Radial(f64),
+    /// Along the first components of the position, in this sense.
+    Radial { sign: f64, components: usize },
+    /// Around the third axis, in this sense of the growing angle.
+    Around(f64),
 }
 
 impl Normal {
-    pub(crate) fn of(surface: Surface) -> Self {
+    pub(crate) fn of(surface: Surface, spec: &Spec, is_of_half_plane: bool) -> Self {
+        let components = match spec.domain {
+            Domain::Tube { .. } => 2,
+            Domain::Box { .. } | Domain::Annulus { .. } => spec.dimension,
+        };
+        // There the radius is a coordinate.
+        match surface {
+            Surface::Inner if is_of_half_plane => return Normal::Axis(0, -1.0),
+            Surface::Outer if is_of_half_plane => return Normal::Axis(0, 1.0),
+            _ => {}
+        }
         match surface {
             Surface::Lower(axis) => Normal::Axis(axis, -1.0),
             Surface::Upper(axis) => Normal::Axis(axis, 1.0),
-            Surface::Inner => Normal::Radial(-1.0),
-            Surface::Outer => Normal::Radial(1.0),
-            // A law with memory has no body of revolution yet, so that no table has these.
-            Surface::FirstAngle => Normal::Axis(1, -1.0),
-            Surface::LastAngle => Normal::Axis(1, 1.0),
+            Surface::Inner => Normal::Radial { sign: -1.0, components },
+            Surface::Outer => Normal::Radial { sign: 1.0, components },
+            Surface::FirstAngle => Normal::Around(-1.0),
+            Surface::LastAngle => Normal::Around(1.0),
         }
     }
 }

@@ -5,9 +5,10 @@ use mmsmith_history::{
     AnyLaw, AtPoint, AtTime, Dual, ENTRIES, HistoryError, Kinematics, LawWithHistory, Motion,
     Number, Table, Tensor, Trajectory, UnsupportedLaw, divergence, kinds_of, place,
 };
-use mmsmith_runtime::{Domain, HistoryReport, Law, Real, Smoothness};
+use mmsmith_runtime::{Around, Domain, HistoryReport, Law, Real, Smoothness};
 use mmsmith_stage::History;
 use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
@@ -31,6 +32,8 @@ pub(crate) enum Chart<const D: usize> {
     Box { lower: [f64; D], upper: [f64; D] },
     /// A body between two radii.
     Annulus { inner: f64, outer: f64 },
+    /// A body between two radii about the axis `Z`, two angles and two heights.
+    Tube { radii: [f64; 2], angles: [f64; 2], heights: [f64; 2] },
 }
 
 /// Why histories cannot be formed.
@@ -39,10 +42,10 @@ pub enum HistoryProblem {
     /// The law has none.
     #[error(transparent)]
     Law(#[from] UnsupportedLaw),
-    /// Tables are of boxes and of bodies between two radii.
+    /// Bodies that have no tables.
     #[error(
-        "particles of a law with memory are followed in boxes with coordinates = 'cartesian', and between two radii with 'polar' or 'spherical'; \
-         in other coordinates they are not. Write one of these, or leave [material.flow], [[material.maxwell]] or [internal] out"
+        "particles of a law with memory are followed in boxes, between two radii, and in tubes, sectors and cylinders; this body is none of these. \
+         Write one of these shapes, or leave [material.flow], [[material.maxwell]] or [internal] out"
     )]
     Shape,
     /// A name in the law without a value.
@@ -65,15 +68,23 @@ impl<const D: usize> Chart<D> {
                 lower: std::array::from_fn(|i| lower[i].to_f64()),
                 upper: std::array::from_fn(|i| upper[i].to_f64()),
             },
+            Domain::Tube { inner, outer, lower, upper, around } => Self::Tube {
+                radii: [*inner, *outer].map(Real::to_f64),
+                angles: match around {
+                    Around::Sector { from, to } => [*from, *to].map(Real::to_f64),
+                    Around::Axisymmetric | Around::Whole => [0.0, TAU],
+                },
+                heights: [*lower, *upper].map(Real::to_f64),
+            },
             _ => return None,
         })
     }
 
     /// The range of a coordinate.
     pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
-        use std::f64::consts::{PI, TAU};
         match self {
             Self::Box { lower, upper } => [lower[axis], upper[axis]],
+            Self::Tube { radii, angles, heights } => [*radii, *angles, *heights][axis],
             Self::Annulus { inner, outer } => match (axis, D) {
                 (0, _) => [*inner, *outer],
                 (1, 3) => [0.0, PI],
@@ -86,6 +97,9 @@ impl<const D: usize> Chart<D> {
     fn place(&self, q: [f64; D]) -> [f64; D] {
         match self {
             Self::Box { .. } => q,
+            Self::Tube { .. } => {
+                std::array::from_fn(|i| [q[0] * q[1].cos(), q[0] * q[1].sin(), q[2]][i])
+            }
             Self::Annulus { .. } => match D {
                 1 => q,
                 2 => std::array::from_fn(|i| q[0] * [q[1].cos(), q[1].sin()][i]),
@@ -99,12 +113,17 @@ impl<const D: usize> Chart<D> {
 
     /// The coordinates of a place.
     fn coordinates(&self, X: &[f64; D]) -> [f64; D] {
-        use std::f64::consts::TAU;
+        let norm = |of: &[f64]| of.iter().fold(0.0, |norm: f64, x| norm.hypot(*x));
+        let angle = || X[1].atan2(X[0]);
         match self {
             Self::Box { .. } => *X,
+            Self::Tube { angles: [first, last], .. } => {
+                // Next to the middle of the angles, so that rounding at an end is no whole turn.
+                let turns = ((0.5 * (first + last) - angle()) / TAU).round();
+                std::array::from_fn(|i| [norm(&X[..2]), angle() + turns * TAU, X[2]][i])
+            }
             Self::Annulus { .. } => {
-                let norm = |of: &[f64]| of.iter().fold(0.0, |norm: f64, x| norm.hypot(*x));
-                let around = if D > 1 { X[1].atan2(X[0]).rem_euclid(TAU) } else { 0.0 };
+                let around = if D > 1 { angle().rem_euclid(TAU) } else { 0.0 };
                 match D {
                     1 => *X,
                     2 => std::array::from_fn(|i| [norm(X), around][i]),
@@ -271,7 +290,7 @@ impl<const D: usize> Histories<D> {
         // Coordinates of the specification that nothing depends on are those of the chart, or none is left out.
         let fits = match chart {
             Chart::Box { .. } => is_cartesian,
-            Chart::Annulus { .. } => !is_cartesian,
+            Chart::Annulus { .. } | Chart::Tube { .. } => !is_cartesian,
         };
         let is_used = |axis: &usize| {
             !fits || uses_places || density_here.is_some() || history.coordinates[*axis]

@@ -12,7 +12,7 @@ mod staged;
 mod table_file;
 
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
-pub use table_file::{FieldShape, TableFile, TableFileError, TabulatedField};
+pub use table_file::{FieldShape, Over, TableFile, TableFileError, TabulatedField};
 
 use history::{Chart, Histories, HistoryProblem, Moment, Prepared, Quantities};
 use lattice::LatticeStages;

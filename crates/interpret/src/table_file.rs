@@ -81,6 +81,17 @@ pub struct TableFile {
     content: String,
 }
 
+/// The places of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Over<'a> {
+    /// All of the body, in Cartesian coordinates and components.
+    Body,
+    /// The same; of an axisymmetric body the places are radius, angle and height, and the components those along them.
+    HalfPlane,
+    /// These points alone.
+    Points(&'a [Vec<f64>]),
+}
+
 /// Why there is no such file.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum TableFileError {
@@ -120,7 +131,7 @@ pub enum TableFileError {
 }
 
 impl TableFile {
-    /// Tabulates the fields for some periods of the solution over the body, or at `points` alone, where there are some.
+    /// Tabulates the fields for some periods of the solution.
     ///
     /// # Errors
     ///
@@ -130,10 +141,10 @@ impl TableFile {
         staged: &Staged,
         overrides: impl IntoIterator<Item = (&'a str, f64)>,
         periods: f64,
-        points: Option<&[Vec<f64>]>,
+        over: Over<'_>,
     ) -> Result<Self, TableFileError> {
         let values = resolve(spec, overrides).map_err(InterpretError::from)?;
-        Self::of_values(spec, staged, values, periods, points)
+        Self::of_values(spec, staged, values, periods, over)
     }
 
     /// Not generic, so that trajectories are compiled with this crate, and not with a caller that may not be optimised.
@@ -142,12 +153,12 @@ impl TableFile {
         staged: &Staged,
         values: Vec<f64>,
         periods: f64,
-        points: Option<&[Vec<f64>]>,
+        over: Over<'_>,
     ) -> Result<Self, TableFileError> {
         match spec.dimension {
-            1 => Self::of::<1>(spec, staged, values, periods, points),
-            2 => Self::of::<2>(spec, staged, values, periods, points),
-            _ => Self::of::<3>(spec, staged, values, periods, points),
+            1 => Self::of::<1>(spec, staged, values, periods, over),
+            2 => Self::of::<2>(spec, staged, values, periods, over),
+            _ => Self::of::<3>(spec, staged, values, periods, over),
         }
     }
 
@@ -156,7 +167,7 @@ impl TableFile {
         staged: &Staged,
         values: Vec<f64>,
         periods: f64,
-        points: Option<&[Vec<f64>]>,
+        over: Over<'_>,
     ) -> Result<Self, TableFileError> {
         let built = Interpreted::<f64, D>::new(spec, staged, values.clone())?;
         let end = periods * built.period;
@@ -166,7 +177,7 @@ impl TableFile {
         let histories = built.history.ok_or(TableFileError::NoHistory)?;
         let fields = fields(&histories.names);
         let mut content = head(spec, &values);
-        let (error, in_time) = if let Some(points) = points {
+        let (error, in_time) = if let Over::Points(points) = over {
             let all = at_points(&histories, points, end)?;
             let error = all.iter().fold(0.0_f64, |most, (_, tail)| most.max(*tail));
             measures(&mut content, D, [end, error], &fields);
@@ -183,7 +194,9 @@ impl TableFile {
             };
             let table = tables.table.as_ref().ok_or_else(why)?;
             measures(&mut content, D, [end, tables.error], &fields);
-            let of = (&histories, spec.coordinates);
+            let is_in_half_plane =
+                over == Over::HalfPlane && spec.coordinates == Coordinates::Axisymmetric;
+            let of = (&histories, spec.coordinates, is_in_half_plane);
             let in_time = match table {
                 OverAxes::One(table) => over_body(&mut content, table, of),
                 OverAxes::Two(table) => over_body(&mut content, table, of),
@@ -257,14 +270,17 @@ fn measures(
 fn over_body<const K: usize, const D: usize>(
     text: &mut String,
     table: &Table<K>,
-    (histories, coordinates): (&Histories<D>, Coordinates),
+    (histories, coordinates, is_in_half_plane): (&Histories<D>, Coordinates, bool),
 ) -> [usize; 2] {
     let grid = table.grid();
     let chart = match histories.chart {
+        _ if is_in_half_plane => "box",
         Chart::Box { .. } => "box",
         Chart::Annulus { .. } => "annulus",
+        Chart::Tube { .. } => "tube",
     };
     let frame = match coordinates {
+        _ if is_in_half_plane => "cartesian",
         Coordinates::Cartesian => "cartesian",
         Coordinates::Polar | Coordinates::Cylindrical | Coordinates::Axisymmetric => "polar",
         Coordinates::Spherical => "spherical",

@@ -13,16 +13,17 @@ use mmsmith_vocabulary::Material;
 use nalgebra::{Matrix3, RealField, SMatrix, SVector};
 
 use crate::memory::{
-    ElasticInSpace, Increment, InternalVariable, LawWithMemory, of_particle, set_stress,
+    Increment, InternalVariable, LawInSpace, LawWithMemory, of_particle, set, set_stress,
 };
 use crate::{BLOCK, Law, Stressed};
 
-/// An isotropic elastic law of space in a half plane. Its internal variables are the stretch around the axis, which solvers set to the
-/// radius over the reference radius, and the reference radius.
+/// An isotropic law of space in a half plane. Its internal variables are the stretch around the axis, which solvers set to the
+/// radius over the reference radius, and the reference radius; then those of the law of space, whose directions 1, 2, 3 are those of the
+/// radius, around the axis, and of the height.
 #[derive(Clone, Debug)]
 pub struct HalfPlane<T> {
     law: Law<T, 3>,
-    in_space: ElasticInSpace<T>,
+    in_space: LawInSpace<T>,
 }
 
 /// The internal variables of a particle in a half plane.
@@ -86,25 +87,59 @@ pub fn with_hoop_stretch<T: RealField + Copy, const D: usize>(
     })
 }
 
+/// The deformation gradient in space in the order of the radius, around the axis, and the height, from that in the half plane.
+#[inline(always)]
+#[must_use]
+pub fn of_half_plane<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+    stretch: T,
+) -> Matrix3<T> {
+    Matrix3::from_fn(|i, j| match (i, j) {
+        (1, 1) => stretch,
+        (1, _) | (_, 1) => T::zero(),
+        _ => F[((i / 2) % D, (j / 2) % D)],
+    })
+}
+
 impl<T: Stressed<3>> HalfPlane<T> {
-    /// The law of space in the half plane; none of a law with directions or with internal variables.
+    /// The law of space in the half plane; none of a law with directions.
     #[must_use]
     pub fn new(law: Law<T, 3>) -> Option<Self> {
         let in_space = match &law {
-            Law::Library(material) if material.row().is_isotropic => {
-                ElasticInSpace::Library(*material)
-            }
-            Law::Own(own) => ElasticInSpace::Own(own.clone()),
-            Law::Library(_) | Law::WithMemory(_) => return None,
+            Law::Library(material) if material.row().is_isotropic => LawInSpace::Library(*material),
+            Law::Own(own) => LawInSpace::Own(own.clone()),
+            Law::WithMemory(own) => LawInSpace::WithMemory(own.clone()),
+            Law::Library(_) => return None,
         };
         Some(Self { law, in_space })
+    }
+
+    /// The first Piola-Kirchhoff stresses in space of a law with memory, whose directions are the radius, around the axis, and the height.
+    fn stresses_with_memory<const D: usize>(
+        law: &dyn LawWithMemory<T, 3>,
+        F: &[[[T; BLOCK]; D]; D],
+        q: &[[T; BLOCK]],
+    ) -> [[[T; BLOCK]; 3]; 3] {
+        let mut in_space = [[[T::zero(); BLOCK]; 3]; 3];
+        for n in 0..BLOCK {
+            let stretch = q.first().map_or_else(T::one, |stretch| stretch[n]);
+            set(&mut in_space, n, &of_half_plane(&of_particle(F, n), stretch));
+        }
+        let mut P = [[[T::zero(); BLOCK]; 3]; 3];
+        let own = q.get(Hoop::<T>::COUNT..).unwrap_or_default();
+        law.first_piola_kirchhoff(&in_space, own, &mut P);
+        P
     }
 }
 
 impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
     fn variables(&self) -> Vec<InternalVariable> {
         let of = |name: &str| InternalVariable { name: name.into(), at_rest: 1.0 };
-        vec![of("hoop_stretch"), of("(reference radius)")]
+        let mut all = vec![of("hoop_stretch"), of("(reference radius)")];
+        if let LawInSpace::WithMemory(own) = &self.in_space {
+            all.extend(own.variables());
+        }
+        all
     }
 
     fn first_piola_kirchhoff(
@@ -113,6 +148,15 @@ impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
         q: &[[T; BLOCK]],
         P: &mut [[[T; BLOCK]; D]; D],
     ) {
+        if let LawInSpace::WithMemory(own) = &self.in_space {
+            let in_space = Self::stresses_with_memory(own.as_ref(), F, q);
+            for i in 0..D {
+                for j in 0..D {
+                    P[i][j] = in_space[(2 * i) % 3][(2 * j) % 3];
+                }
+            }
+            return;
+        }
         let Some(stretch) = q.first() else { return };
         for n in 0..BLOCK {
             let F = of_particle(F, n);
@@ -128,22 +172,45 @@ impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
     fn evolve(&self, _: &Increment<'_, T, D>, _: &mut [[T; BLOCK]]) {}
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        Hoop::at_rest(X).to_vec()
+        let mut all = Hoop::at_rest(X).to_vec();
+        if let LawInSpace::WithMemory(own) = &self.in_space {
+            all.extend(own.initial(&SVector::from([X[0], T::zero(), X[1 % D]])));
+        }
+        all
+    }
+
+    fn start_at_rate_around(&self, rate: &SMatrix<T, D, D>, around: T, q: &mut [T]) {
+        if let (LawInSpace::WithMemory(own), Some(q)) =
+            (&self.in_space, q.get_mut(Hoop::<T>::COUNT..))
+        {
+            own.start_at_rate(&of_half_plane(rate, around), q);
+        }
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
+        if let LawInSpace::WithMemory(own) = &self.in_space {
+            let F = std::array::from_fn(|i| std::array::from_fn(|j| [F[(i, j)]; BLOCK]));
+            let own_q: Vec<[T; BLOCK]> = q.iter().map(|value| [*value; BLOCK]).collect();
+            let P = Self::stresses_with_memory::<D>(own.as_ref(), &F, &own_q);
+            return Some(P[1][1][0] * Hoop::of(q).stretch);
+        }
         let tau = self.law.kirchhoff(&with_hoop_stretch(F, Hoop::of(q).stretch))?;
         Some(tau[(D.min(2), D.min(2))])
     }
 
-    fn of_half_plane(&self) -> Option<&ElasticInSpace<T>> {
+    fn stretch_across(&self, q: &[T]) -> Option<T> {
+        Some(Hoop::of(q).stretch)
+    }
+
+    fn of_half_plane(&self) -> Option<&LawInSpace<T>> {
         Some(&self.in_space)
     }
 
     fn elastic(&self) -> Option<Material<T>> {
         match &self.in_space {
-            ElasticInSpace::Library(material) => Some(*material),
-            ElasticInSpace::Own(_) => None,
+            LawInSpace::Library(material) => Some(*material),
+            LawInSpace::Own(_) => None,
+            LawInSpace::WithMemory(own) => own.elastic(),
         }
     }
 }

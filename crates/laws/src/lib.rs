@@ -38,13 +38,13 @@ mod yeoh;
 use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
-pub use half_plane::{HalfPlane, Hoop, with_hoop_stretch};
+pub use half_plane::{HalfPlane, Hoop, of_half_plane, with_hoop_stretch};
 #[doc(hidden)]
 pub use law::BlockOfStresses;
 pub use law::{ConstitutiveLaw, Law, LawCheck};
 #[doc(hidden)]
 pub use memory::BlockWithMemory;
-pub use memory::{ElasticInSpace, Increment, InternalVariable, LawWithMemory};
+pub use memory::{Increment, InternalVariable, LawInSpace, LawWithMemory};
 pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volumetric, WithMemory};
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};

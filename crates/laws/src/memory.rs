@@ -12,13 +12,15 @@ use crate::{BLOCK, ConstitutiveLaw, jacobian};
 /// The entries of a symmetric tensor in the order of internal variables.
 pub(crate) const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// A law of space without internal variables of its own.
+/// A law of space, for the half plane of a body of revolution.
 #[derive(Clone, Debug)]
-pub enum ElasticInSpace<T> {
+pub enum LawInSpace<T> {
     /// A law of the library.
     Library(Material<T>),
     /// A law that the caller brings.
     Own(Arc<dyn ConstitutiveLaw<T, 3>>),
+    /// A law with internal variables of its own.
+    WithMemory(Arc<dyn LawWithMemory<T, 3>>),
 }
 
 /// An internal variable of a law.
@@ -73,6 +75,9 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
     /// without rates.
     fn start_at_rate(&self, _rate: &SMatrix<T, D, D>, _q: &mut [T]) {}
 
+    /// As [`start_at_rate`](Self::start_at_rate) in a half plane, where the stretch around the axis has a rate as well. Default: other laws.
+    fn start_at_rate_around(&self, _rate: &SMatrix<T, D, D>, _around: T, _q: &mut [T]) {}
+
     /// Kirchhoff stresses, `tau = P F^T`. Default: from first Piola-Kirchhoff stresses.
     fn kirchhoff(&self, F: &[[[T; BLOCK]; D]; D], q: &[[T; BLOCK]], tau: &mut [[[T; BLOCK]; D]; D])
     where
@@ -121,9 +126,14 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
         None
     }
 
+    /// The stretch of a particle along the axes that F leaves out; `None` where nothing stretches along them.
+    fn stretch_across(&self, _q: &[T]) -> Option<T> {
+        None
+    }
+
     /// The law of space, where this is that of a [half plane](crate::HalfPlane): solvers set the internal variables then, and the stress
     /// around the axis acts on the grid. Default: it is not.
-    fn of_half_plane(&self) -> Option<&ElasticInSpace<T>> {
+    fn of_half_plane(&self) -> Option<&LawInSpace<T>> {
         None
     }
 
@@ -206,6 +216,11 @@ impl<T: RealField + Copy, const D: usize> ConstitutiveLaw<T, D> for Frozen<T, D>
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>) -> Option<T> {
         let q: Vec<T> = self.q.iter().map(|column| column[0]).collect();
         self.law.kirchhoff_across(F, &q)
+    }
+
+    fn stretch_across(&self, _F: &SMatrix<T, D, D>) -> Option<T> {
+        let q: Vec<T> = self.q.iter().map(|column| column[0]).collect();
+        self.law.stretch_across(&q)
     }
 }
 

@@ -59,12 +59,23 @@ pub struct PointSeries<const D: usize> {
     coefficients: Vec<f64>,
 }
 
+/// The coordinates of a body that its axes count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Chart {
+    /// Cartesian ones.
+    Box,
+    /// Polar or spherical ones.
+    Annulus,
+    /// Cylindrical ones.
+    Tube,
+}
+
 /// Body force, stress and internal variables of a body as Chebyshev series in its coordinates, and in pieces of the time; or series of some
 /// points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HistoryTable<const D: usize> {
     shapes: Vec<Shape>,
-    is_annulus: bool,
+    chart: Chart,
     frame: Frame,
     axes: Vec<Axis>,
     /// Over the body; the coefficients of a node are side by side with those of others.
@@ -210,7 +221,7 @@ impl<const D: usize> HistoryTable<D> {
             });
         }
         words.after("chart")?;
-        let chart = words.word()?.to_owned();
+        let word = words.word()?.to_owned();
         words.after("frame")?;
         let frame = match words.word()? {
             "cartesian" => Frame::Cartesian,
@@ -219,10 +230,15 @@ impl<const D: usize> HistoryTable<D> {
             _ => return None,
         };
         let none = PointSeries { knots: Vec::new(), in_time: 0, coefficients: Vec::new() };
-        let is_annulus = chart == "annulus";
+        let chart = match word.as_str() {
+            "annulus" => Chart::Annulus,
+            "tube" if D == 3 => Chart::Tube,
+            "box" | "points" => Chart::Box,
+            _ => return None,
+        };
         let mut table =
-            Self { shapes, is_annulus, frame, axes: Vec::new(), body: none, points: Vec::new() };
-        match chart.as_str() {
+            Self { shapes, chart, frame, axes: Vec::new(), body: none, points: Vec::new() };
+        match word.as_str() {
             "points" => table.read_points(words)?,
             _ => table.read_body(words)?,
         }
@@ -267,7 +283,10 @@ impl<const D: usize> HistoryTable<D> {
     /// The products of the polynomials of all axes at a position, for each node; not numbers far from the body.
     fn along(&self, X: &[f64; D]) -> Vec<f64> {
         let mut q = *X;
-        if self.is_annulus && D > 1 {
+        if self.chart == Chart::Tube {
+            [q[0], q[1 % D]] = [X[0].hypot(X[1 % D]), X[1 % D].atan2(X[0])];
+        }
+        if self.chart == Chart::Annulus && D > 1 {
             let angle = X[1].atan2(X[0]).rem_euclid(std::f64::consts::TAU);
             let from_axis = X[0].hypot(X[1]);
             q[0] = if D == 2 { from_axis } else { from_axis.hypot(X[D - 1]) };
@@ -276,6 +295,10 @@ impl<const D: usize> HistoryTable<D> {
         }
         let mut products = vec![1.0];
         for Axis { number, range: [low, high], count } in &self.axes {
+            if self.chart == Chart::Tube && *number == 1 {
+                let turns = (0.5 * (low + high) - q[1 % D]) / std::f64::consts::TAU;
+                q[1 % D] += turns.round() * std::f64::consts::TAU;
+            }
             let x = (2.0 * q[*number] - low - high) / (high - low);
             let own = polynomials(if x.abs() <= 1.1 { x } else { f64::NAN }, *count);
             products =
@@ -418,7 +441,7 @@ mod tests {
                 |knot: f64| PointSeries { knots: vec![knot], in_time: 1, coefficients: Vec::new() };
             let table = HistoryTable::<2> {
                 shapes: Vec::new(),
-                is_annulus: false,
+                chart: Chart::Box,
                 frame: Frame::Cartesian,
                 axes: Vec::new(),
                 body: series(-1.0),

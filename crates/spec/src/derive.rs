@@ -15,6 +15,7 @@ use crate::law::{self, Deformation, Stress, inside, zero_if_vanishing};
 use crate::surface::{Components, SurfaceFields, surface_fields};
 use crate::tensor::{Matrix, Vector};
 use mmsmith_expr::{Dependence, Expr, Graph, Program, Rule};
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Every field of a solution, in Cartesian components, as expressions of the graph.
@@ -97,6 +98,31 @@ pub enum DeriveError {
 }
 
 impl Fields {
+    /// The fields of an axisymmetric body at the angle zero, where Cartesian components are those along `R`, the angle and `Z`: as
+    /// [`Spec::derive_for_hosts`] has them, of fields that were changed in space.
+    #[must_use]
+    pub fn at_angle_zero(mut self) -> Self {
+        let graph = &mut self.graph;
+        let [X, Y] = ["X", "Y"].map(|name| graph.symbol(name));
+        let [R, theta] = ["R", "theta"].map(|name| graph.symbol(name));
+        let place = BTreeMap::from([(Y, Graph::ZERO), (R, X), (theta, Graph::ZERO)]);
+        let mut at = |expr: &mut Expr| *expr = graph.replace(*expr, &place);
+        let matrices = [&mut self.H, &mut self.F, &mut self.P].into_iter();
+        let matrices = matrices.chain(self.tangent.iter_mut().flatten());
+        matrices.flatten().flatten().for_each(&mut at);
+        [&mut self.u, &mut self.v, &mut self.a, &mut self.b]
+            .into_iter()
+            .flatten()
+            .for_each(&mut at);
+        [&mut self.J].into_iter().chain(&mut self.W).chain(&mut self.across).for_each(&mut at);
+        for surface in &mut self.surfaces {
+            surface.traction.iter_mut().for_each(&mut at);
+            surface.claims.iter_mut().flat_map(|claim| &mut claim.quantities).for_each(&mut at);
+        }
+        self.definitions.clear();
+        self
+    }
+
     /// The straight-line program that computes `outputs` from the inputs.
     #[must_use]
     pub fn program(&mut self, outputs: &[Expr]) -> Program {

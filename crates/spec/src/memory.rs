@@ -1,5 +1,6 @@
 //! Laws that remember, or depend on more than the deformation: given fields, flow, Maxwell elements, internal variables.
 
+use crate::coordinates::Coordinates;
 use crate::document::{Document, FlowTable, Text};
 use crate::law::energy::rate_names;
 use crate::law::prestress;
@@ -113,6 +114,14 @@ impl Reader<'_> {
     ) -> Result<Option<Memory<Expr>>, Diagnostic> {
         let table = document.material.get_ref();
         let is_on_yield = document.start.as_ref().is_some_and(|start| start.get_ref().on_yield);
+        if let Some(start) = document.start.as_ref().filter(|_| is_on_yield)
+            && self.coordinates == Coordinates::Axisymmetric
+        {
+            let message = "the start on the yield surface is a stretch along X, which is not the same all around the axis";
+            let help = "leave [start] out: with yield = 'sy + K*alpha^(1/3)' the body force is smooth where particles begin to flow; or write \
+                        coordinates = 'cylindrical' and dimension = 3";
+            return Err(self.scope.source.error(message, start.span(), Some(help.into())));
+        }
         let refuse = |reader: &Self, message: String, span, help: &str| {
             Err(reader.scope.source.error(message, span, Some(help.into())))
         };

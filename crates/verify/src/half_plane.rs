@@ -2,9 +2,11 @@
 
 use mmsmith_runtime::{
     AnySolution, Around, BLOCK, BodyForceAtPoints, Boundary, Condition, Domain, Fields,
-    InternalAtPoints, Lattice, Law, PlainPoints, Real, Solution, StateAtPoints, StateRun, Surface,
+    HistoryReport, InternalAtPoints, Lattice, Law, PlainPoints, Real, Solution, StateAtPoints,
+    StateRun, Surface,
 };
 use nalgebra::{SMatrix, SVector};
+use std::ops::Range;
 
 use crate::error::{CaseError, SceneError};
 
@@ -236,15 +238,28 @@ impl<T: Real> Solution<T, 2> for HalfPlane<'_, T> {
     }
 
     fn internal_variables(&self) -> Vec<String> {
-        vec!["hoop_stretch".into()]
+        [vec!["hoop_stretch".into()], self.space.internal_variables()].concat()
     }
 
     fn internal(&self, X: &SVector<T, 2>, t: T) -> Vec<T> {
-        vec![T::one() + self.displacement(X, t)[0] / X[0]]
+        let stretch = T::one() + self.displacement(X, t)[0] / X[0];
+        std::iter::once(stretch).chain(self.space.internal(&place(X), t)).collect()
     }
 
     fn internal_at(&self, X: &[SVector<T, 2>]) -> Box<dyn InternalAtPoints<T> + '_> {
-        Box::new(PlainPoints { solution: self, X: X.to_vec() })
+        if self.space.internal_variables().is_empty() {
+            return Box::new(PlainPoints { solution: self, X: X.to_vec() });
+        }
+        let of_space = self.space.internal_at(&places(X));
+        Box::new(InternalInPlane { half_plane: self, X: X.to_vec(), of_space })
+    }
+
+    fn history(&self, X: &[SVector<T, 2>], end: T) -> Result<Option<HistoryReport>, String> {
+        self.space.history(&places(X), end)
+    }
+
+    fn prepare_until(&self, end: T) -> Result<(), String> {
+        self.space.prepare_until(end)
     }
 
     fn wave_speed(&self) -> T {
@@ -288,6 +303,23 @@ impl<T: Real> BodyForceAtPoints<T, 2> for ForceInPlane<'_, T> {
 
     fn bytes_per_point(&self) -> usize {
         self.0.bytes_per_point()
+    }
+}
+
+/// The stretch around the axis and the internal variables of a law with memory.
+struct InternalInPlane<'a, T: Real> {
+    half_plane: &'a HalfPlane<'a, T>,
+    X: Vec<SVector<T, 2>>,
+    of_space: Box<dyn InternalAtPoints<T> + 'a>,
+}
+
+impl<T: Real> InternalAtPoints<T> for InternalInPlane<'_, T> {
+    fn evaluate(&self, t: T, points: Range<usize>) -> Vec<Vec<T>> {
+        let mut all = self.of_space.evaluate(t, points.clone());
+        for (own, X) in all.iter_mut().zip(&self.X[points]) {
+            own.insert(0, T::one() + self.half_plane.displacement(X, t)[0] / X[0]);
+        }
+        all
     }
 }
 

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use bytemuck::Pod;
-use mmsmith_laws::{ElasticInSpace, with_hoop_stretch};
+use mmsmith_laws::{LawInSpace, with_hoop_stretch};
 use mmsmith_measure::norms::PerNorm;
 use mmsmith_measure::{Homes, each_group, joined, joined_over};
 use mmsmith_mpm::{Law, Particles};
@@ -125,9 +125,10 @@ where
 {
     fn new(law: &'a Law<f64, D>) -> Self {
         let in_space = match law {
-            Law::WithMemory(own) => own.of_half_plane().map(|elastic| match elastic {
-                ElasticInSpace::Library(material) => Law::Library(*material),
-                ElasticInSpace::Own(own) => Law::Own(own.clone()),
+            Law::WithMemory(own) => own.of_half_plane().map(|in_space| match in_space {
+                LawInSpace::Library(material) => Law::Library(*material),
+                LawInSpace::Own(own) => Law::Own(own.clone()),
+                LawInSpace::WithMemory(own) => Law::WithMemory(own.clone()),
             }),
             Law::Library(_) | Law::Own(_) => None,
         };

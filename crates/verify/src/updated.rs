@@ -291,6 +291,9 @@ fn set_memory<T: Real, const D: usize>(
         let mut q = law.initial(X);
         law.start_at_rate(&rate.map(Real::nearest), &mut q);
         if law.of_half_plane().is_some() {
+            let around = |t: f64| exact.internal(&place, t).first().copied().unwrap_or(1.0);
+            let around = (around(dt) * 4.0 - around(2.0 * dt) - around(0.0) * 3.0) / (2.0 * dt);
+            law.start_at_rate_around(&rate.map(Real::nearest), T::nearest(around), &mut q);
             Hoop::follow(x, &mut q);
         }
         particles.internal.extend(q);

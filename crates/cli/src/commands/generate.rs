@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use mmsmith_codegen::{Code, Names, Origin};
-use mmsmith_interpret::{TableFile, TableFileError};
+use mmsmith_interpret::{Over, TableFile, TableFileError};
 use mmsmith_spec::{Coordinates, Spec};
 use mmsmith_stage::Staged;
 
@@ -37,7 +37,7 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
     let code = match options.fault {
         None if spec.has_history() && !options.tangent && options.target.reads_tables => {
             let fields = spec.derive().with_context(|| found.file())?;
-            let staged = Staged::of(&spec, fields.clone());
+            let staged = Staged::of(&spec, fields);
             let file = tabulate(options, &spec, &staged).with_context(|| found.file())?;
             if file.error > CLOSE {
                 terminal::note(format_args!(
@@ -46,7 +46,9 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
                     file.error
                 ));
             }
-            let (code, text) = tabulated::beside(Code::of(&spec, fields, origin), &file);
+            let code = Code::for_host(&spec, origin, options.target.in_half_plane)
+                .with_context(|| found.file())?;
+            let (code, text) = tabulated::beside(code, &file);
             if text.len() > LARGE && options.points.is_none() {
                 terminal::note(format_args!(
                     "the table has {} MB; where the points of your host are few, series of these alone are smaller: --points points.csv",
@@ -68,7 +70,7 @@ pub(crate) fn generate(options: &GenerateOptions) -> Result<bool> {
             .with_context(|| found.file())?,
         Some(fault) => {
             let fields = spec.derive().with_context(|| found.file())?;
-            Code::with_fault(&spec, fields, origin, fault)
+            Code::with_fault(&spec, fields, origin, (fault, options.target.in_half_plane))
                 .context("--fault: choose another solution or another fault")?
         }
     };
@@ -113,14 +115,22 @@ fn refuse_what_does_not_fit(options: &GenerateOptions, spec: &Spec, file: &str) 
 fn tabulate(options: &GenerateOptions, spec: &Spec, staged: &Staged) -> Result<TableFile> {
     let points = match &options.points {
         None => None,
-        Some(file) => Some(positions(Source::of(file), spec.dimension)?),
+        Some(file) => {
+            let in_half_plane =
+                options.target.in_half_plane && spec.coordinates == Coordinates::Axisymmetric;
+            Some(positions(Source::of(file), spec.dimension, in_half_plane)?)
+        }
     };
     if points.as_ref().is_some_and(Vec::is_empty) {
         bail!("--points: there is no point in the file");
     }
-    let points = points.as_deref();
+    let over = match points.as_deref() {
+        Some(points) => Over::Points(points),
+        None if options.target.in_half_plane => Over::HalfPlane,
+        None => Over::Body,
+    };
     let periods = options.periods.unwrap_or(1.0);
-    TableFile::new(spec, staged, [], periods, points).map_err(|error| match error {
+    TableFile::new(spec, staged, [], periods, over).map_err(|error| match error {
         why @ (TableFileError::Front | TableFileError::Rough { .. }) => anyhow::anyhow!(
             "{why}; give the points of your host, and the file has a series for each: mms gen {} --target {} --out DIR --points points.csv, a \
              line X,Y,Z and then a position a line",

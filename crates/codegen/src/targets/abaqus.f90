@@ -99,7 +99,7 @@ module MODULE_host
     else
       values = rho0_b(s, X, t)
     end if
-    if (per_current_volume) values = values / J(s, X, t)
+    if (per_current_volume) values = values / VOLUME
     force_at_reference = values(i)
   end function
 

@@ -42,6 +42,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
         ],
     };
     let routines = user_subroutines(code, include_str!("abaqus.f90"))
+        .replace("VOLUME", &code.volume_by(["J(s, X, t)", "F_zz(s, X, t)"]))
         .replace("CORNER_LOW", low)
         .replace("CORNER_HIGH", high)
         .replace("INSIDE", inside)

@@ -242,6 +242,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     }
     let d = spec.dimension;
     let density = if code.has_graded_density() { "rho0(X)" } else { "density()" };
+    let volume = code.volume_by(["J(X, t)", "F_zz(X, t)"]);
     text += &format!(
         "
     // body force per unit reference volume
@@ -273,7 +274,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     {{
         const auto gradient = F(X, t);
         auto stress = P(X, t), product = stress;
-        const auto volume = J(X, t);
+        const auto volume = {volume};
         for (int i = 0; i < {d}; ++i) {{
             for (int j = 0; j < {d}; ++j) {{
                 auto sum = stress[i][0] * gradient[j][0];

@@ -245,6 +245,7 @@ impl Fortran {
             };
         }
         let density = if code.has_graded_density() { "rho0(s, X)" } else { "density(s)" };
+        let volume = code.volume_by(["J(s, X, t)", "F_zz(s, X, t)"]);
         text + &format!(
             "
   ! body force per unit reference volume
@@ -270,7 +271,7 @@ impl Fortran {
     real(dp) :: values({d}, {d}), stress({d}, {d}), gradient({d}, {d})
     stress = P(s, X, t)
     gradient = F(s, X, t)
-    values = matmul(stress, transpose(gradient)) / J(s, X, t)
+    values = matmul(stress, transpose(gradient)) / {volume}
   end function
 
   ! second Piola-Kirchhoff stress (S and s are one name in Fortran)

@@ -155,6 +155,7 @@ function Solution(given::Pair...)
     }
     let d = spec.dimension;
     let density = if code.has_graded_density() { "rho0(s, X)" } else { "density(s)" };
+    let volume = code.volume_by(["J(s, X, t)", "F_zz(s, X, t)"]);
     text += &format!(
         "
 # body force per unit reference volume
@@ -165,7 +166,7 @@ static_force(s, X, t) = {density} .* (b(s, X, t) .- a(s, X, t))
 
 # Cauchy stress
 function sigma(s, X, t)
-    gradient, volume, stress = F(s, X, t), J(s, X, t), P(s, X, t)
+    gradient, volume, stress = F(s, X, t), {volume}, P(s, X, t)
     return ntuple(i -> ntuple(j -> sum(stress[i][k] * gradient[j][k] for k in 1:{d}) / volume, {d}), {d})
 end
 

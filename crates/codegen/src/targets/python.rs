@@ -118,7 +118,13 @@ impl Python {
                 let (before, after) = self.preamble.split_at(place);
                 let checks = before.rfind("    if ").unwrap_or(place);
                 text += &before[..checks];
-                text += of_half_plane;
+                // Tables take positions of one shape.
+                text += &match code.table {
+                    Some(_) => {
+                        of_half_plane.replace("X[..., 0], 0.0,", "X[..., 0], 0.0 * X[..., 0],")
+                    }
+                    None => of_half_plane.to_owned(),
+                };
                 text += &before[checks..];
                 text += after;
             }
@@ -174,11 +180,7 @@ impl Python {
             "\n    def static_force(self, X, t):\n        # -Div P, the force per reference volume that holds the \
                  deformation of time t at rest\n        return {density} * (self.b(X, t) - self.a(X, t))\n"
         );
-        let volume = match (code.staged.across, code.spec.dimension) {
-            (None, _) => "self.J(X, t)",
-            (Some(_), 1) => "self.J(X, t) * self.F_zz(X, t) ** 2",
-            (Some(_), _) => "self.J(X, t) * self.F_zz(X, t)",
-        };
+        let volume = code.volume_by(["self.J(X, t)", "self.F_zz(X, t)"]);
         text += &format!(
             "\n    def sigma(self, X, t):\n        # Cauchy stress\n        F, J, P = self.F(X, t), {volume}, self.P(X, t)\n"
         );

@@ -104,7 +104,8 @@ fn faults_show_in_every_host() {
         text.lines().filter(|line| !line.contains("WRONG ON PURPOSE")).map(str::to_owned).collect()
     };
     for fault in Fault::ALL {
-        let wrong = Code::with_fault(&spec, spec.derive().unwrap(), origin(), fault).unwrap();
+        let wrong =
+            Code::with_fault(&spec, spec.derive().unwrap(), origin(), (fault, false)).unwrap();
         for host in HOSTS {
             let text = host.source(&wrong).unwrap();
             assert!(

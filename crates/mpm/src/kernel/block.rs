@@ -37,9 +37,14 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
         Vec::new()
     }
 
-    /// Whether internal variables follow the deformation gradient; else they follow the position, and increments need no gradients.
+    /// Whether internal variables follow the deformation gradient, so that increments need gradients.
     fn follows_deformation(&self) -> bool {
         true
+    }
+
+    /// Whether internal variables follow the position, so that increments need positions.
+    fn follows_position(&self) -> bool {
+        false
     }
 
     /// Whether the change of volume is projected: the solver sets the internal variables then, `theta` and `p`.
@@ -74,7 +79,7 @@ pub(crate) struct BlockIncrement<'a, T, const D: usize> {
     pub(crate) start: &'a [SMatrix<T, D, D>],
     /// Deformation gradients at the end.
     pub(crate) end: &'a [SMatrix<T, D, D>],
-    /// Positions at the end, where [internal variables follow them](BlockLaw::follows_deformation).
+    /// Positions at the end, where [internal variables follow them](BlockLaw::follows_position).
     pub(crate) x: &'a [SVector<T, D>],
 }
 

@@ -14,8 +14,8 @@ use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::product;
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
-    AnyLaw, BlockOfStresses, ConstitutiveLaw, ElasticInSpace, Hoop, LibraryLaw, Material,
-    NeoHookean, with_hoop_stretch,
+    AnyLaw, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, Hoop, InternalVariable, LawInSpace,
+    LawWithMemory, LibraryLaw, Material, NeoHookean, of_half_plane, with_hoop_stretch,
 };
 use nalgebra::{Matrix3, SMatrix, SVector};
 
@@ -26,17 +26,18 @@ use crate::kernel::copies::BLOCK;
 
 /// The law of space for blocks of particles in a half plane.
 pub(crate) fn of_law<T: Lanes, const D: usize>(
-    law: &ElasticInSpace<T>,
+    law: &LawInSpace<T>,
     planted: Planted,
 ) -> Box<dyn BlockLaw<T, D>> {
     match law {
-        ElasticInSpace::Library(Material::NeoHookean { lambda, mu }) => {
+        LawInSpace::Library(Material::NeoHookean { lambda, mu }) => {
             Box::new(HalfPlane(OfLibrary(NeoHookean { lambda: *lambda, mu: *mu, planted })))
         }
-        ElasticInSpace::Library(material) => {
+        LawInSpace::Library(material) => {
             Box::new(HalfPlane(OfLibrary(AnyLaw(planted.law_in_stresses(*material)))))
         }
-        ElasticInSpace::Own(law) => Box::new(HalfPlane(OfCaller(law.clone()))),
+        LawInSpace::Own(law) => Box::new(HalfPlane(OfCaller(law.clone()))),
+        LawInSpace::WithMemory(law) => Box::new(WithMemory::new(law.clone())),
     }
 }
 
@@ -105,6 +106,10 @@ impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for Half
 
     fn follows_deformation(&self) -> bool {
         false
+    }
+
+    fn follows_position(&self) -> bool {
+        true
     }
 
     fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
@@ -182,6 +187,81 @@ impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
             let tau = product(&block.stress(n), &in_space[n].transpose());
             let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
             *radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoop(n)), contributions);
+        }
+    }
+}
+
+/// Particles of a half plane whose law of space has internal variables of its own, after those of the [`Hoop`].
+struct WithMemory<T> {
+    law: Arc<dyn LawWithMemory<T, 3>>,
+    variables: Vec<InternalVariable>,
+}
+
+impl<T: Lanes> WithMemory<T> {
+    fn new(law: Arc<dyn LawWithMemory<T, 3>>) -> Self {
+        let variables = law.variables();
+        Self { law, variables }
+    }
+
+    /// How many variables a particle has.
+    fn count(&self) -> usize {
+        Hoop::<T>::COUNT + self.variables.len()
+    }
+
+    /// The variables of the law of space alone, those of a particle one after the other.
+    fn own(&self, internal: &[T]) -> Vec<T> {
+        internal.chunks_exact(self.count()).flat_map(|q| &q[Hoop::<T>::COUNT..]).copied().collect()
+    }
+}
+
+impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
+    fn stress(
+        &self,
+        c: &Constants<T, D>,
+        F: &[SMatrix<T, D, D>; BLOCK],
+        internal: &[T],
+        contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+        let hoops: Vec<Hoop<T>> = internal.chunks_exact(self.count()).map(Hoop::of).collect();
+        let in_space: Vec<Matrix3<T>> =
+            F.iter().zip(&hoops).map(|(F, hoop)| of_half_plane(F, hoop.stretch)).collect();
+        let mut block = BlockWithMemory::at_rest(&self.variables);
+        block.kirchhoff(self.law.as_ref(), &in_space, &self.own(internal));
+        for (n, hoop) in hoops.into_iter().enumerate() {
+            let tau = block.stress(n);
+            let in_plane = SMatrix::from_fn(|i, j| tau[((2 * i) % 3, (2 * j) % 3)]);
+            let radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(1, 1)], hoop), contributions);
+            contributions.value[n].values[D] += radial;
+        }
+    }
+
+    fn variables(&self) -> usize {
+        self.count()
+    }
+
+    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
+        let in_space = SVector::from([X[0], T::zero(), X[1 % D]]);
+        Hoop::at_rest(X).into_iter().chain(self.law.initial(&in_space)).collect()
+    }
+
+    fn follows_position(&self) -> bool {
+        true
+    }
+
+    fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
+        let BlockIncrement { time, start, end, x } = increment;
+        let mut own = self.own(internal);
+        let (mut from, mut to) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
+        for (n, q) in internal.chunks_exact_mut(self.count()).enumerate() {
+            from.push(of_half_plane(&start[n], Hoop::of(q).stretch));
+            Hoop::follow(&x[n], q);
+            to.push(of_half_plane(&end[n], Hoop::of(q).stretch));
+        }
+        let mut block = BlockWithMemory::at_rest(&self.variables);
+        block.evolve(self.law.as_ref(), &from, &to, time, &mut own);
+        let own = own.chunks_exact(self.variables.len().max(1));
+        for (q, own) in internal.chunks_exact_mut(self.count()).zip(own) {
+            q[Hoop::<T>::COUNT..].copy_from_slice(own);
         }
     }
 }

@@ -77,9 +77,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 if !internal.is_empty() {
                     // Positions follow when forces are known; until then particles are as far as their velocity takes them.
                     let moved = x.iter().zip(interpolated).map(|(x, of)| x + of.velocity * time);
-                    let ahead: Vec<SVector<T, D>> = match law.follows_deformation() {
-                        true => Vec::new(),
-                        false => moved.collect(),
+                    let ahead: Vec<SVector<T, D>> = match law.follows_position() {
+                        true => moved.collect(),
+                        false => Vec::new(),
                     };
                     let end = &*F_early;
                     law.evolve(BlockIncrement { time, start: F, end, x: &ahead }, internal);

@@ -44,6 +44,11 @@ pub(crate) fn read(
     if !is_axisymmetric {
         return read_with(file, &AXES[..selection.dimension()], usual_time);
     }
+    of_half_plane(file, usual_time)
+}
+
+/// The points of a body of revolution.
+fn of_half_plane(file: Source, usual_time: Option<f64>) -> Result<Vec<Point>> {
     let mut points = read_with(file, &OF_HALF_PLANE, usual_time)?;
     for (index, point) in points.iter_mut().enumerate() {
         match point.X[..] {
@@ -58,9 +63,17 @@ pub(crate) fn read(
     Ok(points)
 }
 
-/// Positions in `dimension` dimensions of a file of such points, whose times do not matter and may be left out.
-pub(crate) fn positions(file: Source, dimension: usize) -> Result<Vec<Vec<f64>>> {
-    let points = read_with(file, &AXES[..dimension], Some(0.0))?;
+/// Positions in `dimension` dimensions of a file of such points, or of the half plane of a body of revolution; times do not matter and may be
+/// left out.
+pub(crate) fn positions(
+    file: Source,
+    dimension: usize,
+    in_half_plane: bool,
+) -> Result<Vec<Vec<f64>>> {
+    let points = match in_half_plane {
+        true => of_half_plane(file, Some(0.0))?,
+        false => read_with(file, &AXES[..dimension], Some(0.0))?,
+    };
     Ok(points.into_iter().map(|point| point.X).collect())
 }
 

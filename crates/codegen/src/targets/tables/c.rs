@@ -70,21 +70,28 @@ static inline void {name}_free_table({name}_solution *s)
             OfTable::Traction(surface) => {
                 let stress =
                     format!("    double P[{}];\n    int i;\n    {name}_P(s, X, t, P);\n", d * d);
-                let terms = |factor: &str| {
+                let terms = |factor: &str, components: usize| {
                     let term = |j: usize| format!("P[{d} * i + {j}] * X[{j}]");
-                    let sum: Vec<String> = (0..d).map(term).collect();
+                    let sum: Vec<String> = (0..components).map(term).collect();
                     format!("{factor} * ({}) / r", sum.join(" + "))
                 };
-                let (before, value) = match Normal::of(surface) {
+                let (before, value) = match Normal::of(surface, self.spec, self.is_of_half_plane) {
                     Normal::Axis(axis, sign) => {
                         let sign = if sign < 0.0 { "-" } else { "" };
                         (String::new(), format!("{sign}P[{d} * i + {axis}]"))
                     }
-                    Normal::Radial(sign) => {
+                    Normal::Around(sign) => {
+                        let sign = if sign < 0.0 { "-" } else { "" };
+                        (
+                            "    const double r = sqrt(X[0] * X[0] + X[1] * X[1]);\n".to_owned(),
+                            format!("{sign}(P[{d} * i + 1] * X[0] - P[{d} * i] * X[1]) / r"),
+                        )
+                    }
+                    Normal::Radial { sign, components } => {
                         let squares: Vec<String> =
-                            (0..d).map(|j| format!("X[{j}] * X[{j}]")).collect();
+                            (0..components).map(|j| format!("X[{j}] * X[{j}]")).collect();
                         let r = format!("    const double r = sqrt({});\n", squares.join(" + "));
-                        (r, terms(if sign < 0.0 { "-1.0" } else { "1.0" }))
+                        (r, terms(if sign < 0.0 { "-1.0" } else { "1.0" }, components))
                     }
                 };
                 format!(

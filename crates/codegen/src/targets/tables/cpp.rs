@@ -241,14 +241,21 @@ pub(in crate::targets) fn item(code: &Code<'_>, item: &Item, of_table: OfTable) 
             made(entry.to_string())
         ),
         OfTable::Traction(surface) => {
-            let (before, value) = match Normal::of(surface) {
+            let (before, value) = match Normal::of(surface, code.spec, code.is_of_half_plane) {
                 Normal::Axis(axis, sign) => {
                     let sign = if sign < 0.0 { "-" } else { "" };
                     (String::new(), format!("{sign}stress[i][{axis}]"))
                 }
-                Normal::Radial(sign) => {
+                Normal::Around(sign) => {
+                    let sign = if sign < 0.0 { "-" } else { "" };
+                    (
+                        "        const auto r = sqrt(X[0] * X[0] + X[1] * X[1]);\n".to_owned(),
+                        format!("{sign}(stress[i][1] * X[0] - stress[i][0] * X[1]) / r"),
+                    )
+                }
+                Normal::Radial { sign, components } => {
                     let sum = |of: &dyn Fn(usize) -> String| {
-                        (0..d).map(of).collect::<Vec<_>>().join(" + ")
+                        (0..components).map(of).collect::<Vec<_>>().join(" + ")
                     };
                     let squares = sum(&|j| format!("X[{j}] * X[{j}]"));
                     let product = sum(&|j| format!("stress[i][{j}] * X[{j}]"));

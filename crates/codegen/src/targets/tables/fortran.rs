@@ -21,8 +21,7 @@ const TYPES: &str = "\
   type :: table
     private
     integer :: axes = 0, in_time = 0, points = 0, axis(3) = 1, count(3) = 1
-    logical :: is_annulus = .false.
-    character :: frame = \"c\"
+    character :: chart = \"b\", frame = \"c\"
     real(dp) :: low(3) = 0.0_dp, high(3) = 1.0_dp, end = 0.0_dp
     ! For each field its shape and how many entries there are before it.
     character, allocatable :: shape(:)
@@ -125,9 +124,20 @@ pub(in crate::targets) fn item(code: &Code<'_>, item: &Item, of_table: OfTable) 
         ),
         OfTable::Traction(surface) => {
             let stress = format!("    real(dp) :: stress({d}, {d})\n    stress = P(s, X, t)\n");
-            let (sign, value) = match Normal::of(surface) {
+            let (sign, value) = match Normal::of(surface, code.spec, code.is_of_half_plane) {
                 Normal::Axis(axis, sign) => (sign, format!("stress(:, {})", axis + 1)),
-                Normal::Radial(sign) => (sign, "matmul(stress, X / norm2(X))".to_owned()),
+                Normal::Radial { sign, components } if components == d => {
+                    (sign, "matmul(stress, X / norm2(X))".to_owned())
+                }
+                Normal::Radial { sign, components } => (
+                    sign,
+                    format!(
+                        "matmul(stress(:, :{components}), X(:{components}) / norm2(X(:{components})))"
+                    ),
+                ),
+                Normal::Around(sign) => {
+                    (sign, "(stress(:, 2) * X(1) - stress(:, 1) * X(2)) / norm2(X(:2))".to_owned())
+                }
             };
             let sign = if sign < 0.0 { "-" } else { "" };
             (format!("({d})"), format!("{stress}    values = {sign}{value}\n"))

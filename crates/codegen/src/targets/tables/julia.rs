@@ -52,7 +52,6 @@ mmsmith_rows(flat) = ntuple(i -> ntuple(j -> flat[(i-1)*{d}+j], {d}), {d})
 
 /// A function that takes its values from the table.
 pub(in crate::targets) fn item(code: &Code<'_>, item: &Item, of_table: OfTable) -> String {
-    let d = code.spec.dimension;
     // Fields count from one.
     let field = |number: usize| format!("mmsmith_field(table_of(s), X, t, {})", number + 1);
     let value = match of_table {
@@ -70,12 +69,15 @@ pub(in crate::targets) fn item(code: &Code<'_>, item: &Item, of_table: OfTable) 
             format!("{}[{}]", field(number), entry + 1)
         }
         OfTable::Traction(surface) => {
-            let (sign, value) = match Normal::of(surface) {
+            let (sign, value) = match Normal::of(surface, code.spec, code.is_of_half_plane) {
                 Normal::Axis(axis, sign) => (sign, format!("row[{}]", axis + 1)),
-                Normal::Radial(sign) => (
+                Normal::Radial { sign, components: n } => (
                     sign,
-                    format!("sum(row[j] * X[j] for j in 1:{d}) / sqrt(sum(X[j]^2 for j in 1:{d}))"),
+                    format!("sum(row[j] * X[j] for j in 1:{n}) / sqrt(sum(X[j]^2 for j in 1:{n}))"),
                 ),
+                Normal::Around(sign) => {
+                    (sign, "(row[2] * X[1] - row[1] * X[2]) / sqrt(X[1]^2 + X[2]^2)".to_owned())
+                }
             };
             let sign = if sign < 0.0 { "-" } else { "" };
             format!("map(row -> {sign}{value}, P(s, X, t))")

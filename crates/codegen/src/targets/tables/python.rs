@@ -80,19 +80,36 @@ impl Python {
             OfTable::Variable { field: number, entry, .. } => {
                 format!("        return {}[..., {entry}]\n", field(number))
             }
-            OfTable::Traction(surface) => match Normal::of(surface) {
-                Normal::Axis(axis, sign) => {
-                    let sign = if sign < 0.0 { "-" } else { "" };
-                    format!("        return {sign}self.P(X, t)[..., :, {axis}]\n")
+            OfTable::Traction(surface) => {
+                match Normal::of(surface, code.spec, code.is_of_half_plane) {
+                    Normal::Axis(axis, sign) => {
+                        let sign = if sign < 0.0 { "-" } else { "" };
+                        format!("        return {sign}self.P(X, t)[..., :, {axis}]\n")
+                    }
+                    Normal::Around(sign) => {
+                        let sign = if sign < 0.0 { "-" } else { "" };
+                        format!(
+                            "        X, P = _position(X, {d}), self.P(X, t)\n        r = {arrays}.hypot(X[0], X[1])[..., None]\n        return {sign}(P[..., :, 1] * \
+                         X[0][..., None] - P[..., :, 0] * X[1][..., None]) / r\n"
+                        )
+                    }
+                    Normal::Radial { sign, components } => {
+                        let sign = if sign < 0.0 { "-" } else { "" };
+                        // Components along other axes are zero.
+                        let first =
+                            if components < d { format!("[:{components}]") } else { String::new() };
+                        let of_P = if components < d {
+                            format!("[..., :{components}]")
+                        } else {
+                            String::new()
+                        };
+                        format!(
+                            "        place = {arrays}.stack(_position(X, {d}){first}, axis=-1)\n        normal = {sign}place / \
+                         {arrays}.linalg.norm(place, axis=-1)[..., None]\n        return {arrays}.einsum(\"...ij,...j->...i\", self.P(X, t){of_P}, normal)\n"
+                        )
+                    }
                 }
-                Normal::Radial(sign) => {
-                    let sign = if sign < 0.0 { "-" } else { "" };
-                    format!(
-                        "        place = {arrays}.stack(_position(X, {d}), axis=-1)\n        normal = {sign}place / \
-                         {arrays}.linalg.norm(place, axis=-1)[..., None]\n        return {arrays}.einsum(\"...ij,...j->...i\", self.P(X, t), normal)\n"
-                    )
-                }
-            },
+            }
         };
         text
     }

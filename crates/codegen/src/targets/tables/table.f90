@@ -43,9 +43,13 @@
     real(dp) :: q(3), place, from_axis, angle, around
     integer :: k, i, before
     q = 0.0_dp
+    around = 8.0_dp * atan(1.0_dp)
     q(1:DIMENSION) = X
-    if (tab%is_annulus .and. DIMENSION > 1) then
-      around = 8.0_dp * atan(1.0_dp)
+    if (tab%chart == "t") then
+      q(1) = norm2(X(1:min(2, DIMENSION)))
+      q(min(2, DIMENSION)) = atan2(X(min(2, DIMENSION)), X(1))
+    end if
+    if (tab%chart == "a" .and. DIMENSION > 1) then
       from_axis = norm2(X(1:min(2, DIMENSION)))
       angle = atan2(X(min(2, DIMENSION)), X(1))
       if (angle < 0.0_dp) angle = angle + around
@@ -57,6 +61,9 @@
     values(1) = 1.0_dp
     before = 1
     do k = 1, tab%axes
+      if (tab%chart == "t" .and. tab%axis(k) == 2) then
+        q(2) = q(2) + around * anint((0.5_dp * (tab%low(k) + tab%high(k)) - q(2)) / around)
+      end if
       place = (2.0_dp * q(tab%axis(k)) - tab%low(k) - tab%high(k)) / (tab%high(k) - tab%low(k))
       if (abs(place) > 1.1_dp) place = not_a_number
       own = table_polynomials(place, tab%count(k))
@@ -266,7 +273,7 @@
     end do
     read (file, *, iostat=failure) word, kind
     if (failure /= 0) return
-    tab%is_annulus = kind == "annulus"
+    tab%chart = kind(1:1)
     read (file, *, iostat=failure) word, tab%frame
     if (failure /= 0) return
     if (kind == "points") then

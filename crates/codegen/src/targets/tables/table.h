@@ -10,7 +10,9 @@ enum { mmsmith_most_fields = 256, mmsmith_most_polynomials = 64, mmsmith_most_kn
 /* Fields of position and time: Chebyshev series in coordinates of the body, and in pieces of the time. Or, where points is positive, series
    in time of these points alone. */
 typedef struct mmsmith_table {
-    int dimension, fields, quantities, axes, pieces, in_time, is_annulus;
+    int dimension, fields, quantities, axes, pieces, in_time;
+    /* 'b', 'a' or 't': a box, a body between two radii, or a tube, a sector or a cylinder about the third axis. */
+    char chart;
     /* 'c', 'p' or 's': components are Cartesian, polar or spherical until they are turned. */
     char frame;
     /* 's', 'v', 'm', 't': scalar, vector, matrix, symmetric tensor; then the number of its first entry. */
@@ -66,7 +68,11 @@ MMSMITH_FN void mmsmith_along(const mmsmith_table *table, const double *X, doubl
     for (k = 0; k < table->dimension; ++k) {
         q[k] = X[k];
     }
-    if (table->is_annulus && table->dimension > 1) {
+    if (table->chart == 't') {
+        q[0] = hypot(X[0], X[1]);
+        q[1] = atan2(X[1], X[0]);
+    }
+    if (table->chart == 'a' && table->dimension > 1) {
         const double from_axis = hypot(X[0], X[1]);
         const double angle = atan2(X[1], X[0]);
         q[0] = table->dimension == 2 ? from_axis : hypot(from_axis, X[2]);
@@ -78,7 +84,11 @@ MMSMITH_FN void mmsmith_along(const mmsmith_table *table, const double *X, doubl
         values[k][0] = 1.0;
         if (k < table->axes) {
             const double low = table->low[k], high = table->high[k];
-            const double x = (2.0 * q[table->axis[k]] - low - high) / (high - low);
+            double x;
+            if (table->chart == 't' && table->axis[k] == 1) {
+                q[1] += around * floor((0.5 * (low + high) - q[1]) / around + 0.5);
+            }
+            x = (2.0 * q[table->axis[k]] - low - high) / (high - low);
             mmsmith_polynomials(fabs(x) <= 1.1 ? x : (double)NAN, table->count[k], values[k]);
         }
     }
@@ -329,7 +339,7 @@ static inline int mmsmith_table_content(FILE *file, mmsmith_table *table)
     if (fscanf(file, " chart %71s frame %71s", word[0], word[1]) != 2) {
         return 0;
     }
-    table->is_annulus = word[0][0] == 'a';
+    table->chart = word[0][0];
     table->frame = word[1][0];
     if (word[0][0] == 'p') {
         return fscanf(file, " points %ld", &table->points) == 1 && table->points > 0 && mmsmith_table_points(file, table);

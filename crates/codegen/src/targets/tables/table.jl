@@ -101,8 +101,14 @@ function mmsmith_along(table, X)
         angle = angle < 0 ? angle + 2 * pi : angle
         q = table.dimension == 2 ? [from_axis, angle] : [sqrt(from_axis^2 + X[3]^2), atan(from_axis, X[3]), angle]
     end
+    if table.chart == "tube"
+        q = [sqrt(X[1]^2 + X[2]^2), atan(X[2], X[1]), X[3]]
+    end
     basis = [one(q[1])]
     for (axis, low, high, count) in table.axes
+        if table.chart == "tube" && axis == 2
+            q[2] += 2 * pi * round(((low + high) / 2 - q[2]) / (2 * pi))
+        end
         x = (2 * q[axis] - low - high) / (high - low)
         basis = kron(mmsmith_polynomials(abs(x) <= 1.1 ? x : oftype(x, NaN), count), basis)
     end

@@ -82,8 +82,12 @@ class _Table:
             from_axis, angle = XP.hypot(X[0], X[1]), XP.arctan2(X[1], X[0])
             angle = XP.where(angle < 0.0, angle + 2.0 * math.pi, angle)
             q = [from_axis, angle] if self.dimension == 2 else [XP.hypot(from_axis, X[2]), XP.arctan2(from_axis, X[2]), angle]
+        if self.chart == "tube":
+            q = [XP.hypot(X[0], X[1]), XP.arctan2(X[1], X[0]), X[2]]
         basis = XP.ones_like(q[0])[..., None]
         for axis, low, high, count in self.axes:
+            if self.chart == "tube" and axis == 1:
+                q[1] = q[1] + 2.0 * math.pi * XP.round((0.5 * (low + high) - q[1]) / (2.0 * math.pi))
             x = (2.0 * q[axis] - low - high) / (high - low)
             own = _polynomials(XP.where(XP.abs(x) <= 1.1, x, XP.nan), count)
             basis = (own[..., :, None] * basis[..., None, :]).reshape(*basis.shape[:-1], -1)
