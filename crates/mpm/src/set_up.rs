@@ -248,7 +248,8 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let uniform = particles.uniform();
     let corners = corners.map(|corners| {
         let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
-        Box::new(Corners::new(corners, mass_of_cell, is_affine, reprojects))
+        let of_body = (mass_of_cell, law.follows_position());
+        Box::new(Corners::new(corners, of_body, is_affine, reprojects))
     });
     let grid = GridState {
         constants: Constants::new(grid, &layout, &tiles, settings.time_step, least_mass),

@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::clock::Begun;
 use crate::error::CaseError;
+use crate::evaluate::refuse_on_axis;
 use crate::interrupt::StepLoop;
 use crate::kept_stress::KeptStress;
 use crate::on_grid::OnGrid;
@@ -79,6 +80,10 @@ impl<'a, T: Precision<D>, const D: usize> Driven<'a, T, D> {
             }
             Scheme::Total(total) => total::set_up(exact, total, case, scene, time_step)?,
         };
+        // Processes whose points differ stop together, or not at all.
+        if ranks.is_none() {
+            refuse_on_axis(exact, solver.forced())?;
+        }
         let body_force = ExactBodyForce::new(model, solver.as_mut(), ranks);
         Ok(Self { solver, body_force, dt: time_step.to_f64() })
     }
@@ -218,10 +223,6 @@ impl<T: Real, const D: usize> BodyForce<T, D> for ExactBodyForce<'_, T, D> {
             };
             let F = self.model.deformation_gradient(X, t);
             *stress = P * F.transpose() / self.model.jacobian(X, t);
-            if self.model.is_half_plane() {
-                // Areas of a radian have the radius as a factor.
-                *stress *= X[0] + self.model.displacement(X, t)[0];
-            }
         }
     }
 

@@ -333,8 +333,16 @@ impl<const D: usize> Scene<D> {
             }
             Domain::Box { lower, upper } => {
                 let fits = pose.is_usual() && are_multiples(&(upper - lower), spacing);
+                // No traction has a value there, so that the axis is a wall of every grid, which begins at it.
+                let has_axis = solution.is_half_plane() && lower[0] == 0.0;
+                if has_axis && !pose.is_usual() {
+                    return Err(SceneError::Extent(
+                        "the axis of a solid body of revolution is a line of the grid: leave --grid-angle and --grid-shift out",
+                    ));
+                }
                 for axis in 0..D {
                     walls[axis] = on_grid[axis].map(|side| fits && side.is_wall());
+                    walls[axis][0] |= axis == 0 && has_axis;
                     let is_loaded = |end: usize| match walls[axis][end] {
                         true => on_grid[axis][end].is_loaded(),
                         false => on_grid[axis][end] != SideOnGrid::Free,

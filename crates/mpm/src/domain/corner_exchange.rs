@@ -9,6 +9,7 @@
 //! of corners: no sum depends on the number of threads.
 
 use mmsmith_lanes::simd::{Lane4, Lanes, dispatch};
+use mmsmith_lanes::tensor::real;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_values::{AlongAxes, CornerValues};
@@ -40,6 +41,8 @@ pub(crate) struct Exchange<T, const D: usize> {
     affine_sums: Vec<AlongAxes<T, D>>,
     /// The light nodes that a clipped body reaches.
     extension: Option<Extension<T, D>>,
+    /// Whether areas are those of a radian about the axis.
+    is_of_half_plane: bool,
     /// The Cauchy stress at each loaded point.
     stresses: Vec<SMatrix<T, D, D>>,
     /// Buffers for blocks of corners.
@@ -61,14 +64,19 @@ impl<T: Lanes, const D: usize> ChunkSums<'_, T, D> {
 }
 
 impl<T: Lanes, const D: usize> Exchange<T, D> {
-    /// For grid cells that have the mass `mass_of_cell` inside of the body.
-    pub(crate) fn new(corners: &SharedCorners<T, D>, mass_of_cell: T) -> Self {
+    /// For grid cells that have the mass `mass_of_cell` inside of the body, in the half plane of a body of revolution or not.
+    pub(crate) fn new(
+        corners: &SharedCorners<T, D>,
+        mass_of_cell: T,
+        is_of_half_plane: bool,
+    ) -> Self {
         let is_extended = !corners.mesh.is_of_cells() && corners.at_corner.on_axis == OnAxis::Hat;
         Self {
             sums: Vec::new(),
             is_affine: false,
             affine_sums: Vec::new(),
             extension: is_extended.then(|| Extension::new(mass_of_cell)),
+            is_of_half_plane,
             stresses: Vec::new(),
             buffers: BufferPool::new(),
         }
@@ -86,11 +94,18 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
 
     /// Adds the loads to what particles give at corners.
     pub(crate) fn load(&mut self, corners: &SharedCorners<T, D>, loading: Loading<'_, T, D>) {
-        let Self { sums, stresses, .. } = self;
+        let Self { sums, stresses, is_of_half_plane, .. } = self;
         let Some((loading, time)) = loading.filter(|_| !stresses.is_empty()) else { return };
         loading.boundary_stress(&corners.mesh.loads, time, stresses);
         for (load, stress) in corners.mesh.loads.iter().zip(&*stresses) {
-            let force = stress * load.normal(&corners.mesh.x);
+            let mut force = stress * load.normal(&corners.mesh.x);
+            if *is_of_half_plane {
+                // The radius of the middle of the edge: particles have that of their centres, with which forces of a homogeneous stress are in
+                // balance on edges across the axis and along it.
+                let ends = load.corners.map(|corner| corners.mesh.x[corner as usize][0]);
+                let sum = ends.into_iter().fold(T::zero(), |sum, radius| sum + radius);
+                force *= sum / real(ends.len() as f64);
+            }
             for (&corner, &share) in load.corners.iter().zip(&load.shares) {
                 // The process that sorts a corner has all loads at it.
                 let Some(&sum) = corners.sums_of(corner as usize).first() else { continue };

@@ -23,14 +23,15 @@ pub(crate) struct Corners<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Corners<T, D> {
-    /// For grid cells that have the mass `mass_of_cell` inside of the body. Reserves all memory that a step needs for it.
+    /// For grid cells that have the mass `mass_of_cell` inside of the body, in the half plane of a body of revolution or not. Reserves all
+    /// memory that a step needs for it.
     pub(crate) fn new(
         shared: SharedCorners<T, D>,
-        mass_of_cell: T,
+        (mass_of_cell, is_of_half_plane): (T, bool),
         is_affine: bool,
         reprojects: bool,
     ) -> Self {
-        let exchange = Exchange::new(&shared, mass_of_cell);
+        let exchange = Exchange::new(&shared, mass_of_cell, is_of_half_plane);
         let (values, reprojected) = (CornerValues::none(), CornerValues::none());
         let mut own = Self { shared, exchange, values, reprojected, is_affine, reprojects };
         own.fit();
