@@ -20,6 +20,7 @@ use crate::case::law_of_body;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
+use crate::evaluate::{OnAxis, on_axis};
 use crate::flow::is_of_memory;
 use crate::inverse::determinant;
 use crate::points;
@@ -108,6 +109,8 @@ pub struct CheckReport {
     pub findings: Vec<Finding>,
     /// Change of a motion that is not the same after its period. It is no failure, since a run may last any time.
     pub not_periodic: Option<Change>,
+    /// The axis of coordinates within the body, where formulas divide by zero.
+    pub on_axis: Option<OnAxis>,
 }
 
 /// How much a motion differs after its period from its beginning, over all points sampled.
@@ -127,11 +130,13 @@ impl CheckReport {
     /// A mistake may hide at particular values, such as a density of one.
     #[must_use]
     pub fn worst_of(reports: Vec<CheckReport>) -> CheckReport {
-        let mut worst = CheckReport { points: 0, findings: Vec::new(), not_periodic: None };
+        let mut worst =
+            CheckReport { points: 0, findings: Vec::new(), not_periodic: None, on_axis: None };
         for (set, report) in reports.into_iter().enumerate() {
             worst.points += report.points;
             if set == 0 {
                 worst.not_periodic = report.not_periodic;
+                worst.on_axis = report.on_axis;
             }
             for (index, mut finding) in report.findings.into_iter().enumerate() {
                 finding.parameter_set = set;
@@ -314,7 +319,12 @@ where
         }
         findings.extend(boundary_findings(solution, boundary, &places, &samples));
     }
-    Ok(CheckReport { points: count, findings, not_periodic: change(solution, &samples) })
+    Ok(CheckReport {
+        points: count,
+        findings,
+        not_periodic: change(solution, &samples),
+        on_axis: on_axis(solution),
+    })
 }
 
 /// A change of the motion from one period to the next that is more than rounding, as a share of its largest values.

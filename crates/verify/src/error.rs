@@ -132,6 +132,24 @@ pub enum SceneError {
         /// Lines of a specification that runs.
         instead: &'static str,
     },
+    /// A body at rest whose waves have no speed.
+    #[error(
+        "the body has no stiffness at rest: the modulus of its waves is {modulus:.3e}, so that no step in time is stable; give it a smaller prestress, or \
+         larger moduli"
+    )]
+    NoStiffness {
+        /// The modulus of plane waves, a stress.
+        modulus: f64,
+    },
+    /// A point of the solver on the axis of curvilinear coordinates.
+    #[error(
+        "a point of the solver lies on the axis of the coordinates, at X = {X:?}, where the formulas divide by zero; write another --cells or \
+         --ppc, of which one is even, so that the axis lies between points"
+    )]
+    PointOnAxis {
+        /// The place.
+        X: Vec<f64>,
+    },
     /// A body of revolution that the updated Lagrangian formulation has no half plane of.
     #[error(
         "{why}; it runs in the total Lagrangian formulation: --formulation total-lagrangian --shape bspline3 --layout gauss --grid \
@@ -143,7 +161,7 @@ pub enum SceneError {
     },
     /// A law that the half plane of a body of revolution has no form of.
     #[error(
-        "the updated Lagrangian formulation runs bodies of revolution with isotropic elastic laws alone; this one runs with --formulation \
+        "the updated Lagrangian formulation runs bodies of revolution with isotropic laws alone; this one runs with --formulation \
          total-lagrangian --shape bspline3 --layout gauss --grid cylindrical"
     )]
     LawOfHalfPlane,
@@ -157,8 +175,9 @@ pub enum SceneError {
     },
     /// A law with directions along curvilinear coordinates, which turn from place to place.
     #[error(
-        "this law has directions along curvilinear coordinates, and the solver's directions are Cartesian: state the law in J, \
-         I1 and I2, or the solution in Cartesian coordinates (mms check, eval and gen serve it all the same)"
+        "this law has directions along curvilinear coordinates, by its components, its fibres or a prestress, and the solver's directions are \
+         Cartesian: state the law in J, I1 and I2 without a prestress, or the solution in Cartesian coordinates (mms check, eval and gen serve it \
+         all the same)"
     )]
     CurvilinearComponents,
     /// An elastic law without memory of this kind.

@@ -1,95 +1,35 @@
-//! The exact fields at one point, in a form that can be written.
+//! The exact fields at one point, with limits on the axis, or the centre, of curvilinear coordinates and next to it, where formulas divide by
+//! the radius.
 
-use crate::across::has_stretch_across;
 use crate::dimension::in_dimension;
-use crate::points::outside;
+use crate::error::SceneError;
+use crate::field_row::{FieldRow, evaluate_in};
+use crate::points::{outside, size};
 use crate::tangent::{TangentError, WrongLength, exact_tangent};
-use mmsmith_runtime::{AnySolution, Around, Domain, Fields, Solution};
-use nalgebra::{SMatrix, SVector};
+use mmsmith_runtime::{AnySolution, Domain, Real, Solution};
+use nalgebra::SVector;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
-/// All fields at a point; vectors as lists, matrices as lists of rows.
+/// The number of distances at which fields are taken, on either side of the axis.
+const DISTANCES: i32 = 6;
+/// The nearest distance as a share of the body's size: small beside the body, large beside what rounding loses in quotients by the distance.
+const SHARE: f64 = 0.005;
+/// The distance from the axis, as a share of the body's size, within which formulas lose digits.
+const NEAR: f64 = 0.001;
+/// The difference of limits from two sets of distances up to which there is a limit, as a share of the field's largest value.
+const SAME: f64 = 1e-7;
+
+/// The state of the fields on an axis of coordinates within the body, where the formulas give no finite numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FieldRow {
-    /// Displacement.
-    pub u: Vec<f64>,
-    /// Velocity.
-    pub v: Vec<f64>,
-    /// Acceleration.
-    pub a: Vec<f64>,
-    /// Displacement gradient `H[i][J]`.
-    pub H: Vec<Vec<f64>>,
-    /// Deformation gradient `F[i][J]`.
-    pub F: Vec<Vec<f64>>,
-    /// `det F`.
-    pub J: f64,
-    /// The stretch across the plane, or the line, in plane or uniaxial stress. Written where the solution assumes that there is no stress
-    /// across.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub F_zz: Option<f64>,
-    /// First Piola-Kirchhoff stress `P[i][J]`.
-    pub P: Vec<Vec<f64>>,
-    /// Body force per unit mass.
-    pub b: Vec<f64>,
-    /// The tangent of the solver's law, `dPdF[i][J][k][L] = dP_iJ/dF_kL`. Written where it is asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub dPdF: Vec<Vec<Vec<Vec<f64>>>>,
-    /// Internal variables of the law by their names, in Cartesian components. Written where there are any.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub internal: BTreeMap<String, f64>,
-    /// Whether `X` lies outside the body, where the fields are those of the same formulas. Written where it is true.
-    #[serde(skip_serializing_if = "is_false")]
-    pub outside: bool,
-    /// The fields that have entries which are no finite numbers, and are written as null. Written where there are any.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub not_finite: Vec<String>,
-    /// Why they have: the history of the internal variables could not be followed. Written where that is the reason.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub why: Option<String>,
-}
-
-fn is_false(value: &bool) -> bool {
-    !value
-}
-
-/// Share of the body's size by which a point may lie outside before it is told: rounding of points on the surface.
-const OUTSIDE: f64 = 1e-12;
-
-impl FieldRow {
-    /// Every value but those of the tangent.
-    fn values(&mut self) -> impl Iterator<Item = &mut f64> {
-        let vectors = [&mut self.u, &mut self.v, &mut self.a, &mut self.b].into_iter().flatten();
-        let matrices = [&mut self.H, &mut self.F, &mut self.P].into_iter().flatten().flatten();
-        let others = self.F_zz.iter_mut().chain(self.internal.values_mut());
-        vectors.chain(matrices).chain([&mut self.J]).chain(others)
-    }
-
-    /// Each field's letter, the shape of its value at a point, and its entries row by row.
-    #[must_use]
-    pub fn named(&self) -> Vec<(&str, Vec<usize>, Vec<f64>)> {
-        let vector = |list: &[f64]| (vec![list.len()], list.to_vec());
-        let matrix = |rows: &[Vec<f64>]| (vec![rows.len(); 2], rows.concat());
-        let named = |name, (shape, values)| (name, shape, values);
-        let mut all = vec![
-            named("u", vector(&self.u)),
-            named("v", vector(&self.v)),
-            named("a", vector(&self.a)),
-            named("H", matrix(&self.H)),
-            named("F", matrix(&self.F)),
-            named("J", (Vec::new(), vec![self.J])),
-            named("P", matrix(&self.P)),
-            named("b", vector(&self.b)),
-        ];
-        if !self.dPdF.is_empty() {
-            let entries = self.dPdF.iter().flatten().flatten().flatten().copied().collect();
-            all.push(named("dPdF", (vec![self.dPdF.len(); 4], entries)));
-        }
-        all.extend(self.F_zz.map(|F_zz| named("F_zz", (Vec::new(), vec![F_zz]))));
-        let internal = self.internal.iter();
-        all.extend(internal.map(|(name, value)| (name.as_str(), Vec::new(), vec![*value])));
-        all
-    }
+pub struct OnAxis {
+    /// A place on the axis.
+    pub X: Vec<f64>,
+    /// A time.
+    pub t: f64,
+    /// Whether all fields have limits there.
+    pub has_limit: bool,
+    /// The fields that have no finite value by their formulas.
+    pub fields: Vec<String>,
 }
 
 /// [`evaluate`] with the tangent of the solver's law at the exact deformation.
@@ -117,55 +57,10 @@ pub fn evaluate_with_tangent(
 /// [`WrongLength`] when `X` does not have one coordinate for each dimension.
 pub fn evaluate(solution: &AnySolution<f64>, X: &[f64], t: f64) -> Result<FieldRow, WrongLength> {
     let unknown = || Err(WrongLength { given: X.len(), dimension: 0 });
-    let row = in_dimension!(solution, |s| evaluate_in(s, X, t), else unknown())?;
-    match (solution, X) {
-        (AnySolution::Three(space), [0.0, 0.0, Z]) if !row.not_finite.is_empty() => {
-            Ok(limit_at_axis(space.as_ref(), *Z, t).unwrap_or(row))
-        }
-        _ => Ok(row),
-    }
+    in_dimension!(solution, |s| evaluate_at(s, X, t), else unknown())
 }
 
-/// The limits of all fields on the axis of a solid body that is axisymmetric; `None` for other bodies.
-///
-/// Along a line through the axis every Cartesian entry is smooth, so that means over both sides are even functions of the distance. They are
-/// extrapolated from six distances by the polynomial of the squares.
-fn limit_at_axis(space: &dyn Solution<f64, 3>, Z: f64, t: f64) -> Option<FieldRow> {
-    const DISTANCES: usize = 6;
-    // Small beside the body, large beside what rounding loses in quotients by the distance.
-    const SHARE: f64 = 0.01;
-    let Domain::Tube { inner: 0.0, outer, around: Around::Axisymmetric, .. } = space.domain()
-    else {
-        return None;
-    };
-    let mut limit: Option<FieldRow> = None;
-    for k in 1..=DISTANCES {
-        // Lagrange's weight at zero of the square of the distance.
-        let square = |k: usize| (k * k) as f64;
-        let weight: f64 = (1..=DISTANCES)
-            .filter(|other| *other != k)
-            .map(|other| square(other) / (square(other) - square(k)))
-            .product();
-        for side in [1.0, -1.0] {
-            let X = side * SHARE * outer * k as f64;
-            let mut row = evaluate_in(space, &[X, 0.0, Z], t).ok()?;
-            row.values().for_each(|value| *value *= 0.5 * weight);
-            match &mut limit {
-                None => limit = Some(row),
-                Some(sum) => sum.values().zip(row.values()).for_each(|(sum, own)| *sum += *own),
-            }
-        }
-    }
-    let limit = limit?;
-    let is_finite =
-        |(.., values): &(&str, Vec<usize>, Vec<f64>)| values.iter().all(|v| v.is_finite());
-    limit.named().iter().all(is_finite).then(|| {
-        let outside = outside(&space.domain(), &SVector::from([0.0, 0.0, Z]));
-        FieldRow { outside: outside.is_some_and(|share| share > OUTSIDE), ..limit }
-    })
-}
-
-fn evaluate_in<const D: usize>(
+fn evaluate_at<const D: usize>(
     solution: &dyn Solution<f64, D>,
     X: &[f64],
     t: f64,
@@ -173,40 +68,143 @@ fn evaluate_in<const D: usize>(
     let position: [f64; D] =
         X.try_into().map_err(|_| WrongLength { given: X.len(), dimension: D })?;
     let X = SVector::from(position);
-    let Fields { u, v, a, H, F, J, P, b } = solution.fields(&X, t);
-    let F_zz = has_stretch_across(&solution.law()).then(|| solution.stretch_across(&X, t));
-    let names = solution.internal_variables();
-    let values = if names.is_empty() { Vec::new() } else { solution.internal(&X, t) };
-    let mut row = FieldRow {
-        internal: names.into_iter().zip(values).collect(),
-        u: list(&u),
-        v: list(&v),
-        a: list(&a),
-        H: rows(&H),
-        F: rows(&F),
-        J,
-        F_zz,
-        P: rows(&P),
-        b: list(&b),
-        dPdF: Vec::new(),
-        outside: outside(&solution.domain(), &X).is_some_and(|share| share > OUTSIDE),
-        not_finite: Vec::new(),
-        why: None,
-    };
-    let bad = |values: &[f64]| !values.iter().all(|value| value.is_finite());
-    let fields = row.named();
-    let not_finite = fields.iter().filter(|(.., values)| bad(values));
-    row.not_finite = not_finite.map(|(name, ..)| (*name).to_owned()).collect();
-    if !row.not_finite.is_empty() && !row.internal.is_empty() {
-        row.why = solution.history(&[X], t).err();
+    Ok(beside_axis(solution, &X, t, evaluate_in(solution, &X, t)))
+}
+
+/// The fields at a place, as limits where the place lies on an axis of coordinates or next to it and the formulas have none.
+///
+/// Along a line through the axis every Cartesian entry of a smooth field is smooth, so that values at six distances on either side have a
+/// polynomial. A field whose polynomial depends on the distances has no limit: its `row` stays as it is.
+pub(crate) fn beside_axis<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &SVector<f64, D>,
+    t: f64,
+    row: FieldRow,
+) -> FieldRow {
+    let Some(foot) = foot(&solution.domain(), X) else { return row };
+    let on_axis = evaluate_in(solution, &foot, t);
+    if on_axis.not_finite.is_empty() || on_axis.why.is_some() {
+        return row;
     }
-    Ok(row)
+    match limit(solution, X, t) {
+        Some(limit) => FieldRow { outside: row.outside, ..limit },
+        None if row.not_finite.is_empty() => row,
+        None => FieldRow {
+            why: Some("the fields have no limit on the axis: the motion, or the stress, is not smooth there".into()),
+            ..row
+        },
+    }
 }
 
-fn list<const D: usize>(vector: &SVector<f64, D>) -> Vec<f64> {
-    vector.iter().copied().collect()
+/// The fields on an axis of coordinates within the body, where the formulas give no finite numbers; `None` where they do, and where the body
+/// contains none.
+pub(crate) fn on_axis<const D: usize>(solution: &dyn Solution<f64, D>) -> Option<OnAxis> {
+    let domain = solution.domain();
+    let heights: Vec<f64> = match &domain {
+        _ if D < 3 => vec![0.0],
+        Domain::Tube { lower, upper, .. } => vec![lower + 0.37 * (upper - lower)],
+        Domain::Box { lower, upper } => vec![lower[2] + 0.37 * (upper[2] - lower[2])],
+        Domain::Annulus { inner, outer } => vec![inner + 0.37 * (outer - inner)],
+        _ => Vec::new(),
+    };
+    let period = solution.period();
+    let t = if period.is_finite() { 0.31 * period } else { 0.0 };
+    heights.into_iter().find_map(|height| {
+        let X = SVector::from_fn(|i, _| if i == 2 { height } else { 0.0 });
+        outside(&domain, &X).filter(|share| *share <= 0.0)?;
+        let row = evaluate_in(solution, &X, t);
+        (!row.not_finite.is_empty() && row.why.is_none()).then(|| OnAxis {
+            X: X.iter().copied().collect(),
+            t,
+            has_limit: limit(solution, &X, t).is_some(),
+            fields: row.not_finite,
+        })
+    })
 }
 
-fn rows<const D: usize>(matrix: &SMatrix<f64, D, D>) -> Vec<Vec<f64>> {
-    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+/// Refuses points of a solver on an axis of coordinates, or so near that rounding takes all digits, where formulas divide by the radius.
+pub(crate) fn refuse_on_axis<T: Real, const D: usize>(
+    exact: &dyn Solution<f64, D>,
+    points: &[SVector<T, D>],
+) -> Result<(), SceneError> {
+    let Some(near) = size(&exact.domain()).map(|size| 1e-9 * size) else { return Ok(()) };
+    let is_near = |X: &&SVector<T, D>| D > 1 && X[0].to_f64().hypot(X[1 % D].to_f64()) <= near;
+    let Some(X) = points.iter().find(is_near) else { return Ok(()) };
+    let foot = SVector::from_fn(|i, _| if i < 2 { 0.0 } else { X[i].to_f64() });
+    if exact.is_half_plane() || evaluate_in(exact, &foot, 0.0).not_finite.is_empty() {
+        return Ok(());
+    }
+    Err(SceneError::PointOnAxis { X: foot.iter().copied().collect() })
+}
+
+/// The place on the axis `Z`, or in the plane the origin, next to a place; `None` of places that are not near.
+fn foot<const D: usize>(domain: &Domain<f64, D>, X: &SVector<f64, D>) -> Option<SVector<f64, D>> {
+    let is_near = D > 1 && X[0].hypot(X[1 % D]) <= NEAR * size(domain)?;
+    is_near.then(|| SVector::from_fn(|i, _| if i < 2 { 0.0 } else { X[i] }))
+}
+
+/// All fields at a place next to the axis from places farther away; `None` where these tell different values.
+fn limit<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &SVector<f64, D>,
+    t: f64,
+) -> Option<FieldRow> {
+    let size = size(&solution.domain())?;
+    let [(near, largest), (far, _)] =
+        [1.0, 2.0].map(|times| interpolated(solution, X, t, times * SHARE * size));
+    let (near, far) = (near?, far?);
+    // Components of one variable are measured by the largest of them: others of it may be nothing but rounding.
+    let stem = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
+    let is_same = near.named().iter().zip(far.named()).all(|((name, _, near), (_, _, far))| {
+        let own = largest.iter().filter(|(known, _)| stem(known) == stem(name));
+        let largest = own.fold(0.0, |most: f64, (_, own)| most.max(*own));
+        near.iter().zip(far).all(|(near, far)| (near - far).abs() <= SAME * largest)
+    });
+    is_same.then_some(far)
+}
+
+/// The polynomial of the fields along the line through a place and the axis, and the largest value of each field at its nodes.
+fn interpolated<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    X: &SVector<f64, D>,
+    t: f64,
+    step: f64,
+) -> (Option<FieldRow>, Vec<(String, f64)>) {
+    let distance = X[0].hypot(X[1 % D]);
+    let direction: SVector<f64, D> = SVector::from_fn(|i, _| match i {
+        0 | 1 if distance > 0.0 => X[i] / distance,
+        0 => 1.0,
+        _ => 0.0,
+    });
+    let nodes: Vec<f64> =
+        (1..=DISTANCES).flat_map(|k| [1, -1].map(|side| f64::from(side * k) * step)).collect();
+    let (mut sum, mut largest): (Option<FieldRow>, Vec<(String, f64)>) = (None, Vec::new());
+    for own in &nodes {
+        // Lagrange's weight.
+        let others = nodes.iter().filter(|other| *other != own);
+        let weight: f64 = others.map(|other| (distance - other) / (own - other)).product();
+        let mut row = evaluate_in(solution, &(X + direction * (own - distance)), t);
+        if !row.not_finite.is_empty() {
+            return (None, largest);
+        }
+        for (name, _, values) in row.named() {
+            let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+            match largest.iter_mut().find(|(known, _)| known == name) {
+                Some((_, known)) => *known = known.max(most),
+                None => largest.push((name.to_owned(), most)),
+            }
+        }
+        row.values().for_each(|value| *value *= weight);
+        match &mut sum {
+            None => sum = Some(row),
+            Some(sum) => sum.values().zip(row.values()).for_each(|(sum, own)| *sum += *own),
+        }
+    }
+    // A body force that is nothing has the rounding of the acceleration and of the stress.
+    let of = |name: &str| largest.iter().find(|(known, _)| known == name).map_or(0.0, |own| own.1);
+    let rounding = of("a").max(of("P") / (solution.density() * step * f64::from(DISTANCES)));
+    if let Some((_, of_b)) = largest.iter_mut().find(|(known, _)| known == "b") {
+        *of_b = of_b.max(1e-3 * rounding);
+    }
+    (sum, largest)
 }

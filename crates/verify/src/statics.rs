@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::{Case, CflSpeed, law_of};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
+use crate::evaluate::refuse_on_axis;
 use crate::frames::{FrameOutput, write_at_rest};
 use crate::inverse::determinant;
 use crate::order::Order;
@@ -41,7 +42,7 @@ pub struct StaticCase {
 }
 
 /// Errors of an equilibrium.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StaticErrors<T> {
     /// The displacement's.
     pub u: T,
@@ -308,6 +309,7 @@ where
     let law = law_of(exact, &case.case)?;
     let begun = Instant::now();
     let mut body = f64::at_rest(&grid, case.total.degree, law, exact.density())?;
+    refuse_on_axis(exact, body.positions())?;
     let time = case.moment * exact.period();
     let [unknowns, entries] = body.size();
     let mut row = StaticRow {

@@ -7,8 +7,8 @@ use mmsmith_claims::{
 use mmsmith_expr::nearest_f64;
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
-    BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, TOLERANCE, Verdict, check as check_fields,
-    history_of,
+    BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, OnAxis, TOLERANCE, Verdict,
+    check as check_fields, history_of,
 };
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -106,6 +106,7 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             "points": report.points,
             "findings": report.findings,
             "not_periodic": report.not_periodic,
+            "on_axis": report.on_axis,
             "blind_spots": blind,
             "history": history.as_ref().map(history::document),
             "inverted": inverted,
@@ -292,7 +293,26 @@ fn text(
             100.0 * v
         );
     }
+    if let Some(OnAxis { X, t, has_limit, fields }) = &report.on_axis {
+        let (place, fields) = (list(X), fields.join(", "));
+        let time = number::rounded(*t, 3);
+        text += &match has_limit {
+            true => format!(
+                "  remark: the formulas of {fields} divide by zero on the axis, as at X = {place}: mms eval takes the limits; a run, or generated \
+                 code, needs points beside it\n"
+            ),
+            false => format!(
+                "  remark: {fields} have no limit on the axis, as at X = {place}, t = {time}: the motion, or the stress, is not smooth there, and no solver \
+                 converges; let u_R and u_theta begin with R, u_Z with 1 or R^2, or leave the axis out of the body\n"
+            ),
+        };
+    }
     text + &claims.text()
+}
+
+/// A place as specifications and tables of points have it.
+fn list(X: &[f64]) -> String {
+    format!("[{}]", X.iter().map(|x| number::rounded(*x, 3)).collect::<Vec<_>>().join(", "))
 }
 
 /// The findings of one solution, a row each.

@@ -168,7 +168,7 @@ fn eval_tells_of_points_outside_and_of_values_that_are_no_numbers() {
     assert_eq!(fields["rows"][1]["outside"], true);
     assert_eq!(keys(&fields["rows"][2]), "F H J P a b u v");
 
-    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0, 0], "t": 0.01 } ]"#;
+    let points = r#"[ { "X": [0.6, 0.3], "t": 0.01 }, { "X": [0, 0], "t": 0.004 } ]"#;
     let called = mms_with(place, "eval ring --points -", &[], points);
     assert_eq!(called.status, 1, "{}", called.stderr);
     assert!(called.stderr.contains("entry 1: "), "{}", called.stderr);
