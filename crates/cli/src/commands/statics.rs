@@ -7,7 +7,7 @@ use mmsmith_solutions::AnySolution;
 use mmsmith_verify::{
     Case, Formulation, FrameOutput, Integrator, Layout as Points, Named, ORDER_TOLERANCE, PerNorm,
     Scheme, Shape, Start, StaticCase, StaticErrors, StaticProblem, StaticRow, StaticStudy, Total,
-    Transfer, Volume, expected_of_statics, is_at_rest, usual_moment,
+    Transfer, Volume, expected_of_statics, is_at_rest, uneven_refinement, usual_moment,
 };
 use serde_json::{Value, json};
 
@@ -275,10 +275,14 @@ impl Study for Orders<'_> {
 
     fn report(&self, found: Vec<StaticRow>) -> Result<Report> {
         let floors: Vec<_> = self.cases.iter().map(|case| case.plan().floors).collect();
-        let mut study = StaticStudy::new(found, &self.expected, self.tolerance, &floors);
+        let cells: Vec<usize> = found.iter().map(|row| row.cells).collect();
+        let not_judged = uneven_refinement(&self.problem.exact, &cells);
+        let nothing = StaticErrors::default();
+        let expected = if not_judged.is_some() { &nothing } else { &self.expected };
+        let mut study = StaticStudy::new(found, expected, self.tolerance, &floors);
         if !self.is_strict {
             study.spare_coarse_grids();
         }
-        Ok(told::orders(self.problem, &study))
+        Ok(told::orders(self.problem, &study, not_judged))
     }
 }

@@ -4,7 +4,7 @@ use mmsmith_solutions::{AnySolution, Smoothness};
 use mmsmith_verify::{
     Discretized, Expected, OrderVerdict, PerField, PerNorm, Row, Status, Study, Sweep, Temporal,
     Values, expected_in_space, expected_in_time, flows_smoothly, history_of, orders_above,
-    verdicts_above,
+    uneven_refinement, verdicts_above,
 };
 
 use super::Converge;
@@ -46,7 +46,13 @@ fn not_judged(exact: &AnySolution<f64>) -> Option<String> {
 
 impl Judged {
     pub(super) fn new(asked: &Converge<'_>, rows: Vec<Row>, differences: Option<Temporal>) -> Self {
-        let reason = not_judged(&asked.problem.model.exact);
+        let exact = &asked.problem.model.exact;
+        let reason = not_judged(exact).or_else(|| match &asked.sweep {
+            Sweep::Cells(cells) if asked.base.scheme.updated().is_none() => {
+                uneven_refinement(exact, cells)
+            }
+            Sweep::Cells(_) | Sweep::Cfls(_) => None,
+        });
         let judged = Self::unless(asked, rows, differences, reason);
         // A missed order proves nothing where errors grow by themselves; one that is met does.
         if !any(judged.decisive(), |one| one.passed == Some(false)) {

@@ -172,7 +172,7 @@ fn on_convergence(row: &StaticRow) -> String {
 }
 
 /// The report on a series of grids.
-pub(super) fn orders(problem: &Problem, study: &StaticStudy) -> Report {
+pub(super) fn orders(problem: &Problem, study: &StaticStudy, not_judged: Option<String>) -> Report {
     let units = Units::of(&problem.selection);
     let length = units.map(Units::length);
     let mut sections = Vec::new();
@@ -187,6 +187,7 @@ pub(super) fn orders(problem: &Problem, study: &StaticStudy) -> Report {
             notes += &format!("{} cells: {}", row.cells, stopped(problem, row, why));
         }
     }
+    notes += &not_judged.iter().map(|reason| format!("{reason}\n")).collect::<String>();
     notes += &on_verdicts(study);
     sections.push(Section::Note(notes));
     sections.push(Section::Sheet(sheet(study)));
@@ -215,7 +216,10 @@ pub(super) fn orders(problem: &Problem, study: &StaticStudy) -> Report {
             ("orders".to_owned(), json!(study.orders)),
             ("verdicts".to_owned(), json!(study.verdicts)),
             ("passed".to_owned(), json!(verdict)),
-        ]),
+        ])
+        .into_iter()
+        .chain(not_judged.map(|reason| ("not_judged".to_owned(), json!(reason))))
+        .collect(),
         verdict,
     }
 }
