@@ -547,3 +547,27 @@ fn times_of_a_static_solution_have_no_bounds() {
         assert!(called.stdout.contains("status: ok"), "{t}: {}{}", called.stdout, called.stderr);
     }
 }
+
+/// Recordings that end at other times, or whose points contradict what is told of their spacings, have no order.
+#[test]
+fn recordings_that_are_not_alike_are_not_judged() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    for (folder, call) in
+        [("coarse", "--cells 8"), ("fine", "--cells 16"), ("short", "--cells 16 --periods 0.25")]
+    {
+        let called = mms(place, &format!("run axis-aligned --frames 5 --vtk {folder} {call}"));
+        assert_eq!(called.status, 0, "{}", called.stderr);
+    }
+    assert_eq!(score(place, "axis-aligned coarse fine --cells 8,16")["passed"], true);
+    for (call, why) in [
+        ("coarse short --cells 8,16", "ends at t ="),
+        ("coarse fine --cells 8,10", "points, and what is told of their spacings"),
+        ("coarse fine --cells 16,8", "points, and what is told of their spacings"),
+    ] {
+        let found = score(place, &format!("axis-aligned {call} --expect u.l2=2"));
+        assert_ne!(found["passed"], true, "{call}");
+        let message = found["verdict"]["message"].as_str().unwrap();
+        assert!(message.contains("cannot tell") && message.contains(why), "{call}: {message}");
+    }
+}

@@ -49,8 +49,8 @@ impl Balance {
     ) {
         // Where F is recorded, each of them is held against it.
         let ([Some(J), Some(density)], None) = (&data.scalars, &data.tensors[0]) else { return };
-        for (J, density) in J.iter().zip(density) {
-            let ratio = J * density / exact.density();
+        for ((J, density), X) in J.iter().zip(density).zip(&data.X) {
+            let ratio = J * density / exact.density_at(X);
             self.places += 1.0;
             self.ratio += ratio;
             self.squared += ratio * ratio;

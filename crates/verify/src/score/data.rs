@@ -129,7 +129,6 @@ impl<const D: usize> FrameData<D> {
     where
         f64: Precision<D>,
     {
-        let density = exact.density();
         let law = Across::<D>::of(exact.law());
         let has_whole = self.whole.iter().any(Option::is_some);
         let is_needed = has_whole || exact.is_half_plane();
@@ -140,6 +139,7 @@ impl<const D: usize> FrameData<D> {
         };
         move |p: usize, state: &State<f64, D>| {
             let v = self.v.as_ref().map_or(0.0, |(v, _)| (v[p] - state.v).norm());
+            let density = exact.density_at(&self.X[p]);
             let at = (&self.X[p], &state.F, time);
             let beyond = of_frame.as_ref().map(|known| directions.at(known, p, exact, at));
             // Around an axis volumes change with the radius too.

@@ -49,7 +49,7 @@ pub enum ScoreError {
         path: PathBuf,
     },
     /// A frame without points, which only CSV files can have.
-    #[error("{}: there are no positions (columns x, y, z)", path.display())]
+    #[error("{}: there are no positions (columns X, Y, Z or x, y, z; of a body of revolution R, theta, Z, or without a twist R, Z)", path.display())]
     NoPositions {
         /// The file.
         path: PathBuf,
@@ -147,8 +147,8 @@ pub enum ScoreError {
     },
     /// Recordings are compared with each other, each with a time step.
     #[error(
-        "there are {steps} time step(s) for {recordings} recording(s): two recordings at least, each with one, such as --dt \
-         1e-4,5e-5"
+        "there are {steps} time step(s) for {recordings} recording(s): two recordings at least, each with one, such as \
+         --differences 1e-4,5e-5"
     )]
     Steps {
         /// Time steps.

@@ -199,6 +199,9 @@ where
             verdict.doubt("it depends on whether points are reference or current positions; --points tells it");
         }
     }
+    if let Some(why) = other_ends(&rows).or_else(|| other_spacings(&rows, inputs, D)) {
+        verdict.doubt(&why);
+    }
     largest::tell(exact, inputs, &decision.taken, options, &mut rows, &mut verdict)?;
     conclude(&mut rows, &verdict);
     let of_v = verdict.fields.get(&Quantity::Velocity).and_then(|norms| norms.l2.finest);
@@ -211,6 +214,57 @@ where
     let integrated_orders = IntegratedOrders::of(&of_meshes.collect::<Vec<_>>());
     let across_orders = across_orders(&rows);
     Ok(Score { rows, orders, across_orders, integrated_orders, verdict })
+}
+
+/// How much earlier a recording may end than another, as a share of the time of that: steps and frames of other lengths.
+const ENDS: f64 = 0.05;
+
+/// Why the errors of recordings have no order: one of them ends much earlier than another, as a run that stopped, and errors grow with time.
+fn other_ends(rows: &[ScoreRow]) -> Option<String> {
+    let last = rows.iter().max_by(|a, b| a.last_time.total_cmp(&b.last_time))?;
+    let span = last.last_time.abs().max(last.last_time - last.first_time);
+    let early = rows.iter().find(|row| last.last_time - row.last_time > ENDS * span)?;
+    Some(format!(
+        "{} ends at t = {:.6e} and {} at t = {:.6e}, as where a run has stopped, and errors over other times have no order; record all until the \
+         same time",
+        early.file, early.last_time, last.file, last.last_time
+    ))
+}
+
+/// How far the ratio of two spacings that are told may be from that of the points, as a logarithm.
+const SPACINGS: f64 = 0.15;
+
+/// Why the spacings that are told cannot be those of the recordings: these have too many points for it, or too few. `None` where they can, and
+/// of recordings at the same number of places.
+fn other_spacings(rows: &[ScoreRow], inputs: &[Input], dimension: usize) -> Option<String> {
+    let all: Vec<_> = rows.iter().zip(inputs).collect();
+    all.windows(2).find_map(|pair| {
+        let [(coarse, of_coarse), (fine, of_fine)] = pair else { return None };
+        let is_told = |input: &Input| !matches!(input.resolution, Resolution::Estimated);
+        let is_same = coarse.particles == fine.particles;
+        if is_same || !is_told(of_coarse) || !is_told(of_fine) || coarse.h == fine.h {
+            return None;
+        }
+        let told = (coarse.h / fine.h).ln();
+        // Of the body, or of a plane or a line in it; nodes are one more along each side than cells.
+        let ratios = (1..=dimension).flat_map(|d| {
+            let [coarse, fine] = [coarse, fine].map(|row| (row.particles as f64).powf(1.0 / d as f64));
+            [fine / coarse, (fine - 1.0).max(1.0) / (coarse - 1.0).max(1.0)].map(f64::ln)
+        });
+        let (least, most) = ratios
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), own| (own.min(least), own.max(most)));
+        let is_apart = told < least - SPACINGS || told > most + SPACINGS;
+        is_apart.then(|| {
+            format!(
+                "{} and {} have {} and {} points, and what is told of their spacings (--cells, --h) is a ratio of {:.2}, which these do not have",
+                coarse.file,
+                fine.file,
+                coarse.particles,
+                fine.particles,
+                told.exp()
+            )
+        })
+    })
 }
 
 /// Says of each field that is another one whether the motion has it too.

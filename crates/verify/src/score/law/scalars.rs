@@ -48,7 +48,7 @@ pub(super) fn rows<const D: usize>(
     rounding: Rounding<'_>,
     remarks: &mut Remarks,
 ) -> Vec<LawRow> {
-    let (density, is_half_plane) = (exact.density(), exact.is_half_plane());
+    let is_half_plane = exact.is_half_plane();
     let fields: [(_, _, Value, _); 2] = [
         (Quantity::VolumeRatio, "det F", |[J, ..]| J, VOLUME_RATIOS),
         (Quantity::Density, "rho0/det F", |[J, _, density]| density / J, DENSITIES),
@@ -62,7 +62,7 @@ pub(super) fn rows<const D: usize>(
                 let around = if is_half_plane { place.around? } else { 1.0 };
                 let J = determinant(&place.F) * around;
                 let trace = (place.F - SMatrix::identity()).trace() + (around - 1.0);
-                Some((place.scalars[n]?, [J, trace, density]))
+                Some((place.scalars[n]?, [J, trace, exact.density_at(&place.X)]))
             })
             .filter(|(_, [J, ..])| *J > 0.0)
             .collect();
