@@ -73,6 +73,32 @@ fn a_wrong_solver_passes_by_no_norm() {
     refuses(place, &format!("{line} --expect u.l2=2,u.linf=1"), &["one norm of u"]);
 }
 
+/// The largest error is that of the first frame, which no field of later times changes: results are compared, not it alone.
+#[test]
+fn a_field_that_is_used_later_is_not_called_unused() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let change = "s/axis_aligned_1d_u(&bar, &X.i., 0.0, &u.i.)/u[i] = 0.0/;s/step % n == 0/step == 0 || step == n/";
+    let (status, said) = diagnosed(place, "axis-aligned-1d", "bar.c", change);
+    assert_eq!(status, 1, "{said}");
+    let found = read_json(&place.join("found.json"));
+    assert_eq!(found["causes"][0]["name"], "initial-displacement-unused", "{said}");
+}
+
+/// What a finer grid mends was no mistake: the right fields are run on each grid on which a mistake is tried.
+#[test]
+fn a_right_solver_on_coarse_grids_has_no_mistake() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    script(place, "bar.c", "");
+    let line =
+        format!("diagnose axis-aligned-1d --target c --jobs 2 --run {}/run.sh", place.display());
+    let called = mms(place, &format!("{line} --cells 2,4 --expect u=2.1 --json found.json"));
+    let found = read_json(&place.join("found.json"));
+    assert!(found["causes"].as_array().unwrap().is_empty(), "{}", called.stdout);
+    assert_eq!((called.status, &found["passed"]), (0, &true.into()), "{}", called.stdout);
+}
+
 #[test]
 fn mistakes_in_the_memory_of_a_material_are_named() {
     // One of three that differ in a factor: each takes a table for each of them.

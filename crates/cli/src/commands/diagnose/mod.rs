@@ -262,7 +262,7 @@ fn examine<'a>(
         norm: expected.norms.get(&field).copied().unwrap_or(Norm::Linf),
     };
     if !passed {
-        told.search(&given, &runs[0], options, expected)?;
+        told.search(&given, &runs, options, expected)?;
     }
     Ok(told)
 }
@@ -271,15 +271,17 @@ impl Told {
     fn search(
         &mut self,
         solver: &Solver<'_>,
-        right: &Run,
+        runs: &[Run],
         options: &DiagnoseOptions,
         expected: &Expected,
     ) -> Result<()> {
+        let right = &runs[0];
         let search = Search {
             solver,
             expected,
             cells: &options.cells,
             order: self.order(),
+            right: Mutex::new(by_cells(&options.cells, runs)),
             not_tried: Mutex::default(),
         };
         // No solver is right that does without the body force, or without the motion of all its surfaces: other mistakes need not be tried.
@@ -292,6 +294,16 @@ impl Told {
         };
         let ignored = search.unused(right, is_needed)?;
         let tried = if ignored.is_empty() { search.single(right)? } else { vec![] };
+        let with_right = search.right.lock().map(|right| right.clone()).unwrap_or_default();
+        if with_right.len() > options.cells.len() && expected.is_met(&with_right, 0.0) {
+            let cells: Vec<String> = with_right.keys().map(usize::to_string).collect();
+            self.notes.push(format!(
+                "the errors fall as expected on a finer grid, so that nothing is wrong; --cells {} shows it",
+                cells.join(",")
+            ));
+            (self.passed, self.right) = (true, with_right);
+            return Ok(());
+        }
         for one in tried {
             let is_named = search.explains(&one);
             let Tried { trial, errors } = one;
@@ -324,9 +336,20 @@ impl Told {
         }
         let late = self.not_tried.values().filter(|why| *why == NO_TIME).count();
         if self.causes.is_empty() {
-            self.notes.push(match late {
-                0 => "no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into(),
-                _ => format!(
+            // The reason that kept most mistakes from being tried.
+            let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
+            for why in self.not_tried.values() {
+                *reasons.entry(why).or_default() += 1;
+            }
+            let most = reasons.iter().max_by_key(|(_, count)| **count);
+            self.notes.push(match (late, most) {
+                (0, Some((why, count))) if *count > self.tried.len() => format!(
+                    "none of the {} mistakes that were tried explains it; {} were not tried, {count} of them since {why}",
+                    self.tried.len(),
+                    self.not_tried.len()
+                ),
+                (0, _) => "no single mistake of the list explains it: perhaps there are two at once, or it is not in the list (mms diagnose --list)".into(),
+                (late, _) => format!(
                     "the time was up before {late} mistakes were tried, and none of the {} others explains it: give more with --seconds",
                     self.tried.len()
                 ),

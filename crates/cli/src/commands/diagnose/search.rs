@@ -88,6 +88,8 @@ pub(super) struct Search<'a> {
     pub(super) cells: &'a [usize],
     /// The order with the right fields.
     pub(super) order: f64,
+    /// The errors with the right fields, on all grids that mistakes are tried on.
+    pub(super) right: Mutex<BTreeMap<usize, Errors>>,
     /// Why a mistake was not looked for.
     pub(super) not_tried: Mutex<BTreeMap<&'static str, String>>,
 }
@@ -184,8 +186,15 @@ impl Search<'_> {
     }
 
     /// Whether the order is restored by a mistake that can be one of these errors: what vanishes with the cells, as a shift by a time step, leaves
-    /// no error that stays. There it cancels a part of another error on one grid and none on the next.
+    /// no error that stays. There it cancels a part of another error on one grid and none on the next. A mistake that leaves the errors as they
+    /// are with the right fields is not made.
     pub(super) fn explains(&self, tried: &Tried) -> bool {
+        let finest = tried.errors.keys().next_back();
+        let with_right = self.right.lock().ok().and_then(|right| right.get(finest?).cloned());
+        let whole = with_right.map_or(f64::INFINITY, |errors| self.expected.size(&errors));
+        if self.expected.size(tried.finest()) > (1.0 - ALIKE) * whole {
+            return false;
+        }
         let vanishes =
             matches!(tried.trial.cause.counter, Counter::Time { .. } | Counter::Cell { .. });
         self.expected.is_met(&tried.errors, 0.0) && !(vanishes && self.order < VANISHING)
@@ -201,6 +210,17 @@ impl Search<'_> {
         let last = self.cells[self.cells.len() - 1];
         let mut near: Vec<&mut Tried> =
             tried.iter_mut().filter(|one| self.expected.is_met(&one.errors, NEAR)).collect();
+        if near.is_empty() {
+            return Ok(());
+        }
+        // The right fields as well: what the third grid mends was no mistake.
+        let is_known = |right: &BTreeMap<usize, Errors>| right.contains_key(&(2 * last));
+        if self.solver.has_time() && !self.right.lock().is_ok_and(|right| is_known(&right)) {
+            let run = self.solver.errors(None, 2 * last)?;
+            if let Ok(mut right) = self.right.lock() {
+                right.insert(2 * last, run.errors);
+            }
+        }
         near.sort_by(|one, other| self.by_size(one, other));
         near.into_par_iter()
             .take(THIRD)
@@ -333,6 +353,12 @@ impl Search<'_> {
             Counter::Unused(unused) => {
                 asked(unused)
                     && match unused {
+                        // There is no later time.
+                        Unused::ForceLater | Unused::TractionLater
+                            if self.solver.spec.is_static() =>
+                        {
+                            false
+                        }
                         Unused::Traction | Unused::TractionLater => loaded,
                         Unused::Boundary => moved,
                         _ => true,
@@ -348,7 +374,7 @@ impl Search<'_> {
                 return Ok(None);
             }
             let run = self.solver.errors(Some(&trial), self.cells[0])?;
-            Ok(run.is_like(right).then_some(*cause))
+            Ok(self.solver.is_same(&run, right, self.cells[0]).then_some(*cause))
         };
         let found: Result<Vec<Option<&'static Cause>>> = causes.par_iter().map(is_unused).collect();
         let found: Vec<&'static Cause> = found?.into_iter().flatten().collect();
