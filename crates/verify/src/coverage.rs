@@ -145,8 +145,13 @@ where
     }
     let exact = solution.law();
     let pressure = Pressure::of(exact.clone());
-    let elastic = |law: &mmsmith_mpm::Law<f64, D>| !matches!(law, mmsmith_mpm::Law::WithMemory(_));
-    let law = law::<f64, D>(exact).ok().filter(elastic);
+    // Of a law with memory the response to sudden changes.
+    let (law, has_memory) = match law::<f64, D>(exact).ok() {
+        Some(mmsmith_mpm::Law::WithMemory(own)) => {
+            (own.elastic().map(mmsmith_mpm::Law::Library), true)
+        }
+        law => (law, false),
+    };
     let density = solution.density();
     let mut squares = Squares::default();
     for n in 0..count {
@@ -174,7 +179,11 @@ where
         }
         if let Some(law) = &law {
             let P = law.stress_at_small_strain(&fields.H);
-            squares.nonlinear += (fields.P - P).norm_squared();
+            let own = match has_memory {
+                true => law.first_piola_kirchhoff(&fields.F).unwrap_or(P),
+                false => fields.P,
+            };
+            squares.nonlinear += (own - P).norm_squared();
             squares.linear += P.norm_squared();
         }
     }
@@ -203,8 +212,8 @@ where
             }
             Part::Wall => has(&Condition::is_wall),
         };
-        // Round-off is no share: where something vanishes but for it, nothing is exercised.
-        Share { part, share: if share < ROUND_OFF { 0.0 } else { share } }
+        // Round-off is no share: where something vanishes but for it, nothing is exercised. Nor is a share of fields that are no numbers.
+        Share { part, share: if share >= ROUND_OFF { share } else { 0.0 } }
     });
     Ok(shares.collect())
 }

@@ -118,7 +118,8 @@ pub struct Growth {
 pub enum GrowthError {
     /// The stress depends on more than the deformation.
     #[error(
-        "the law has memory: its response to a small disturbance depends on what went before, and the growth is told of elastic laws alone"
+        "the stress depends on more than the deformation gradient, on its history, its rate or the place, and the growth is told of elastic laws alone \
+         whose constants are the same everywhere"
     )]
     Memory,
     /// The density differs from place to place.

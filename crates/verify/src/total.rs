@@ -373,7 +373,18 @@ where
     let Total { degree, mass, composition, .. } = *total;
     // The mass matrix is a product over the axes.
     if is_uneven(exact) {
-        let instead = "updated-lagrangian for a density that differs from place to place, with --layout clipped where sides are no walls";
+        let instead = match exact.domain() {
+            Domain::Box { .. } if D == 1 => {
+                "left out, with --static, or updated-lagrangian where both ends slide: the density differs from place to place, and no formulation \
+                 runs other ends of a bar so"
+            }
+            Domain::Tube { around: Around::Whole | Around::Sector { .. }, .. } => {
+                "left out, with --static: the density differs from place to place, and no formulation runs this body so"
+            }
+            _ => {
+                "updated-lagrangian for a density that differs from place to place, with --layout clipped where sides are no walls"
+            }
+        };
         return Err(CaseError::setting("formulation", "total-lagrangian", instead));
     }
     let set_up = SetUp {

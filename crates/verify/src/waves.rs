@@ -5,7 +5,7 @@ use mmsmith_runtime::Solution;
 use nalgebra::{SMatrix, SVector};
 
 use crate::case::{CflSpeed, law_of_body};
-use crate::error::CaseError;
+use crate::error::{CaseError, SceneError};
 use crate::points;
 use crate::precision::Precision;
 
@@ -45,7 +45,11 @@ impl CflSpeed {
             Self::Bar => Ok(exact.wave_speed()),
             Self::PWave | Self::Viscous => {
                 let law = law_of_body::<f64, D>(exact)?;
-                Ok((p_wave_modulus(&law, exact) / exact.density()).sqrt())
+                let modulus = p_wave_modulus(&law, exact);
+                match modulus > 0.0 {
+                    true => Ok((modulus / exact.density()).sqrt()),
+                    false => Err(SceneError::NoStiffness { modulus }.into()),
+                }
             }
         }
     }
@@ -74,7 +78,8 @@ where
     f64: Precision<D>,
 {
     let law = law_of_body::<f64, D>(exact)?;
-    let at_rest = CflSpeed::PWave.on_wide_cells(exact)?;
+    // A fluid at rest has no such waves.
+    let at_rest = (p_wave_modulus(&law, exact).max(0.0) / exact.density()).sqrt();
     // Periodic motion repeats.
     let span = exact.period() * periods.min(1.0);
     let modulus = (0..SAMPLES)

@@ -76,10 +76,14 @@ impl Settled {
         let needs_space = verify::needs_space(exact);
         // The mass matrix of splines is a product over the axes.
         let uneven = verify::has_uneven_density(exact);
+        // Bodies that no clipped layout is of are left to the total formulation, which says what else there is.
+        let can_clip = !matches!(exact, AnySolution::One(_)) && needs_space.is_none();
         let is_total = match options.formulation {
             Some(formulation) => formulation == Formulation::Total,
             None => {
-                (needed.is_some() || needs_space.is_some()) && !says_updated(options) && !uneven
+                (needed.is_some() || needs_space.is_some())
+                    && !says_updated(options)
+                    && !(uneven && can_clip)
             }
         };
         let clips = !is_total && uneven && needed.is_some() && options.layout.is_none();

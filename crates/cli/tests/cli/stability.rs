@@ -250,7 +250,7 @@ fn growth_of_the_exact_motion_is_told_as_a_table_and_as_json() {
     refuses(place, "stability swirl --exact --at 0.5", &["--exact", "--at"]);
     refuses(place, "stability swirl --exact --over shape=gimp", &["the exact motion has no shape"]);
     refuses(place, "stability swirl --exact --shape gimp", &["bspline2 to bspline5"]);
-    refuses(place, "stability block-j2 --exact", &["the law has memory"]);
+    refuses(place, "stability block-j2 --exact", &["on its history"]);
 }
 
 /// A small pressure is no stability where plane waves have no stiffness left.

@@ -6,7 +6,7 @@ use mmsmith_mpm::{Integrator, Shape, Transfer};
 use super::{LADDER, Setting};
 use crate::case::Case;
 use crate::on_grid::Plan;
-use crate::scheme::{Placement, Scheme, Total, Updated};
+use crate::scheme::{GridPose, Placement, Scheme, Total, Updated};
 
 /// The families that may fit a solution, in the order in which they are tried; those that do not fit it are left out.
 /// `base` says the periods, the extent and the speed of CFL numbers, and the CFL number to begin with.
@@ -26,31 +26,7 @@ pub fn families(
     let fitted =
         Updated { shape: Shape::Cpdi2, placement: Placement::BodyFitted, ..Updated::default() };
     for usual in [square, fitted] {
-        let mut add = |scheme: Updated, per_cell| all.push(with(Scheme::Updated(scheme), per_cell));
-        add(usual, 2);
-        let shapes = [
-            Shape::Linear,
-            Shape::Ugimp,
-            Shape::Gimp,
-            Shape::Cpdi,
-            Shape::Cpdi2,
-            Shape::Bspline2,
-            Shape::Bspline3,
-            Shape::GimpBspline2,
-        ];
-        for shape in shapes.into_iter().filter(|shape| *shape != usual.shape) {
-            add(Updated { shape, ..usual }, 2);
-        }
-        for integrator in [Integrator::Usl, Integrator::Usf, Integrator::Musl, Integrator::Usavg] {
-            add(Updated { integrator, ..usual }, 2);
-        }
-        for per_cell in [1, 3, 4] {
-            add(usual, per_cell);
-        }
-        add(Updated { shape: Shape::Bspline3, ..usual }, 4);
-        for transfer in [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)] {
-            add(Updated { transfer, ..usual }, 2);
-        }
+        all.extend(around(usual).map(|(scheme, per_cell)| with(Scheme::Updated(scheme), per_cell)));
     }
     if let Some(threads) = more_threads {
         all.push(Setting { threads, ..with(Scheme::Updated(square), 2) });
@@ -61,7 +37,12 @@ pub fn families(
             all.push(Setting { single: true, ..with(scheme, 2) });
         }
     }
-    for coordinates in [Coordinates::Cartesian, Coordinates::Polar, Coordinates::Spherical] {
+    for coordinates in [
+        Coordinates::Cartesian,
+        Coordinates::Polar,
+        Coordinates::Cylindrical,
+        Coordinates::Spherical,
+    ] {
         for degree in 2..=5 {
             let lattice = Total { coordinates, ..Total::of_degree(degree) };
             let gauss = Total { layout: Layout::Gauss, ..lattice };
@@ -86,5 +67,38 @@ pub fn families(
         LADDER.iter().any(|&cells| plan(&at(cells)).is_some())
     };
     all.retain(fits);
+    if all.iter().all(|setting| setting.case.scheme.updated().is_none()) {
+        let placement = Placement::Clipped { offset: 0.0, pose: GridPose::default() };
+        let clipped = Updated { shape: Shape::Cpdi2, placement, ..Updated::default() };
+        let mut clipped: Vec<Setting> = around(clipped)
+            .map(|(scheme, per_cell)| with(Scheme::Updated(scheme), per_cell))
+            .collect();
+        clipped.retain(fits);
+        all.splice(..0, clipped);
+    }
     all
+}
+
+/// An updated Lagrangian scheme with the numbers of particles along an axis of a cell, and those that differ from it in a choice.
+fn around(usual: Updated) -> impl Iterator<Item = (Updated, usize)> {
+    let shapes = [
+        Shape::Linear,
+        Shape::Ugimp,
+        Shape::Gimp,
+        Shape::Cpdi,
+        Shape::Cpdi2,
+        Shape::Bspline2,
+        Shape::Bspline3,
+        Shape::GimpBspline2,
+    ];
+    let integrators = [Integrator::Usl, Integrator::Usf, Integrator::Musl, Integrator::Usavg];
+    let of_shapes = shapes.into_iter().filter(move |shape| *shape != usual.shape);
+    let of_transfers = [Transfer::Pic, Transfer::Apic, Transfer::Xpic(2)].into_iter();
+    [(usual, 2)]
+        .into_iter()
+        .chain(of_shapes.map(move |shape| (Updated { shape, ..usual }, 2)))
+        .chain(integrators.into_iter().map(move |integrator| (Updated { integrator, ..usual }, 2)))
+        .chain([1, 3, 4].into_iter().map(move |per_cell| (usual, per_cell)))
+        .chain([(Updated { shape: Shape::Bspline3, ..usual }, 4)])
+        .chain(of_transfers.map(move |transfer| (Updated { transfer, ..usual }, 2)))
 }
