@@ -4,7 +4,7 @@
 //! language.
 
 use mmsmith_expr::{Derivatives, Expr, Graph, Rational};
-use mmsmith_spec::{Domain, Fields, Law, Spec};
+use mmsmith_spec::{Coordinates, Domain, Fields, Law, Spec};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -202,7 +202,7 @@ impl Fault {
                 f.b.iter_mut().zip(&f.a).for_each(|(b, a)| *b = graph.sub(*b, *a));
             }
             Fault::BodyForceWithoutStress => f.b = f.a.clone(),
-            Fault::BodyForceExchanged => swap_first_two(&mut f.b),
+            Fault::BodyForceExchanged => swap_first_two(spec, &mut f.b),
             Fault::BodyForceOfTransposedStress => balance(f, &transposed(&stress), spec.density),
             Fault::BodyForceOfKirchhoffStress => {
                 let row = |row: &Vec<Expr>| row.iter().map(|&P| graph.mul(f.J, P)).collect();
@@ -289,10 +289,17 @@ fn all(before: &Fields, after: &Fields) -> [Vec<Expr>; 2] {
     [before, after].map(outputs)
 }
 
-pub(crate) fn swap_first_two(vector: &mut [Expr]) {
-    if let [first, second, ..] = vector {
-        std::mem::swap(first, second);
+/// Exchanges the first two components of a vector; of a body of revolution the radial and the axial one, which solvers of the half plane have.
+pub(crate) fn swap_first_two(spec: &Spec, vector: &mut [Expr]) {
+    let other = second_of(spec);
+    if vector.len() > other {
+        vector.swap(0, other);
     }
+}
+
+/// The place of the second component that a solver has.
+pub(crate) fn second_of(spec: &Spec) -> usize {
+    if spec.coordinates == Coordinates::Axisymmetric { 2 } else { 1 }
 }
 
 /// All outputs of generated code that depend on position and time.

@@ -487,6 +487,14 @@ impl Spec {
         self.rotation.is_none() && !self.graph.symbols_in(&self.displacement).iter().any(is_time)
     }
 
+    /// Whether the body has its reference shape at the start, as far as symbols show.
+    #[must_use]
+    pub fn starts_undisplaced(&self) -> bool {
+        let mut graph = self.graph.clone();
+        let start = BTreeMap::from([(graph.symbol("t"), Graph::ZERO)]);
+        self.displacement.iter().all(|u| graph.replace(*u, &start) == Graph::ZERO)
+    }
+
     /// Derives every field.
     ///
     /// # Errors

@@ -276,7 +276,7 @@ impl Cause {
                 timing::shift(fields, of, by * steps.dt, steps.start)
             }
             Counter::Place(placed) => timing::seek(fields, placed),
-            Counter::Motion(moved) => timing::moves(fields, moved, steps.start),
+            Counter::Motion(moved) => timing::moves(spec, fields, moved, steps.start),
             Counter::Impulse { steps: length } => timing::push(fields, length, steps),
             Counter::Cell { cells } => timing::beside(fields, cells * steps.h),
             Counter::Unused(unused) => timing::nudge(fields, unused, steps.start),

@@ -1,6 +1,6 @@
 //! Fields with the opposite of a mistake: a solver that makes the mistake becomes right with them.
 
-use crate::fault::{balance, swap_first_two};
+use crate::fault::{balance, second_of, swap_first_two};
 use mmsmith_expr::{Expr, Function, Graph, Rational};
 use mmsmith_spec::{Domain, Fields, Law, Spec, Surface};
 use std::collections::BTreeMap;
@@ -66,14 +66,13 @@ impl<'a> Planting<'a> {
 
     /// The first two components of `b` exchanged.
     pub(super) fn exchange_force(&mut self) {
-        swap_first_two(&mut self.fields.b);
+        swap_first_two(self.spec, &mut self.fields.b);
     }
 
     /// `b` at the point whose first two coordinates are exchanged.
     pub(super) fn exchange_coordinates(&mut self) {
-        if let [(X, _), (Y, _), _, ..] = self.fields.inputs[..]
-            && self.spec.dimension > 1
-        {
+        if self.spec.dimension > 1 {
+            let [X, Y] = [0, second_of(self.spec)].map(|axis| self.fields.inputs[axis].0);
             self.place_force(&BTreeMap::from([(X, Y), (Y, X)]));
         }
     }
@@ -116,7 +115,7 @@ impl<'a> Planting<'a> {
 
     /// The first two components of `v` exchanged.
     pub(super) fn exchange_velocity(&mut self) {
-        swap_first_two(&mut self.fields.v);
+        swap_first_two(self.spec, &mut self.fields.v);
     }
 
     /// Replaces the stress at the same deformation, and with it `b`, `P` and tractions.
@@ -255,7 +254,8 @@ impl<'a> Planting<'a> {
 
     /// The first two components of all tractions exchanged.
     pub(super) fn exchange_tractions(&mut self) {
-        self.fields.surfaces.iter_mut().for_each(|surface| swap_first_two(&mut surface.traction));
+        let Self { spec, fields, .. } = self;
+        fields.surfaces.iter_mut().for_each(|surface| swap_first_two(spec, &mut surface.traction));
     }
 
     /// All tractions times a power of the current area over the reference area, `J |F^-T N|`.

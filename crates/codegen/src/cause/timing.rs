@@ -3,7 +3,7 @@
 use super::{Moved, Placed, Steps, Timed, Unused};
 use crate::fault::swap_first_two;
 use mmsmith_expr::{Expr, Function, Graph, Rational};
-use mmsmith_spec::Fields;
+use mmsmith_spec::{Fields, Spec};
 use std::collections::BTreeMap;
 
 /// The number of iterations towards a reference position. Each multiplies the error by the displacement gradient; the text of the field
@@ -84,14 +84,14 @@ pub(super) fn shift(fields: &mut Fields, of: Timed, by: f64, start: f64) {
 }
 
 /// Another motion after the start.
-pub(super) fn moves(fields: &mut Fields, moved: Moved, start: f64) {
+pub(super) fn moves(spec: &Spec, fields: &mut Fields, moved: Moved, start: f64) {
     let Fields { graph, u, v, .. } = fields;
     let later = later(graph, start);
     let mut others = match moved {
         Moved::Velocity => u.clone(),
         Moved::Exchanged => {
             let mut exchanged = u.clone();
-            swap_first_two(&mut exchanged);
+            swap_first_two(spec, &mut exchanged);
             exchanged
         }
         Moved::Sign | Moved::Halved | Moved::Doubled => {

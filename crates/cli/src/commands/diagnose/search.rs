@@ -359,6 +359,8 @@ impl Search<'_> {
                         {
                             false
                         }
+                        // Nothing shows whether a displacement of nothing is used.
+                        Unused::InitialDisplacement => !self.solver.spec.starts_undisplaced(),
                         Unused::Traction | Unused::TractionLater => loaded,
                         Unused::Boundary => moved,
                         _ => true,
