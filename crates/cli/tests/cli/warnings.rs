@@ -209,3 +209,24 @@ fn errors_that_grow_under_refinement_are_warned_of() {
     assert!(said.contains("grows on the finest grids"), "{said}");
     assert!(found["quadrature"].is_null() && found["refinement"]["field"].is_string());
 }
+
+/// Splines that follow the motion exactly leave the error of the time steps alone: where these do not follow the cells, no order is missed.
+#[test]
+fn orders_of_runs_with_few_steps_are_not_judged() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let text = include_str!("../../../../tests/data/specs/told/few-steps.toml");
+    std::fs::write(place.join("few-steps.toml"), text).unwrap();
+    let judged = |periods: &str| {
+        let call =
+            format!("converge few-steps.toml --cells 4,6,8 --periods {periods} --json made.json");
+        let called = mms(place, &call);
+        assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+        read_json(&place.join("made.json"))
+    };
+    let whole = judged("0.08");
+    assert_eq!((&whole["passed"], whole.get("not_judged")), (&true.into(), None));
+    let few = judged("0.05");
+    assert!(few["passed"].is_null(), "{}", few["passed"]);
+    assert!(few["not_judged"].as_str().unwrap().contains("do not follow the cells"));
+}

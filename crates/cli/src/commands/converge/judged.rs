@@ -44,6 +44,24 @@ fn not_judged(exact: &AnySolution<f64>) -> Option<String> {
     })
 }
 
+/// The largest quotient of the CFL numbers of a series whose errors are those of one number.
+const ALIKE: f64 = 1.1;
+
+/// Why orders that are missed prove nothing where steps do not follow the cells: a run has whole steps, and a short one few.
+fn steps_apart(asked: &Converge<'_>, rows: &[Row]) -> Option<String> {
+    if !matches!(asked.sweep, Sweep::Cells(_)) {
+        return None;
+    }
+    let least = rows.iter().map(|row| row.cfl).fold(f64::INFINITY, f64::min);
+    let most = rows.iter().map(|row| row.cfl).fold(0.0, f64::max);
+    (most > ALIKE * least).then(|| {
+        format!(
+            "Orders are not judged: the time steps do not follow the cells, with CFL numbers from {least:.3} to {most:.3}, since a run has whole \
+             steps and these have few. A larger --periods, or a smaller --cfl, has more of them."
+        )
+    })
+}
+
 impl Judged {
     pub(super) fn new(asked: &Converge<'_>, rows: Vec<Row>, differences: Option<Temporal>) -> Self {
         let exact = &asked.problem.model.exact;
@@ -58,7 +76,7 @@ impl Judged {
         if !any(judged.decisive(), |one| one.passed == Some(false)) {
             return judged;
         }
-        match asked.warnings().not_judged() {
+        match asked.warnings().not_judged().or_else(|| steps_apart(asked, &judged.study.rows)) {
             None => judged,
             reason => {
                 let Self { study, differences, .. } = judged;
