@@ -91,11 +91,15 @@ impl Code<'_> {
             Some(_) => "at all positions of the body",
             None => "at the points that were given to mms gen alone, and nowhere else",
         };
+        let components = match self.is_of_half_plane {
+            true => "the components 1, 2 and 3 along R, theta and Z",
+            false => "Cartesian components",
+        };
         vec![format!(
             "table: P, b, tractions and internal variables ({}) follow from the history of each particle and come from the file {} beside this one, \
              {where_it_holds}, with errors of about {:.1e} of the largest value of each. It holds for {}, and for times from 0 to {}: later ones give \
              not a number. For other values write both files anew, mms gen {} --set NAME=VALUE --periods X. The state at the start, which a host \
-             sets, is that of t = 0. Tensors among the internal variables have Cartesian components.",
+             sets, is that of t = 0. Tensors among the internal variables have {components}.",
             table.variables.join(", "),
             self.table_file(),
             table.error,
