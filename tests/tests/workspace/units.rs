@@ -260,6 +260,8 @@ fn layouts(all: bool) -> Tally {
             (Body::Ring, clipped(0.1, pose(0.0, 0.0))),
             (Body::LoadedCube, clipped(0.0, pose(20.0, 0.3))),
             (Body::Shell, clipped(0.0, pose(0.0, 0.0))),
+            // With slivers, in the half plane.
+            (Body::Cylinder, clipped(0.0, pose(0.0, 0.01))),
         ] {
             for transfer in [Transfer::Flip, Transfer::Apic] {
                 add(body, Updated { shape, placement, transfer, ..usual }, &|case| case);

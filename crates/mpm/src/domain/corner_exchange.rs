@@ -75,7 +75,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             sums: Vec::new(),
             is_affine: false,
             affine_sums: Vec::new(),
-            extension: is_extended.then(|| Extension::new(mass_of_cell)),
+            extension: is_extended.then(|| Extension::new(mass_of_cell, is_of_half_plane)),
             is_of_half_plane,
             stresses: Vec::new(),
             buffers: BufferPool::new(),

@@ -22,11 +22,11 @@ use mmsmith_ranks::Ranks;
 use mmsmith_rare_states::{RareState, met_if};
 use rayon::prelude::*;
 
-use crate::grid::Layout;
 use crate::grid::bins::{AddToBand, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate, receive_nodes, send_nodes};
 use crate::grid::node::Node;
+use crate::grid::{Layout, PAD_BELOW};
 use mmsmith_threads::each_chunk;
 
 /// Nodes with less than this share of the mass of a whole cell are light.
@@ -47,8 +47,9 @@ const OFFSETS: Range<isize> = -2..2;
 
 /// The light nodes of a grid, and the inner nodes that they continue.
 pub(crate) struct Extension<T, const D: usize> {
-    /// The mass below which a node is light.
+    /// The mass below which a node is light; in a half plane times its radius.
     least_mass: T,
+    is_of_half_plane: bool,
     light: Vec<Light>,
     inner: Vec<Inner<T>>,
     /// Several processes: the nodes here between some of other processes' rows.
@@ -71,10 +72,11 @@ struct Inner<T> {
 }
 
 impl<T: Lanes, const D: usize> Extension<T, D> {
-    /// For cells of the mass `of_cell`.
-    pub(crate) fn new(of_cell: T) -> Self {
+    /// For cells of the mass `of_cell`; in the half plane of a body of revolution of that mass times their radius.
+    pub(crate) fn new(of_cell: T, is_of_half_plane: bool) -> Self {
         let least_mass = of_cell * real(LIGHT);
-        Self { least_mass, light: Vec::new(), inner: Vec::new(), padded: Vec::new() }
+        let (light, inner, padded) = (Vec::new(), Vec::new(), Vec::new());
+        Self { least_mass, is_of_half_plane, light, inner, padded }
     }
 
     /// Calls `add` for every tile, as [`GridUpdate::p2g`], and updates the nodes, light ones last.
@@ -135,15 +137,26 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
 
     /// Finds the light nodes, each with the nearest inner ones that imply its values.
     fn find(&mut self, c: &Constants<T, D>, layout: &Layout<D>, nodes: &[Node<T, D>]) {
-        let Self { least_mass, light, inner, .. } = self;
-        let is_inner = |node: usize| nodes[node].mass() >= *least_mass;
-        let is_light =
-            |node: &Node<T, D>| node.mass() < *least_mass && c.inverse_mass(node) > T::zero();
+        let Self { least_mass, is_of_half_plane, light, inner, .. } = self;
+        let least_mass = |node: usize| match is_of_half_plane {
+            false => *least_mass,
+            // The function of a node on the axis has the mass of a cell with a sixth of the spacing as its radius.
+            true => {
+                let line = (node % layout.dims[0]) as f64 - PAD_BELOW as f64;
+                let radius = c.lower[0] + c.spacing() * real(line);
+                *least_mass * radius.abs().max(c.spacing() * real(1.0 / 6.0))
+            }
+        };
+        let is_inner = |node: usize| nodes[node].mass() >= least_mass(node);
+        let is_light = |number: usize, node: &Node<T, D>| {
+            node.mass() < least_mass(number) && c.inverse_mass(node) > T::zero()
+        };
         let chunks = nodes.par_chunks(NODES).enumerate();
         let found: Vec<usize> = chunks
             .flat_map_iter(|(chunk, nodes)| {
-                let of_chunk = nodes.iter().enumerate().filter(|(_, node)| is_light(node));
-                of_chunk.map(move |(place, _)| chunk * NODES + place)
+                let numbered = nodes.iter().enumerate();
+                let numbered = numbered.map(move |(place, node)| (chunk * NODES + place, node));
+                numbered.filter(|(number, node)| is_light(*number, node)).map(|(number, _)| number)
             })
             .collect();
         let mut dims = layout.dims;
