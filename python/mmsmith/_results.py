@@ -93,13 +93,18 @@ class Result(dict[str, Any]):
         return "; ".join(self.reasons()) or self.verdict
 
 
+def _status(row: dict[str, Any]) -> str:
+    # Rows of bodies at rest tell what stopped them alone.
+    return str(row.get("status") or row.get("stopped") or "ok")
+
+
 class Run(Result):
     """One simulation."""
 
     @property
     def status(self) -> str:
-        """`ok`, or what stopped the run, with step and particle."""
-        return str(self["result"]["status"])
+        """`ok`, or what stopped the run, with step and particle; of a body at rest why its load was not reached."""
+        return _status(self["result"])
 
     @property
     def passed(self) -> bool | None:
@@ -110,7 +115,7 @@ class Run(Result):
     @property
     def errors(self) -> dict[str, dict[str, float]]:
         """The errors by field and norm: `errors["u"]["linf"]`. Not a number where the run has none."""
-        return {field: {norm: _number(value) for norm, value in norms.items()} for field, norms in self["result"]["errors"].items()}
+        return {field: {norm: _number(value) for norm, value in norms.items()} for field, norms in (self["result"]["errors"] or {}).items()}
 
     def reasons(self) -> list[str]:
         """Why the result did not pass, a line each; empty where it did."""
@@ -204,7 +209,7 @@ class Convergence(OverGrids):
     @property
     def passed(self) -> bool | None:
         """Whether the orders that were expected, or are promised, are met, and all runs came to their end."""
-        to_the_end = all(row.get("status", "ok") == "ok" for row in self.get("rows", []))
+        to_the_end = all(_status(row) == "ok" for row in self.get("rows", []))
         passed: bool | None = self.get("passed", self._ended_well and to_the_end)
         return passed
 
@@ -219,8 +224,8 @@ class Convergence(OverGrids):
                 found = [f"{_order(v['finest']) or 'none'} ({norm})" for norm, v in failed.items() if v["expected"] == expected]
                 tolerance = next(iter(failed.values()))["tolerance"]
                 missed.append(f"order of {field} is {', '.join(found)}, expected {expected:g} (tolerance {tolerance:g})")
-        stopped = [f"{row['cells']} cells: {row['status']}" for row in self.get("rows", []) if row.get("status", "ok") != "ok"]
-        return [*missed, *stopped] or [self.verdict]
+        stopped = [f"{row['cells']} cells: {_status(row)}" for row in self.get("rows", []) if _status(row) != "ok"]
+        return [*missed, *stopped] or [str(self.get("not_judged", self.verdict))]
 
 
 class Score(OverGrids):

@@ -180,6 +180,15 @@ def test_a_run_is_a_dict_and_more():
     assert table.shape[0] == 1 and table["u_linf"][0] == run.errors["u"]["linf"] and table["cells"][0] == 8
 
 
+def test_bodies_at_rest_have_all_that_runs_have():
+    run = mmsmith.run("skew-2d", cells=4, static=True)
+    assert run.passed is True and run.status == "ok" and run.verdict == "passed" and run.errors["u"]["l2"] > 0.0
+    run.require()
+    assert str(run).startswith("run skew-2d, 4 cells: passed")
+    orders = mmsmith.converge("skew-2d", cells=[4, 8], static=True, shape="bspline2")
+    assert orders.verdict == "passed" and not orders.reasons()
+
+
 def test_a_run_that_stops_does_not_pass():
     stopped = mmsmith.run("axis-aligned", set={"A": 0.24}, cells=8, cfl=3.0)
     assert stopped.passed is False and stopped.status != "ok"

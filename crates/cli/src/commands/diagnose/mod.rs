@@ -293,6 +293,14 @@ impl Told {
             _ => false,
         };
         let ignored = search.unused(right, is_needed)?;
+        if search.takes_no_field(right, &ignored)? {
+            self.notes.push(
+                "no field has an effect, neither the body force nor the start: the program takes another copy of the file, such as one that is found \
+                 before the one in {fields}; build and run it with the folder {fields} alone"
+                    .into(),
+            );
+            return Ok(());
+        }
         let tried = if ignored.is_empty() { search.single(right)? } else { vec![] };
         let with_right = search.right.lock().map(|right| right.clone()).unwrap_or_default();
         if with_right.len() > options.cells.len() && expected.is_met(&with_right, 0.0) {

@@ -340,6 +340,19 @@ impl Search<'_> {
         Ok((curvature > 0.0 && shift.abs() > SMALLEST_SHIFT * first).then_some(shift))
     }
 
+    /// Whether a program without the body force, as found, does without the state at the start too.
+    pub(super) fn takes_no_field(&self, right: &Run, ignored: &[&'static Cause]) -> Result<bool> {
+        let is = |of: Unused| move |cause: &&'static Cause| matches!(cause.counter, Counter::Unused(own) if own == of);
+        if !ignored.iter().any(is(Unused::Force)) {
+            return Ok(false);
+        }
+        let at_start = [Unused::InitialDisplacement, Unused::InitialVelocity];
+        let unused = self.unused(right, |of| at_start.contains(&of))?;
+        let is_at_rest = self.solver.spec.starts_undisplaced();
+        Ok(unused.iter().any(is(Unused::InitialVelocity))
+            && (is_at_rest || unused.iter().any(is(Unused::InitialDisplacement))))
+    }
+
     /// The mistakes that leave a field without effect on the result, of those that are asked for.
     pub(super) fn unused(
         &self,
