@@ -16,11 +16,11 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::across::Across;
+use crate::axis::{OnAxis, on_axis};
 use crate::case::law_of_body;
 use crate::difference::{derivative, derivative_of_sum};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
-use crate::evaluate::{OnAxis, on_axis};
 use crate::flow::is_of_memory;
 use crate::inverse::determinant;
 use crate::points;

@@ -10,9 +10,9 @@ use mmsmith_ranks::{Ranks, gather_by, total};
 use mmsmith_runtime::{BodyForceAtPoints, Lattice, Real, Solution};
 use nalgebra::{SMatrix, SVector};
 
+use crate::axis::refuse_on_axis;
 use crate::clock::Begun;
 use crate::error::CaseError;
-use crate::evaluate::refuse_on_axis;
 use crate::interrupt::StepLoop;
 use crate::kept_stress::KeptStress;
 use crate::on_grid::OnGrid;

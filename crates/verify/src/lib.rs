@@ -19,6 +19,7 @@
 //! Lengths, times and stresses are in the units of the solution; errors are not divided by anything.
 
 mod across;
+mod axis;
 mod blind;
 mod body;
 mod case;
@@ -76,6 +77,7 @@ mod verdict;
 mod waves;
 mod whole_file;
 
+pub use axis::OnAxis;
 pub use blind::{BlindSpot, blind_spots};
 pub use body::forgotten_cell_length;
 pub use case::{Arithmetic, Case, CflSpeed, Extent};
@@ -89,7 +91,7 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
-pub use evaluate::{OnAxis, evaluate, evaluate_with_tangent};
+pub use evaluate::{evaluate, evaluate_with_tangent};
 pub use field_row::FieldRow;
 pub use flow::{flows_smoothly, has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};

@@ -13,10 +13,10 @@ use mmsmith_runtime::{AnySolution, Domain, Law, Solution};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+use crate::axis::refuse_on_axis;
 use crate::case::{Case, CflSpeed, law_of};
 use crate::dimension::in_dimension;
 use crate::error::CaseError;
-use crate::evaluate::refuse_on_axis;
 use crate::frames::{FrameOutput, write_at_rest};
 use crate::inverse::determinant;
 use crate::order::Order;

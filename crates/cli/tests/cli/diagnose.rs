@@ -85,7 +85,7 @@ fn a_field_that_is_used_later_is_not_called_unused() {
     assert_eq!(found["causes"][0]["name"], "initial-displacement-unused", "{said}");
 }
 
-/// What a finer grid mends was no mistake: the right fields are run on each grid on which a mistake is tried.
+/// A finer grid mends no mistake: the right fields are run on each grid on which a mistake is tried.
 #[test]
 fn a_right_solver_on_coarse_grids_has_no_mistake() {
     let place = tempfile::tempdir().unwrap();
