@@ -616,6 +616,18 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|table| self.boundary(table, &domain))
             .collect::<Result<Vec<_>, _>>()?;
+        for (number, (boundary, table)) in boundaries.iter().zip(&document.boundary.0).enumerate() {
+            if boundaries[..number].iter().any(|earlier| earlier.surface == boundary.surface) {
+                let message = format!("{} has a condition already", boundary.surface);
+                let help = "leave one of the two out; one table states both its components, as normal = 'prescribed-motion' and tangential = \
+                            'traction-free'";
+                return Err(self.scope.source.error(
+                    message,
+                    table.surface.span(),
+                    Some(help.into()),
+                ));
+            }
+        }
         let mut rotation = None;
         if let Some(table) = &document.with_rotation {
             rotation = Some(Rotation::read(&mut self.scope, table, self.dimension)?);

@@ -65,12 +65,18 @@ pub(crate) fn on_axis<const D: usize>(solution: &dyn Solution<f64, D>) -> Option
         Domain::Annulus { inner, outer } => vec![inner + 0.37 * (outer - inner)],
         _ => Vec::new(),
     };
+    let size = size(&domain)?;
     let period = solution.period();
     let t = if period.is_finite() { 0.31 * period } else { 0.0 };
     heights.into_iter().find_map(|height| {
         let X = SVector::from_fn(|i, _| if i == 2 { height } else { 0.0 });
         outside(&domain, &X).filter(|share| *share <= 0.0)?;
         let row = evaluate_in(solution, &X, t);
+        // Where there are no fields beside it either, the axis is not the cause.
+        let beside = X + SVector::from_fn(|i, _| if i == 0 { SHARE * size } else { 0.0 });
+        if !evaluate_in(solution, &beside, t).not_finite.is_empty() {
+            return None;
+        }
         (!row.not_finite.is_empty() && row.why.is_none()).then(|| OnAxis {
             X: X.iter().copied().collect(),
             t,

@@ -29,7 +29,7 @@ use super::reference::{Scheme, scheme};
 use super::row::{EXCEEDS_MOTION, ScoreRow, Source};
 use super::scales::{Grain, Scales};
 use super::shuffled::{self, is_shuffled};
-use super::times::{TIME_SLACK, any_velocity_time, open};
+use super::times::{TIME_SLACK, any_velocity_time, is_static, open};
 use crate::precision::Precision;
 
 /// A recording, and how its frames are read.
@@ -367,7 +367,10 @@ where
     opened.tell_provenance(options, &mut remarks);
     totals.tell_density(&mut remarks);
     totals.balance.tell(exact, &mut remarks);
-    opened.tell_single_frame(options.periods * exact.period(), &mut remarks);
+    // A body at rest is the same at all times.
+    if !is_static(exact) {
+        opened.tell_single_frame(options.periods * exact.period(), &mut remarks);
+    }
     totals.tell_overflow(&mut remarks);
     totals.tell_excess(&mut remarks);
     if totals.is_shuffled {

@@ -122,6 +122,9 @@ const TOOLS: &[Tool] = &[
     },
 ];
 
+/// The most points of a check, which no message can end once it has begun.
+const MOST_POINTS: u32 = 10_000;
+
 /// Arguments of any tool.
 #[derive(Deserialize, Default)]
 #[serde(default)]
@@ -152,7 +155,7 @@ fn argument(name: &str) -> Value {
             "additionalProperties": { "type": "number" },
             "description": "values in place of the defaults of parameters",
         }),
-        "points" => json!({ "type": "integer", "minimum": 1, "maximum": 10_000 }),
+        "points" => json!({ "type": "integer", "minimum": 1, "maximum": MOST_POINTS }),
         "target" => json!({ "enum": HOSTS.iter().map(|host| host.name).collect::<Vec<_>>() }),
         "fault" => {
             json!({ "enum": Fault::ALL.iter().map(|fault| fault.name()).collect::<Vec<_>>() })
@@ -251,6 +254,10 @@ impl Tools {
             Ok(given) => given,
             Err(error) => return Outcome::Refused(format!("{name}: {error}")),
         };
+        if let Some(points) = given.points.filter(|points| !(1..=MOST_POINTS).contains(points)) {
+            let message = format!("{name}: points is {points}, and is between 1 and {MOST_POINTS}");
+            return Outcome::Refused(message);
+        }
         // A mistake of a tool is no end of the server.
         let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let work = self.begin(tool, given)?;

@@ -1,6 +1,7 @@
 //! A page of advice, each sentence with the figure behind it.
 
 use mmsmith_verify::{Entry, TOLERANCES};
+use std::collections::BTreeSet;
 
 use super::measured::Measured;
 use super::words;
@@ -103,7 +104,14 @@ impl Measured<'_> {
             });
             let best = own.min_by(|a, b| self.error(a).total_cmp(&self.error(b)));
             let Some(best) = best else {
-                lines.push(format!("{kind} does not suit this solution: every run of it stopped."));
+                let own = entries.iter().filter(|entry| words::kind(&entry.setting) == kind);
+                let cells: BTreeSet<usize> = own.map(|entry| entry.setting.case.cells).collect();
+                let cells: Vec<String> = cells.iter().map(usize::to_string).collect();
+                lines.push(format!(
+                    "{kind} has no error to compare: every run of it stopped, or had an error above the motion itself, on {} cells, and finer grids were \
+                     not tried.",
+                    cells.join(", ")
+                ));
                 continue;
             };
             let cheaper = entries
