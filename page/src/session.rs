@@ -2,7 +2,7 @@
 
 use crate::refusal::Refusal;
 use mmsmith_codegen::{Code, HOSTS, Host, Names, Origin, Tabulated};
-use mmsmith_interpret::{TableFile, interpret_staged};
+use mmsmith_interpret::{Over, TableFile, interpret_staged};
 use mmsmith_runtime::nalgebra::{SMatrix, SVector};
 use mmsmith_runtime::{AnySolution, Solution};
 use mmsmith_spec::{Coordinates, Diagnostic, Fields, Looks, Spec};
@@ -26,7 +26,8 @@ pub(crate) struct Session {
     staged: OnceCell<Staged>,
     /// For a body of revolution, in its half plane.
     for_hosts: OnceCell<(Fields, Staged)>,
-    table: OnceCell<TableFile>,
+    /// The tables of the body in space and in its half plane.
+    tables: [OnceCell<TableFile>; 2],
 }
 
 impl Session {
@@ -55,7 +56,7 @@ impl Session {
             fields,
             staged: OnceCell::new(),
             for_hosts: OnceCell::new(),
-            table: OnceCell::new(),
+            tables: [const { OnceCell::new() }; 2],
         };
         if !set.is_empty() {
             // What parameters must satisfy together.
@@ -161,7 +162,7 @@ impl Session {
         let spec = &self.spec;
         let mut table = None;
         let code = if spec.has_history() && host.reads_tables {
-            let (code, text) = self.tabulated(origin)?;
+            let (code, text) = self.tabulated(origin, host.in_half_plane)?;
             table = Some(text);
             code
         } else {
@@ -179,13 +180,20 @@ impl Session {
     }
 
     /// The code that reads a table, and that table.
-    fn tabulated(&self, origin: Origin) -> Result<(Code<'_>, String), Refusal> {
-        if self.table.get().is_none() {
-            let table = TableFile::new(&self.spec, self.staged(), [], 1.0, None)?;
+    fn tabulated(
+        &self,
+        origin: Origin,
+        in_half_plane: bool,
+    ) -> Result<(Code<'_>, String), Refusal> {
+        let in_half_plane = in_half_plane && self.spec.coordinates == Coordinates::Axisymmetric;
+        let kept = &self.tables[usize::from(in_half_plane)];
+        if kept.get().is_none() {
+            let over = if in_half_plane { Over::HalfPlane } else { Over::Body };
+            let table = TableFile::new(&self.spec, self.staged(), [], 1.0, over)?;
             // Nothing was there before.
-            let _ = self.table.set(table);
+            let _ = kept.set(table);
         }
-        let table = self.table.get().ok_or("there is no table")?;
+        let table = kept.get().ok_or("there is no table")?;
         let digest: String =
             Sha256::digest(table.content()).iter().map(|byte| format!("{byte:02x}")).collect();
         let digest = digest[..DIGITS_OF_DIGEST].to_owned();
@@ -199,7 +207,7 @@ impl Session {
             variables: table.variables.clone(),
             in_time: table.in_time,
         };
-        let code = Code::of(&self.spec, self.fields.clone(), origin).with_table(beside);
+        let code = Code::for_host(&self.spec, origin, in_half_plane)?.with_table(beside);
         Ok((code, table.text(&digest)))
     }
 }
