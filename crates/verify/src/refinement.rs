@@ -3,6 +3,7 @@
 use mmsmith_runtime::{AnySolution, Domain, Solution};
 
 use crate::dimension::in_dimension;
+use crate::scene::whole_cells;
 
 /// The part of an order that uneven counts may hide or add, beyond which a series of grids tells none.
 const UNEVEN: f64 = 0.025;
@@ -22,7 +23,7 @@ struct Length {
 impl Length {
     /// The number of cells on a grid of so many cells to a cell length.
     fn count(&self, cells: usize) -> usize {
-        (self.cells * cells as f64 - 1e-9).ceil().max(2.0) as usize
+        whole_cells(self.cells, 1.0 / cells as f64)
     }
 
     /// Whether twice the cells to a cell length are twice the cells along this length, again and again.

@@ -270,8 +270,8 @@ impl<const D: usize> Scene<D> {
                 }
             }
             Domain::Tube { inner, outer, lower, upper, .. } => {
-                // None longer than the spacing; how many lie around the axis is for the grid to say.
-                let count = |length: f64| (length / spacing - 1e-9).ceil().max(2.0) as usize;
+                // How many lie around the axis is for the grid to say.
+                let count = |length: f64| whole_cells(length, spacing);
                 let cells = [count(outer - inner), 1, count(upper - lower)];
                 let corner = [*inner, 0.0, *lower];
                 (SVector::from_fn(|k, _| corner[k]), std::array::from_fn(|k| cells[k]))
@@ -508,6 +508,11 @@ fn covering<const D: usize>(
         cells[a] = (high - low) as usize;
     }
     (first, cells)
+}
+
+/// The whole cells that fill a length of a curved body, none longer than the spacing.
+pub(crate) fn whole_cells(length: f64, spacing: f64) -> usize {
+    (length / spacing - 1e-9).ceil().max(2.0) as usize
 }
 
 /// The formulation that models given motions and tractions on the sides of a body, in words.

@@ -17,7 +17,7 @@ use crate::kept_stress::KeptStress;
 use crate::named::Named;
 use crate::points;
 use crate::precision::Precision;
-use crate::scene::{Scene, is_mirrored};
+use crate::scene::{Scene, is_mirrored, whole_cells};
 use crate::scheme::Total;
 
 /// Polar angles of the part of a spherical shell that is modelled, from the third axis: beyond a cone about it, which moves as the
@@ -121,8 +121,8 @@ impl Total {
         scene: &Scene<D>,
         per_cell: usize,
     ) -> Result<Grid<D>, CaseError> {
-        // As many cells as make none longer than the spacing across, and along the mean circle or sphere.
-        let count = |length: f64| (length / scene.spacing - 1e-9).ceil().max(2.0) as usize;
+        // Across, and along the mean circle or sphere.
+        let count = |length: f64| whole_cells(length, scene.spacing);
         let name = self.coordinates.name();
         let axes = match (&scene.domain, self.coordinates) {
             (Domain::Box { lower, upper }, Coordinates::Cartesian) => {
