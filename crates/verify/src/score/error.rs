@@ -49,10 +49,17 @@ pub enum ScoreError {
         path: PathBuf,
     },
     /// A frame without points, which only CSV files can have.
-    #[error("{}: there are no positions (columns X, Y, Z or x, y, z; of a body of revolution R, theta, Z, or without a twist R, Z)", path.display())]
+    #[error(
+        "{}: there are no positions: write columns x, y, z, or X, Y, Z beside ux, uy, uz; of a body of revolution R, theta, Z, or without a twist R, \
+         Z; there are {}",
+        path.display(),
+        arrays.join(", ")
+    )]
     NoPositions {
         /// The file.
         path: PathBuf,
+        /// The arrays that it has.
+        arrays: Vec<String>,
     },
     /// The points have fewer coordinates than the solution.
     #[error("{}: points have {found} coordinate(s); the solution has {expected}", path.display())]

@@ -25,7 +25,10 @@ pub(super) fn positions<const D: usize>(
     remarks: &mut Remarks,
 ) -> Result<Positions<D>, ScoreError> {
     let path = || snapshot.path().to_owned();
-    let head = snapshot.points().ok_or_else(|| ScoreError::NoPositions { path: path() })?;
+    let head = snapshot.points().ok_or_else(|| ScoreError::NoPositions {
+        path: path(),
+        arrays: snapshot.arrays().iter().map(|head| head.name.clone()).collect(),
+    })?;
     let axes = place.axes_of_points(head.components);
     let least = axes.iter().max().map_or(D, |axis| axis + 1);
     if head.components < least || head.components > 3 {
