@@ -341,7 +341,9 @@ impl<'a> Scope<'a> {
         let span = table.clone();
         let missing = |message: String, scope: &Self| {
             let message = format!("{key} is not given, and '{usual}' does not serve: {message}");
-            scope.source.error(message, table.clone(), Some(format!("give {key} = '...' here")))
+            // A parameter of the law's own name is a value to give it.
+            let value = if scope.names.contains_key(key) { key } else { "..." };
+            scope.source.error(message, table.clone(), Some(format!("give {key} = '{value}' here")))
         };
         let ast = Ast::parse(usual).map_err(|e| missing(e.message, self))?;
         let text = Text { value: usual.to_owned(), span };
@@ -360,6 +362,7 @@ impl<'a> Scope<'a> {
         let expr = result.map_err(|e| {
             let help = unknown.map(|name| match elsewhere.get(&name) {
                 Some(reason) => reason.clone(),
+                None if name == "e" => "a power of e is exp(x)".to_owned(),
                 None => match nearest(&name, names.keys().map(String::as_str).chain(["Pi"])) {
                     Some(known) => format!("did you mean '{known}'?"),
                     None => {

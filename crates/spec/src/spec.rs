@@ -466,8 +466,10 @@ impl Spec {
         }
         let document: Document = toml::from_str(text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
-            let (message, help) = missing_fields(e.message(), text)
-                .unwrap_or_else(|| (e.message().to_owned(), meant_field(e.message())));
+            let (message, help) = missing_fields(e.message(), text).unwrap_or_else(|| {
+                let help = meant_field(e.message());
+                (e.message().to_owned(), help.or_else(|| meant_value(e.message(), text, &span)))
+            });
             source.error(message, span, help)
         })?;
         document.check_sizes(&source)?;
@@ -867,7 +869,7 @@ impl<'a> Reader<'a> {
         for (key, span) in given {
             if !keys.contains(&key) && !moduli.contains(&key) {
                 let message = format!("the law '{law}' has no '{key}'");
-                let mut help = format!("it takes {}", keys.join(", "));
+                let mut help = format!("it takes {}; any law takes density", keys.join(", "));
                 let value = table.constants.get(key).map_or("", |text| text.value.as_str());
                 if let Some(line) = self.meant_assumption(key, value) {
                     help = line;
@@ -1161,6 +1163,31 @@ fn meant_field(message: &str) -> Option<String> {
     let mut names = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
     let name = names.next()?;
     nearest(name, names).map(|near| format!("did you mean '{near}'?"))
+}
+
+/// The value that was meant, where it is no value of the language of specifications: words without quotes, units, and decimal commas.
+fn meant_value(message: &str, text: &str, span: &std::ops::Range<usize>) -> Option<String> {
+    let [start, end] = [span.start, span.end].map(|place| text.floor_char_boundary(place));
+    let (before, value) = (text.get(..start)?, text.get(start..end)?.trim());
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    let first = value.trim_matches(['\'', '"']).split_whitespace().next().unwrap_or_default();
+    let is_with_unit = is_number(first) && first.len() < value.trim_matches(['\'', '"']).len();
+    if is_with_unit && (message.contains("quoted") || message.contains("a number without quotes")) {
+        return Some(format!(
+            "a number has no unit in it: write {first}, and unit = '...' beside it"
+        ));
+    }
+    if message.contains("extra comma") && before.ends_with(|c: char| c.is_ascii_digit() || c == ',')
+    {
+        return Some("decimals have a point, as in 0.05".to_owned());
+    }
+    let key =
+        before.rsplit_once('\n').map_or(before, |(_, line)| line).trim_end_matches([' ', '=']);
+    let is_word = value.starts_with(|c: char| c.is_ascii_alphabetic());
+    let is_key =
+        !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+    let asks = message.contains("quoted") || message.contains("invalid float");
+    (asks && is_word && is_key).then(|| format!("text is written in quotes: {key} = '{value}'"))
 }
 
 /// Fields that have no default, in the order in which a specification has them, each with a line that states it; those of the

@@ -147,11 +147,7 @@ impl Graph {
         }
         let function = Function::from_name(name);
         let Some(arity) = function.map(Function::arity).or((name == "sqrt").then_some(1)) else {
-            let known: Vec<&str> = Function::names().map(|(name, _)| name).collect();
-            return fail(format!(
-                "no function is called '{name}'; there are sqrt, diff, {}",
-                known.join(", ")
-            ));
+            return fail(unknown_function(name));
         };
         if arguments.len() != arity {
             return fail(format!("{name} takes {arity} argument(s), not {}", arguments.len()));
@@ -202,6 +198,34 @@ impl Graph {
 
 fn large_numbers() -> String {
     format!("numbers of more than {MOST_BITS} bits are not supported")
+}
+
+/// Functions of other languages, and what is written here.
+const INSTEAD: [(&str, &str); 11] = [
+    ("abs", "sqrt(x^2)"),
+    ("cbrt", "x^(1/3)"),
+    ("heaviside", "positive_part_slope(x)"),
+    ("log10", "ln(x)/ln(10)"),
+    ("log2", "ln(x)/ln(2)"),
+    ("max", "y + positive_part(x - y)"),
+    ("min", "x - positive_part(x - y)"),
+    ("pow", "x^y"),
+    ("sec", "1/cos(x)"),
+    ("sqr", "x^2"),
+    ("square", "x^2"),
+];
+
+fn unknown_function(name: &str) -> String {
+    let small = name.to_lowercase();
+    let known = Function::everyday();
+    let hint = match INSTEAD.iter().find(|(own, _)| *own == small) {
+        Some((_, instead)) => format!("write {instead}; "),
+        None if small != name && (Function::from_name(&small).is_some() || small == "sqrt") => {
+            format!("did you mean '{small}'? ")
+        }
+        None => String::new(),
+    };
+    format!("no function is called '{name}'; {hint}there are sqrt, diff, {}", known.join(", "))
 }
 
 #[cfg(test)]

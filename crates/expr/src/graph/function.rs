@@ -381,6 +381,23 @@ impl Function {
         own.chain(others)
     }
 
+    /// Names of functions that people write, without those in which laws and fields are formed to keep their digits.
+    #[must_use]
+    pub fn everyday() -> Vec<&'static str> {
+        const OWN: [&str; 9] = [
+            "log1pmx",
+            "lnboth",
+            "lnratio2",
+            "lnratio2_slope",
+            "lnratio2_curvature",
+            "cosh_sqrt_m1",
+            "cosh_sqrt_m1_slope",
+            "cosh_sqrt_m1_curvature",
+            "positive_part_slope",
+        ];
+        Self::names().map(|(name, _)| name).filter(|name| !OWN.contains(name)).collect()
+    }
+
     /// The function that text calls `name`.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {

@@ -1,6 +1,6 @@
 //! Text to syntax tree: Maple's notation, with `^` and `**`, and no implied multiplication.
 
-use crate::Rational;
+use crate::{Function, Rational};
 use num_bigint::BigInt;
 use std::ops::Range;
 use thiserror::Error;
@@ -92,9 +92,7 @@ impl Ast {
         match token {
             Token::End => Ok(ast),
             Token::Close => Err(error("this ')' closes nothing", span)),
-            Token::Name(_) | Token::Number(_) | Token::Open => {
-                Err(error("an operator is missing here; multiplication is written with '*'", span))
-            }
+            Token::Name(_) | Token::Number(_) | Token::Open => Err(parser.missing_operator(span)),
             other => Err(error(format!("{} is out of place", other.describe()), span)),
         }
     }
@@ -241,6 +239,35 @@ impl Parser {
         Ok(Ast { kind: AstKind::Call(name, arguments), span: span.start..end })
     }
 
+    /// Says what is missing before the token at hand.
+    fn missing_operator(&self, span: Range<usize>) -> ParseError {
+        let before = |count: usize| {
+            self.position
+                .checked_sub(count)
+                .and_then(|place| self.tokens.get(place))
+                .map(|(token, _)| token)
+        };
+        let function = |token: Option<&Token>| match token {
+            Some(Token::Name(name)) if name == "sqrt" || Function::from_name(name).is_some() => {
+                Some(name.clone())
+            }
+            _ => None,
+        };
+        if let Some(name) = function(before(1)) {
+            let message =
+                format!("the argument of {name} is written in parentheses, as in {name}(x)");
+            return error(message, span);
+        }
+        if let (Some(name), Some(Token::Sign('^')), Some(Token::Number(_))) =
+            (function(before(3)), before(2), before(1))
+        {
+            let message =
+                format!("a power of {name} is written behind its argument, as in {name}(x)^2");
+            return error(message, span);
+        }
+        error("an operator is missing here; multiplication is written with '*'", span)
+    }
+
     fn close(&mut self, open: &Range<usize>) -> Result<usize, ParseError> {
         match self.peek() {
             (Token::Close, span) => {
@@ -249,7 +276,7 @@ impl Parser {
             }
             (Token::End, _) => Err(error("this '(' is never closed", open.clone())),
             (Token::Name(_) | Token::Number(_) | Token::Open, span) => {
-                Err(error("an operator is missing here; multiplication is written with '*'", span))
+                Err(self.missing_operator(span))
             }
             (other, span) => Err(error(format!("')' is expected, not {}", other.describe()), span)),
         }
