@@ -33,9 +33,9 @@ const RUN: &str = "run bar --cells 8 --periods 0.1 --threads 1 --json a.json --h
 const CHECKPOINT: &str = "run bar --cells 8 --periods 0.2 --threads 1 --json a.json --vtk frames --frames 4 --history h.csv \
                           --checkpoint kept --every 3";
 const CONVERGE: &str =
-    "converge bar --cells 4,8,16 --periods 0.02 --threads 1 --out study --json t.json";
+    "converge bar --cells 4,8,16 --periods 0.05 --threads 1 --out study --json t.json";
 const SHARD: &str =
-    "converge bar --cells 4,8,16 --periods 0.02 --threads 1 --out study --shard 1/1";
+    "converge bar --cells 4,8,16 --periods 0.05 --threads 1 --out study --shard 1/1";
 const SCORE: &str = "score bar frames --json s.json";
 const FRAMES: &str = "run bar --cells 8 --periods 0.1 --threads 1 --vtk frames --frames 3";
 const GEN: &str = "gen bar --target numpy --out generated";
@@ -87,7 +87,7 @@ const SCENARIOS: &[(&str, Scenario)] = &[
         Scenario {
             files: &[],
             before: &[
-                "60% converge bar --cells 4,8,16 --periods 0.02 --threads 1 --out study --json t.json",
+                "60% converge bar --cells 4,8,16 --periods 0.05 --threads 1 --out study --json t.json",
             ],
             call: CONVERGE,
             status: 1,
@@ -100,7 +100,7 @@ const SCENARIOS: &[(&str, Scenario)] = &[
         Scenario {
             files: &[],
             before: &[
-                "60% converge bar --cells 4,8,16 --periods 0.02 --threads 1 --out study --shard 1/1",
+                "60% converge bar --cells 4,8,16 --periods 0.05 --threads 1 --out study --shard 1/1",
             ],
             call: SHARD,
             status: 0,
