@@ -191,6 +191,13 @@ fn build(graph: &mut Graph, tree: &Tree) -> Expr {
     }
 }
 
+/// Whether any part is zero.
+fn vanishes(graph: &Graph, root: Expr, values: &[(Expr, Rational)], oracle: &mut Oracle) -> bool {
+    let parts: Vec<Expr> = graph.reachable(&[root]).into_iter().collect();
+    let point = Point { graph, definitions: &[], values };
+    oracle.evaluate(&point, &parts).is_ok_and(|values| values.iter().any(Zero::is_zero))
+}
+
 /// Whether any part is so large that reduction by pi, or an exponential, takes its digits away.
 fn tame(graph: &Graph, root: Expr, values: &[(Expr, Rational)], oracle: &mut Oracle) -> bool {
     let parts: Vec<Expr> = graph.reachable(&[root]).into_iter().collect();
@@ -216,9 +223,14 @@ proptest! {
         let point = Point { graph: &graph, definitions: &[], values: &values };
         match oracle.settle(&point, &[expr], 60) {
             Ok(value) if tame(&graph, expr, &values, &mut oracle) => {
-                let second = evaluate(&graph, expr, &float(&exact));
-                prop_assert!(second.is_some(), "defined by the oracle only: {}", graph.print(expr));
-                let difference = second.unwrap() - float(&value[0]);
+                let Some(second) = evaluate(&graph, expr, &float(&exact)) else {
+                    // Where the oracle knows that tan(Pi) is zero, the other library has a rounding of
+                    // it, which may be negative: a root of it is not defined there.
+                    let at_an_edge = vanishes(&graph, expr, &values, &mut oracle);
+                    prop_assert!(at_an_edge, "defined by the oracle only: {}", graph.print(expr));
+                    return Ok(());
+                };
+                let difference = second - float(&value[0]);
                 let tolerance = float(&Rational::new(1.into(), num_bigint::BigInt::from(10).pow(40)));
                 // Zeros of tan(Pi x) are exact on one side only; other values are no smaller than this.
             let scale = float(&(value[0].abs() + Rational::new(1.into(), 1_000_000.into())));
