@@ -64,6 +64,16 @@ impl<T: RealField + Copy> Hoop<T> {
         }
     }
 
+    /// The internal variables at time zero of a particle with this reference position: these, and after them those of a law of space with memory.
+    #[must_use]
+    pub fn at_rest_with<const D: usize>(
+        law: &dyn LawWithMemory<T, 3>,
+        X: &SVector<T, D>,
+    ) -> Vec<T> {
+        let in_space = SVector::from([X[0], T::zero(), X[1 % D]]);
+        Self::at_rest(X).into_iter().chain(law.initial(&in_space)).collect()
+    }
+
     /// The radius.
     #[inline(always)]
     #[must_use]
@@ -172,11 +182,10 @@ impl<T: Stressed<3>, const D: usize> LawWithMemory<T, D> for HalfPlane<T> {
     fn evolve(&self, _: &Increment<'_, T, D>, _: &mut [[T; BLOCK]]) {}
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        let mut all = Hoop::at_rest(X).to_vec();
-        if let LawInSpace::WithMemory(own) = &self.in_space {
-            all.extend(own.initial(&SVector::from([X[0], T::zero(), X[1 % D]])));
+        match &self.in_space {
+            LawInSpace::WithMemory(own) => Hoop::at_rest_with(own.as_ref(), X),
+            LawInSpace::Library(_) | LawInSpace::Own(_) => Hoop::at_rest(X).to_vec(),
         }
-        all
     }
 
     fn start_at_rate_around(&self, rate: &SMatrix<T, D, D>, around: T, q: &mut [T]) {

@@ -240,8 +240,7 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
     }
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
-        let in_space = SVector::from([X[0], T::zero(), X[1 % D]]);
-        Hoop::at_rest(X).into_iter().chain(self.law.initial(&in_space)).collect()
+        Hoop::at_rest_with(self.law.as_ref(), X)
     }
 
     fn follows_position(&self) -> bool {
