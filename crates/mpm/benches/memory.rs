@@ -83,6 +83,11 @@ fn compare(
     elastic: Law<f64, 2>,
     law: Law<f64, 2>,
 ) {
+    // A word of the command line chooses some of them.
+    let mut chosen = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
+    if chosen.next().is_some_and(|word| !name.contains(&word)) {
+        return;
+    }
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let law_variables = law.variables().len();
     let simulation = |law| simulation_of(law, cells, Shape::Gimp, Integrator::Cd);

@@ -63,6 +63,16 @@ struct OfLibrary<L>(L);
 /// A law that the caller brings.
 struct OfCaller<T>(Arc<dyn ConstitutiveLaw<T, 3>>);
 
+/// The internal variables of a block; at rest at radius one beyond its last particle. Loops over all of a block are vectorised.
+#[inline(always)]
+fn hoops<T: Lanes>(internal: &[T]) -> [Hoop<T>; BLOCK] {
+    let mut hoops = [Hoop::of(&[]); BLOCK];
+    for (hoop, q) in hoops.iter_mut().zip(internal.chunks_exact(Hoop::<T>::COUNT)) {
+        *hoop = Hoop::of(q);
+    }
+    hoops
+}
+
 /// Sets the stress flux of a particle of a block; returns the force of the stress around the axis.
 #[inline(always)]
 fn set_flux<T: Lanes, const D: usize>(
@@ -90,8 +100,7 @@ impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for Half
     ) {
         let mut radial = [T::zero(); BLOCK];
         self.0.set(c, F, internal, contributions, &mut radial);
-        let count = internal.len() / Hoop::<T>::COUNT;
-        for (force, value) in radial[..count].iter().zip(&mut contributions.value) {
+        for (force, value) in radial.iter().zip(&mut contributions.value) {
             value.values[D] += *force;
         }
     }
@@ -144,8 +153,9 @@ struct Stress<'a, T, L, const D: usize> {
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     #[inline(always)]
     fn run<V: Vectors>(mut self, _: V) {
-        if !L::HAS_SHORT || !self.stresses::<true>() {
-            self.stresses::<false>();
+        let hoops = hoops(self.internal);
+        if !L::HAS_SHORT || !self.stresses::<true>(&hoops) {
+            self.stresses::<false>(&hoops);
         }
     }
 }
@@ -154,12 +164,11 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
     /// Sets the stress fluxes of all particles of a block, and their radial forces, by the short form of the law or the full one; returns
     /// whether the short form holds for all of them.
     #[inline(always)]
-    fn stresses<const SHORT: bool>(&mut self) -> bool {
-        let Self { F, c, law, internal, contributions, radial } = self;
+    fn stresses<const SHORT: bool>(&mut self, hoops: &[Hoop<T>; BLOCK]) -> bool {
+        let Self { F, c, law, contributions, radial, .. } = self;
         let mut short = true;
-        let of_particles = F.iter().zip(internal.chunks_exact(Hoop::<T>::COUNT)).enumerate();
-        for (n, (F, q)) in of_particles {
-            let hoop = Hoop::of(q);
+        for n in 0..BLOCK {
+            let (F, hoop) = (&F[n], hoops[n]);
             let (tau, around, is_short) = law.kirchhoff_with_hoop::<SHORT, D>(F, hoop.stretch);
             short &= is_short;
             radial[n] = set_flux(c, (n, F), (&tau, around, hoop), contributions);
@@ -178,15 +187,15 @@ impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
         radial: &mut [T; BLOCK],
     ) {
         let mut block = BlockOfStresses::at_rest();
-        let hoop = |n: usize| Hoop::of(internal.get(n * Hoop::<T>::COUNT..).unwrap_or_default());
+        let hoops = hoops(internal);
         let in_space: [Matrix3<T>; BLOCK] =
-            std::array::from_fn(|n| with_hoop_stretch(&F[n], hoop(n).stretch));
+            std::array::from_fn(|n| with_hoop_stretch(&F[n], hoops[n].stretch));
         in_space.iter().enumerate().for_each(|(n, F)| block.set(n, F));
         block.evaluate(self.0.as_ref());
         for (n, radial) in radial.iter_mut().enumerate() {
             let tau = product(&block.stress(n), &in_space[n].transpose());
             let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
-            *radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoop(n)), contributions);
+            *radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoops[n]), contributions);
         }
     }
 }
