@@ -12,8 +12,8 @@ pub(crate) mod tiles;
 use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
+use mmsmith_threads::each;
 use nalgebra::{RealField, SVector};
-use rayon::prelude::*;
 
 use crate::error::SetupError;
 
@@ -283,10 +283,9 @@ impl<const D: usize> Layout<D> {
                 visit_all(ghosts, images);
                 continue;
             }
-            let ghosts = ghosts.par_chunks_mut(NODES_AT_ONCE);
-            ghosts
-                .zip(images.par_chunks_mut(NODES_AT_ONCE))
-                .for_each(|(ghosts, images)| visit_all(ghosts, images));
+            let images = images.chunks_mut(NODES_AT_ONCE);
+            let pairs = ghosts.chunks_mut(NODES_AT_ONCE).zip(images).collect();
+            each(pairs, &|(ghosts, images)| visit_all(ghosts, images));
         }
     }
 
