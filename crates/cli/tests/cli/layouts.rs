@@ -90,7 +90,7 @@ const ORDERS: [Order; 6] = [
 ];
 const CELLS: [usize; 2] = [6, 12];
 /// Layouts that are drawn.
-const DRAWN: u64 = 360;
+const DRAWN: u64 = 180;
 /// Share that is to be read at least of the layouts that are told all.
 const READ: f64 = 0.9;
 

@@ -133,7 +133,7 @@ fn tables_fit_every_terminal() {
         "list",
         "list --long",
         "explain ring",
-        "check ring axis-aligned-3d",
+        "check ring axis-aligned-1d",
         "check ring --thorough --points 4",
         "coverage",
         "run axis-aligned --cells 8",

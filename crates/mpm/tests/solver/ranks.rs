@@ -182,7 +182,18 @@ fn every_scheme_has_the_bits_of_one_process() {
 
 #[test]
 fn so_it_is_on_a_line_and_in_space() {
-    for settings in schemes::schemes().map(flying).step_by(3) {
+    on_a_line_and_in_space(7);
+}
+
+#[test]
+#[ignore = "a minute: .ci/long runs it"]
+fn so_is_every_scheme_on_a_line_and_in_space() {
+    on_a_line_and_in_space(1);
+}
+
+/// Every `step`-th scheme.
+fn on_a_line_and_in_space(step: usize) {
+    for settings in schemes::schemes().map(flying).step_by(step) {
         agrees::<1>(settings, &[2, 4], -16.0, 30);
         agrees::<3>(settings, &[3], -14.0, 9);
     }

@@ -62,12 +62,15 @@ fn schemes() -> impl Iterator<Item = Scheme> {
     })
 }
 
-fn check<T: Scalar<D>, const D: usize>() {
-    for scheme in schemes() {
+const THREADS: [usize; 5] = [1, 2, 3, 5, 8];
+
+/// The widest registers with so many of the numbers of threads for each scheme, in turn; the others with two threads for every fifth.
+fn check<T: Scalar<D>, const D: usize>(numbers: usize) {
+    for (n, scheme) in schemes().enumerate() {
         let plain = bits::<T, D>(Registers::Scalar, 1, scheme);
         for (turn, registers) in Registers::present().into_iter().rev().enumerate() {
-            // The widest registers with every number of threads, the others with some.
-            for threads in [1, 2, 3, 5, 8].into_iter().filter(|&n| turn == 0 || n == turn + 1) {
+            let of_threads = (0..numbers).map(|k| THREADS[(n + 2 * k) % THREADS.len()]);
+            for threads in of_threads.filter(|&threads| turn == 0 || threads == turn + 1) {
                 let same = bits::<T, D>(registers, threads, scheme) == plain;
                 assert!(same, "{D} {scheme:?} {registers:?} {threads} threads");
             }
@@ -77,11 +80,21 @@ fn check<T: Scalar<D>, const D: usize>() {
 
 #[test]
 fn all_registers_and_numbers_of_threads_give_the_same_bits() {
-    check::<f64, 1>();
-    check::<f64, 2>();
-    check::<f64, 3>();
-    check::<f32, 1>();
-    check::<f32, 2>();
-    check::<f32, 3>();
+    check_all(1);
+}
+
+#[test]
+#[ignore = "half a minute: .ci/long runs it"]
+fn so_it_is_of_every_scheme_with_every_number_of_threads() {
+    check_all(THREADS.len());
+}
+
+fn check_all(numbers: usize) {
+    check::<f64, 1>(numbers);
+    check::<f64, 2>(numbers);
+    check::<f64, 3>(numbers);
+    check::<f32, 1>(numbers);
+    check::<f32, 2>(numbers);
+    check::<f32, 3>(numbers);
     Registers::Avx2.use_at_most();
 }

@@ -86,7 +86,7 @@ fn problems() -> Vec<Problem> {
 fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
     let seeds = std::env::var("MMSMITH_SCHEDULES");
     // Each is several runs.
-    let seeds = seeds.map_or(24, |text| text.parse::<u64>().expect("a number") / 4);
+    let seeds = seeds.map_or(9, |text| text.parse::<u64>().expect("a number") / 4);
     let (mut killed, mut resumed) = (0, 0);
     for (n, problem) in problems().iter().enumerate() {
         let calls = [2, 3, 4].map(|count| {
