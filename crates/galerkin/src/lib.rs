@@ -70,7 +70,7 @@ pub use set_up::{Grid, MassMatrix, Scheme};
 pub use simulation::TotalLagrangian;
 pub use solver::SetUp;
 pub use statics::{
-    AtRest, Equilibrium, LINEAR, LoadStep, Loads, Obstacle, QUADRATIC, StaticsError,
+    AtRest, Equilibrium, LINEAR, LoadStep, Loads, Obstacle, QUADRATIC, Reached, StaticsError,
     newton_exponent,
 };
 

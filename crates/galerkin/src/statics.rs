@@ -7,7 +7,8 @@
 //! f_int(u) = s f_ext,  f_int = sum V P(F) dN/dX,  f_ext = sum m b N + sum T N dA
 //! ```
 //!
-//! with `s` times the given displacement on sides whose motion is given. The matrix of Newton's steps has the tangents `A = dP/dF` of the
+//! with `s` times the given displacement on sides whose motion is given. From one equilibrium to another, as on a path of loads, both go
+//! from those of the first to those of the second. The matrix of Newton's steps has the tangents `A = dP/dF` of the
 //! law at the points ([`Differentiated`](mmsmith_laws::Differentiated)), exact but for rounding, so that residuals fall by their squares; it
 //! is summed cell after cell, in an order that does not depend on the number of threads.
 //!
@@ -118,6 +119,15 @@ pub fn newton_exponent(residuals: &[f64], rounding: f64) -> Option<f64> {
     }
 }
 
+/// An equilibrium, from which a body goes on to another one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reached {
+    /// Coefficients of the displacement, forces, and displacements of sides, by component.
+    u: Vec<Vec<f64>>,
+    forces: Vec<Vec<f64>>,
+    given: Vec<Vec<f64>>,
+}
+
 /// Why a body has no equilibrium here.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -133,6 +143,9 @@ pub enum StaticsError {
         /// The degree asked for.
         degree: usize,
     },
+    /// An equilibrium of a body with other coefficients.
+    #[error("the equilibrium to go on from is that of another grid")]
+    OtherGrid,
     /// A matrix that does not fit.
     #[error("the matrix of {unknowns} unknowns does not fit into memory")]
     Memory {
@@ -198,18 +211,22 @@ pub trait AtRest<const D: usize> {
     /// sides leave rigid motions free.
     fn held(&self) -> Vec<SVector<f64, D>>;
 
-    /// Goes from the undeformed body to the whole load, in so many steps or more; `seen` is called after each step of Newton's, with the
-    /// load factor and the norms of the residual.
+    /// Goes from the undeformed body, or the equilibrium `from`, to the whole load, in so many steps or more; `seen` is called after each
+    /// step of Newton's, with the load factor and the norms of the residual.
     ///
     /// # Errors
     ///
-    /// Where Newton's method does not get there.
+    /// Where Newton's method does not get there, or `from` belongs to another grid.
     fn solve(
         &mut self,
         loads: &Loads<'_, D>,
+        from: Option<&Reached>,
         steps: usize,
         seen: &mut dyn FnMut(f64, &[f64]),
     ) -> Result<Equilibrium, StaticsError>;
+
+    /// The equilibrium that was reached last.
+    fn reached(&self) -> Reached;
 
     /// The points as particles, at rest, and the law.
     fn observe(&mut self) -> (&Particles<f64, D>, &Law<f64, D>);
@@ -253,11 +270,19 @@ macro_rules! at_rest {
                 fn solve(
                     &mut self,
                     loads: &Loads<'_, $D>,
+                    from: Option<&Reached>,
                     steps: usize,
                     seen: &mut dyn FnMut(f64, &[f64]),
                 ) -> Result<Equilibrium, StaticsError> {
+                    self.begin(from)?;
                     self.load(loads);
                     self.follow(steps, seen)
+                }
+
+                fn reached(&self) -> Reached {
+                    let u = self.components.each_ref().map(|component| component.u.clone());
+                    let [forces, given] = [&self.whole.forces, &self.whole.given];
+                    Reached { u: u.to_vec(), forces: forces.to_vec(), given: given.to_vec() }
                 }
 
                 fn observe(&mut self) -> (&Particles<f64, $D>, &Law<f64, $D>) {
@@ -270,6 +295,13 @@ macro_rules! at_rest {
 }
 
 at_rest! { 1 2 3 }
+
+/// Forces of a load and displacements of sides under it, by component.
+#[derive(Clone)]
+struct OfLoad<const D: usize> {
+    forces: [Vec<f64>; D],
+    given: [Vec<f64>; D],
+}
 
 /// The body, its load, and where it is.
 struct Statics<const D: usize> {
@@ -287,9 +319,9 @@ struct Statics<const D: usize> {
     density: f64,
     numbering: Numbering<D>,
     pattern: Pattern,
-    /// Forces of the whole load and displacements of sides under it, by component.
-    forces: [Vec<f64>; D],
-    given: [Vec<f64>; D],
+    /// The load at its beginning, and the whole one.
+    start: OfLoad<D>,
+    whole: OfLoad<D>,
     F: Vec<SMatrix<f64, D, D>>,
     P: Vec<SMatrix<f64, D, D>>,
     tangents: Vec<Tangent<D>>,
@@ -327,9 +359,13 @@ impl<const D: usize> Statics<D> {
         particles.internal = at.given(0, at.X.len()).to_vec();
         let count = at.X.len();
         let coefficients = |component: &Component<D>| vec![0.0; component.u.len()];
-        Ok(Self {
+        let none = OfLoad {
             forces: components.each_ref().map(coefficients),
             given: components.each_ref().map(coefficients),
+        };
+        Ok(Self {
+            start: none.clone(),
+            whole: none,
             F: vec![SMatrix::identity(); count],
             P: vec![SMatrix::zeros(); count],
             tangents: vec![[[SMatrix::zeros(); D]; D]; count],
@@ -349,9 +385,30 @@ impl<const D: usize> Statics<D> {
         })
     }
 
+    /// Takes the place of an equilibrium, or of the undeformed body.
+    fn begin(&mut self, from: Option<&Reached>) -> Result<(), StaticsError> {
+        let Self { components, start, .. } = self;
+        let OfLoad { forces, given } = start;
+        let Some(from) = from else {
+            components.iter_mut().for_each(|component| component.u.fill(0.0));
+            forces.iter_mut().chain(given).for_each(|values| values.fill(0.0));
+            return Ok(());
+        };
+        let own = components.iter_mut().map(|component| &mut component.u);
+        let own: Vec<&mut Vec<f64>> = own.chain(forces).chain(given).collect();
+        let other: Vec<&Vec<f64>> = from.u.iter().chain(&from.forces).chain(&from.given).collect();
+        let lengths = other.iter().map(|values| values.len());
+        if !own.iter().map(|values| values.len()).eq(lengths) {
+            return Err(StaticsError::OtherGrid);
+        }
+        own.into_iter().zip(other).for_each(|(own, other)| own.clone_from(other));
+        Ok(())
+    }
+
     /// Forms the forces of the whole load, and the displacements of sides under it.
     fn load(&mut self, loads: &Loads<'_, D>) {
-        let Self { bases, fits, faces, pins, numbering, components, at, forces, given, .. } = self;
+        let Self { bases, fits, faces, pins, numbering, components, at, whole, .. } = self;
+        let OfLoad { forces, given } = whole;
         let density = self.density;
         for (p, X) in at.X.iter().enumerate() {
             let b = at.in_frame(p, &(loads.body_force)(X)) * (density * at.volume[p]);
@@ -434,8 +491,12 @@ where
         let bad = stresses.iter().position(|P| !is_finite(P));
         let mut residual = self.integrated(&stresses);
         self.P = stresses;
-        for (sums, forces) in residual.iter_mut().zip(&self.forces) {
-            sums.iter_mut().zip(forces).for_each(|(sum, force)| *sum += factor * force);
+        for (sums, (start, whole)) in
+            residual.iter_mut().zip(self.start.forces.iter().zip(&self.whole.forces))
+        {
+            for (sum, (start, whole)) in sums.iter_mut().zip(start.iter().zip(whole)) {
+                *sum += (1.0 - factor) * start + factor * whole;
+            }
         }
         match bad {
             Some(point) => Err(point),

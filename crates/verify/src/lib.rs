@@ -133,8 +133,8 @@ pub use stability::{
 };
 pub use state_of_stress::Extremes;
 pub use statics::{
-    StaticCase, StaticErrors, StaticPlan, StaticProblem, StaticRow, StaticStep, StaticStudy,
-    expected_of_statics, is_at_rest, usual_moment,
+    StaticCase, StaticErrors, StaticPlan, StaticProblem, StaticRow, StaticState, StaticStep,
+    StaticStudy, expected_of_statics, is_at_rest, usual_moment,
 };
 pub use study::{Study, Sweep, converge};
 pub use tangent::{

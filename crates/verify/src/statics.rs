@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use mmsmith_galerkin::{AtRest, Equilibrium, Factors, Loads, StaticsError};
+use mmsmith_galerkin::{AtRest, Equilibrium, Factors, Loads, Reached, StaticsError};
 use mmsmith_measure::Comparison;
 use mmsmith_measure::norms::{PerField, PerNorm};
 use mmsmith_runtime::{AnySolution, Domain, Law, Solution};
@@ -127,6 +127,14 @@ impl StaticRow {
     }
 }
 
+/// An equilibrium, from which a body goes on to that of other loads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StaticState {
+    /// Coordinates of the points of the body, one point after the other.
+    points: Vec<f64>,
+    reached: Reached,
+}
+
 /// A case on its grid.
 pub struct StaticProblem<'a> {
     exact: &'a AnySolution<f64>,
@@ -204,22 +212,24 @@ impl<'a> StaticProblem<'a> {
     ///
     /// [`CaseError`] for settings that cannot be solved. A case whose load is not reached is a row that says so.
     pub fn solve(&self, seen: &mut dyn FnMut(f64, &[f64])) -> Result<StaticRow, CaseError> {
-        self.solve_and_write(seen, None)
+        self.solve_from(None, seen, None).map(|(row, _)| row)
     }
 
-    /// [`solve`](Self::solve), with a particle file of the equilibrium.
+    /// [`solve`](Self::solve) from an equilibrium in the place of rest, with a particle file of the equilibrium; also the state that was
+    /// reached, if the load was.
     ///
     /// # Errors
     ///
-    /// Also where the file cannot be written.
-    pub fn solve_and_write(
+    /// Also where the body is not that of `from`, or the file cannot be written.
+    pub fn solve_from(
         &self,
+        from: Option<&StaticState>,
         seen: &mut dyn FnMut(f64, &[f64]),
         output: Option<&FrameOutput>,
-    ) -> Result<StaticRow, CaseError> {
+    ) -> Result<(StaticRow, Option<StaticState>), CaseError> {
         in_dimension!(
             self.exact,
-            |s| solve(s, &self.case, seen, output),
+            |s| solve(s, &self.case, from, seen, output),
             else Err(CaseError::Dimension)
         )
     }
@@ -298,9 +308,10 @@ where
 fn solve<const D: usize>(
     exact: &dyn Solution<f64, D>,
     case: &StaticCase,
+    from: Option<&StaticState>,
     seen: &mut dyn FnMut(f64, &[f64]),
     output: Option<&FrameOutput>,
-) -> Result<StaticRow, CaseError>
+) -> Result<(StaticRow, Option<StaticState>), CaseError>
 where
     f64: Precision<D>,
 {
@@ -310,6 +321,10 @@ where
     let begun = Instant::now();
     let mut body = f64::at_rest(&grid, case.total.degree, law, exact.density())?;
     refuse_on_axis(exact, body.positions())?;
+    let points: Vec<f64> = body.positions().iter().flatten().copied().collect();
+    if from.is_some_and(|from| from.points != points) {
+        return Err(StaticsError::OtherGrid.into());
+    }
     let time = case.moment * exact.period();
     let [unknowns, entries] = body.size();
     let mut row = StaticRow {
@@ -333,7 +348,7 @@ where
              parameters may be a state of a body",
             J(X)
         ));
-        return Ok(row);
+        return Ok((row, None));
     }
     let boundary = ExactBoundary::new(exact);
     let moves = !is_static(exact);
@@ -347,7 +362,8 @@ where
         boundary: &boundary,
         time,
     };
-    let outcome = body.solve(&loads, case.load_steps, seen);
+    let from = from.map(|from| &from.reached);
+    let outcome = body.solve(&loads, from, case.load_steps, seen);
     row.wall_s = begun.elapsed().as_secs_f64();
     match outcome {
         Ok(found) => {
@@ -376,7 +392,9 @@ where
             row.stopped = Some(error.to_string());
         }
     }
-    Ok(row)
+    let is_reached = row.stopped.is_none();
+    let state = is_reached.then(|| StaticState { points, reached: body.reached() });
+    Ok((row, state))
 }
 
 fn steps(found: &Equilibrium) -> Vec<StaticStep> {

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::scheme::SchemeOptions;
 use super::statics::StaticOptions;
-use super::values::{cell_count, time};
+use super::values::{cell_count, time, variation};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
@@ -21,6 +21,10 @@ pub(crate) struct RunOptions {
     pub(crate) scheme: SchemeOptions,
     #[command(flatten)]
     pub(crate) statics: StaticOptions,
+    /// Load levels of an equilibrium, one after the other: values of a parameter, or of moment, as NAME=VALUE,VALUE,...; each begins at
+    /// the equilibrium of the one before, the first one at rest
+    #[arg(long, value_name = "NAME=VALUE,...", value_parser = variation)]
+    pub(crate) along: Option<(String, Vec<String>)>,
     /// Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium
     #[arg(long, value_name = "DIR")]
     pub(crate) vtk: Option<PathBuf>,

@@ -43,7 +43,13 @@ pub(crate) fn run(options: &RunOptions, line: &[OsString]) -> Result<bool> {
         ("--profile", options.profile),
     ];
     if statics::is_asked(&selection, &options.statics, &options.scheme, &of_time)? {
-        return statics::run(selection, options);
+        return match &options.along {
+            Some((name, values)) => statics::along(&selection, options, name, values),
+            None => statics::run(selection, options),
+        };
+    }
+    if options.along.is_some() {
+        bail!("--along: only an equilibrium has load levels; add --static");
     }
     follow(options, Origin::Line(line))
 }

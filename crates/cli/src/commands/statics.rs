@@ -195,15 +195,7 @@ pub(super) fn run(selection: Selection, options: &RunOptions) -> Result<bool> {
     let cells = options.cells.unwrap_or(problem.case.case.cells);
     let on_grid = problem.on(cells)?;
     let files = Asked(vec![(Form::Json, &options.scheme.json)]).prepare()?;
-    let output = options.vtk.as_ref().map(|folder| FrameOutput {
-        folder: folder.clone(),
-        name: problem.selection.name().to_owned(),
-        count: 1,
-        provenance: Some(problem.selection.provenance()),
-    });
-    if let Some(FrameOutput { folder, .. }) = &output {
-        prepare_folder(folder).context("--vtk")?;
-    }
+    let output = particle_file(&problem, options)?;
     with_threads(options.scheme.threads, || {
         let row = {
             let bar = Bar::expecting("starting", None);
@@ -211,13 +203,92 @@ pub(super) fn run(selection: Selection, options: &RunOptions) -> Result<bool> {
             let show = &mut |factor: f64, residuals: &[f64]| {
                 bar.show_share(|| told::under_way(&what, factor, residuals), factor);
             };
-            on_grid.solve_and_write(show, output.as_ref())?
+            on_grid.solve_from(None, show, output.as_ref())?.0
         };
         let mut report = told::run(&problem, &row);
-        if let Some(FrameOutput { folder, name, .. }) = output.filter(|_| row.errors.is_some()) {
-            let list = folder.join(format!("{name}.pvd"));
-            report.sections.push(Section::Note(format!("particle file: {}\n", list.display())));
+        report.sections.extend(output.filter(|_| row.errors.is_some()).map(on_particle_file));
+        report.publish(files)
+    })
+}
+
+/// The particle file of an equilibrium, if one is asked for.
+fn particle_file(problem: &Problem, options: &RunOptions) -> Result<Option<FrameOutput>> {
+    let Some(folder) = options.vtk.clone() else { return Ok(None) };
+    prepare_folder(&folder).context("--vtk")?;
+    let name = problem.selection.name().to_owned();
+    let provenance = Some(problem.selection.provenance());
+    Ok(Some(FrameOutput { folder, name, count: 1, provenance }))
+}
+
+fn on_particle_file(FrameOutput { folder, name, .. }: FrameOutput) -> Section {
+    let list = folder.join(format!("{name}.pvd"));
+    Section::Note(format!("particle file: {}\n", list.display()))
+}
+
+/// A load level: the value of what it is named by, and the problem there.
+struct Level {
+    value: f64,
+    problem: Problem,
+}
+
+/// `mms run --static --along`: equilibria one after the other.
+pub(super) fn along(
+    selection: &Selection,
+    options: &RunOptions,
+    name: &str,
+    values: &[String],
+) -> Result<bool> {
+    let level = |text: &String| -> Result<Level> {
+        let what = || format!("--along {name}={text}");
+        let number = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let value = number.with_context(|| format!("{}: '{text}' is not a number", what()))?;
+        let (here, moment) = match name {
+            "moment" => (selection.clone(), Some(value)),
+            _ => (
+                selection.with(&[(name.to_owned(), value)]).with_context(what)?,
+                options.statics.moment,
+            ),
+        };
+        let statics = StaticOptions { moment, ..options.statics };
+        let problem = Problem::new(&options.name, here, &options.scheme, &statics);
+        Ok(Level { value, problem: problem.with_context(what)? })
+    };
+    if name == "moment" && options.statics.moment.is_some() {
+        bail!("--moment: the moments are those of --along; leave --moment out");
+    }
+    let levels = values.iter().map(level).collect::<Result<Vec<_>>>()?;
+    let Some(last) = levels.last() else { bail!("--along {name}: no values") };
+    let cells = options.cells.unwrap_or(last.problem.case.case.cells);
+    let on_grid = levels.iter().map(|level| level.problem.on(cells)).collect::<Result<Vec<_>>>()?;
+    let files = Asked(vec![(Form::Json, &options.scheme.json)]).prepare()?;
+    let output = particle_file(&last.problem, options)?;
+    with_threads(options.scheme.threads, || {
+        let (mut rows, mut state) = (Vec::new(), None);
+        {
+            let bar = Bar::expecting("starting", None);
+            for (level, case) in levels.iter().zip(&on_grid) {
+                let what = format!("{name} = {}", level.value);
+                let done = rows.len() as f64;
+                let show = &mut |factor: f64, residuals: &[f64]| {
+                    let share = (done + factor) / levels.len() as f64;
+                    bar.show_share(|| told::under_way(&what, factor, residuals), share);
+                };
+                let output = output.as_ref().filter(|_| rows.len() + 1 == levels.len());
+                let (row, reached) = case.solve_from(state.as_ref(), show, output).with_context(|| {
+                    format!(
+                        "--along {what}: levels of a path belong to one body; vary a parameter that leaves the body as it is, or run the \
+                         levels one by one with --set"
+                    )
+                })?;
+                rows.push(row);
+                state = reached;
+                if state.is_none() {
+                    break;
+                }
+            }
         }
+        let mut report = told::path(name, &levels, &rows);
+        report.sections.extend(output.filter(|_| state.is_some()).map(on_particle_file));
         report.publish(files)
     })
 }

@@ -112,6 +112,7 @@ fn every_command_keeps_to_its_schema() {
         ("converge shear-wave --cells 4,8", 0),
         ("run skew-2d --static --cells 4", 0),
         ("run thick-cylinder --static --cells 4", 0),
+        ("run skew-2d --static --cells 4 --along A=0.02,0.05", 0),
         ("run thick-cylinder --formulation total-lagrangian --cells 4 --periods 0.05", 0),
         ("converge skew-2d --static --cells 4,8", 0),
         (

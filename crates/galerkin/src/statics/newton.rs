@@ -34,13 +34,12 @@ impl<const D: usize> Statics<D>
 where
     f64: Stressed<D> + Differentiated<D>,
 {
-    /// Goes from the undeformed body to the whole load.
+    /// Goes from the place that the body has to the whole load.
     pub(super) fn follow(
         &mut self,
         steps: usize,
         seen: &mut dyn FnMut(f64, &[f64]),
     ) -> Result<Equilibrium, StaticsError> {
-        self.components.iter_mut().for_each(|component| component.u.fill(0.0));
         let usual = 1.0 / steps.max(1) as f64;
         let (mut reached, mut length) = (0.0, usual);
         let mut found = Equilibrium { steps: Vec::new(), cut_backs: 0 };
@@ -104,10 +103,10 @@ where
         let mut residual = self.residual(to).map_err(|point| self.inverted(point))?;
         let mut stiffness = self.stiffness();
         // The sides move with all the rest.
-        let moves = self
-            .given
-            .each_ref()
-            .map(|given| given.iter().map(|value| (to - from) * value).collect::<Vec<f64>>());
+        let moves: [Vec<f64>; D] = std::array::from_fn(|c| {
+            let both = self.start.given[c].iter().zip(&self.whole.given[c]);
+            both.map(|(start, whole)| (to - from) * (whole - start)).collect()
+        });
         if moves.iter().flatten().any(|value| *value != 0.0) {
             let forces = self.product(&moves);
             for (sums, forces) in residual.iter_mut().zip(&forces) {
@@ -223,7 +222,8 @@ where
             }
         }
         let of_displacements = norm(&self.pattern.magnitudes(&stiffness.values, &u));
-        let of_forces = factor * norm(&self.unknowns_of(&self.forces));
+        let of_forces = (1.0 - factor) * norm(&self.unknowns_of(&self.start.forces))
+            + factor * norm(&self.unknowns_of(&self.whole.forces));
         stiffness.magnitude + of_displacements + of_forces
     }
 

@@ -5,7 +5,7 @@ use mmsmith_verify::{
 };
 use serde_json::{Map, json};
 
-use super::Problem;
+use super::{Level, Problem};
 use crate::number;
 use crate::report::{Report, Section, Sheet, number as digits};
 use crate::svg::{Curve, Plot};
@@ -61,6 +61,62 @@ pub(super) fn run(problem: &Problem, row: &StaticRow) -> Report {
             ("passed".to_owned(), json!(verdict)),
         ]),
         verdict,
+    }
+}
+
+/// The report on load levels, of which those are solved that have rows.
+pub(super) fn path(name: &str, levels: &[Level], rows: &[StaticRow]) -> Report {
+    let first = &levels[0].problem;
+    let units = Units::of(&first.selection);
+    let is_whole = rows.len() == levels.len() && rows.iter().all(|row| row.stopped.is_none());
+    let header = [name.to_owned()]
+        .into_iter()
+        .chain(["u", "F", "P"].map(|field| format!("l2 of {}", named(field, units))));
+    let ends = ["steps", "residuals", "exponent", "status"].map(str::to_owned);
+    let mut table = Table::new(0, header.chain(ends));
+    let mut notes = rows.first().map(held).unwrap_or_default();
+    for (Level { value, problem }, row) in levels.iter().zip(rows) {
+        let errors = row.errors.as_ref();
+        let of = |field: &str| {
+            let norms = errors.and_then(|errors| errors.get(field));
+            norms.map_or_else(|| "-".to_owned(), |norms| table::error(norms.l2))
+        };
+        let residuals = row.load_steps.iter().map(|step| step.residuals.len()).sum::<usize>();
+        table.row([
+            number::rounded(*value, 6),
+            of("u"),
+            of("F"),
+            of("P"),
+            row.load_steps.len().to_string(),
+            residuals.to_string(),
+            exponent(row.exponent()),
+            if row.stopped.is_none() { "ok".into() } else { "NOT REACHED".into() },
+        ]);
+        if let Some(why) = &row.stopped {
+            notes += &format!("{name} = {value}: {}", stopped(problem, row, why));
+        }
+    }
+    let values: Vec<f64> = levels.iter().map(|level| level.value).collect();
+    let mut settings = first.settings(&json!(rows.first().map(|row| row.cells)));
+    settings["along"] = json!({ "name": name, "values": values });
+    Report {
+        command: "static-path",
+        preface: String::new(),
+        caption: format!(
+            "load levels {name} = {}\n{}",
+            values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
+            first.caption(),
+        ),
+        sections: vec![
+            Section::Table(format!("equilibria along {name}"), table),
+            Section::Note(notes),
+        ],
+        settings,
+        results: Map::from_iter([
+            ("rows".to_owned(), json!(rows)),
+            ("passed".to_owned(), json!(is_whole)),
+        ]),
+        verdict: Some(is_whole),
     }
 }
 
