@@ -245,3 +245,50 @@ fn a_state_that_is_not_the_exact_one_is_not_ok() {
         assert!(!called.stdout.contains("--load-steps"), "{}", called.stdout);
     }
 }
+
+/// Each level begins at the equilibrium of the one before, and ends where a run from rest does.
+#[test]
+fn load_levels_follow_each_other_to_the_states_of_single_runs() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let l2 = |row: &serde_json::Value, field: &str| row["errors"][field]["l2"].as_f64().unwrap();
+    for (line, name, single, values) in [
+        ("skew-2d --cells 6", "A", "--set A=", ["0.02", "0.06", "0.1"]),
+        ("thick-cylinder --cells 4", "moment", "--moment ", ["0.05", "0.15", "0.25"]),
+    ] {
+        let along = format!("--along {name}={}", values.join(","));
+        let called = mms(at, &format!("run {line} --static {along} --json path.json"));
+        assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
+        let path = read_json(&at.join("path.json"));
+        let rows = path["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), values.len());
+        for (row, value) in rows.iter().zip(values) {
+            let call = format!("run {line} --static {single}{value} --json alone.json");
+            assert_eq!(mms(at, &call).status, 0);
+            let alone = read_json(&at.join("alone.json"))["result"].clone();
+            for field in ["u", "F", "P"] {
+                let quotient = l2(row, field) / l2(&alone, field);
+                assert!((quotient - 1.0).abs() < 1e-6, "{name} = {value}, {field}: {quotient}");
+            }
+        }
+        // Nearer to the equilibrium than the undeformed body is.
+        let first =
+            |row: &serde_json::Value| row["load_steps"][0]["residuals"][1].as_f64().unwrap();
+        let alone = read_json(&at.join("alone.json"))["result"].clone();
+        assert!(first(&rows[2]) < first(&alone), "{rows:?}");
+    }
+    // The level that is not reached ends the path.
+    let called = mms(at, "run skew-2d --static --cells 6 --along A=0.1,2,0.2 --json path.json");
+    assert_eq!(called.status, 1, "{}", called.stdout);
+    assert!(called.stdout.contains("NOT REACHED"), "{}", called.stdout);
+    assert_eq!(read_json(&at.join("path.json"))["rows"].as_array().unwrap().len(), 2);
+    for (call, words) in [
+        ("thick-cylinder --static --cells 4 --along Ri=0.5,0.6", &["Ri = 0.6", "one body"][..]),
+        ("skew-2d --static --along B=1,2", &["--along B=1"]),
+        ("skew-2d --static --along A=1,x", &["'x' is not a number"]),
+        ("skew-2d --along A=0.1,0.2", &["--along", "add --static"]),
+        ("skew-2d --static --moment 0.1 --along moment=0.1,0.2", &["leave --moment out"]),
+    ] {
+        refuses(at, &format!("run {call}"), words);
+    }
+}
