@@ -278,7 +278,15 @@ fn load_levels_follow_each_other_to_the_states_of_single_runs() {
         assert!(first(&rows[2]) < first(&alone), "{rows:?}");
     }
     // The level that is not reached ends the path.
-    let called = mms(at, "run skew-2d --static --cells 6 --along A=0.1,2,0.2 --json path.json");
+    let bar = "shape = 'box'\nlower = [0]\nupper = [1]";
+    let sides = [
+        ("X-lower", "condition = 'prescribed-motion'"),
+        ("X-upper", "condition = 'prescribed-traction'"),
+    ];
+    let motion = ["X = '-A*X - 0.02*X^2'"];
+    let text = stated(("cartesian", 1), &motion, "neo-hookean", bar, &sides);
+    std::fs::write(at.join("made.toml"), text).unwrap();
+    let called = mms(at, "run made.toml --static --cells 6 --along A=0.1,1.2,0.2 --json path.json");
     assert_eq!(called.status, 1, "{}", called.stdout);
     assert!(called.stdout.contains("NOT REACHED"), "{}", called.stdout);
     assert_eq!(read_json(&at.join("path.json"))["rows"].as_array().unwrap().len(), 2);

@@ -72,7 +72,7 @@ pub(super) fn path(name: &str, levels: &[Level], rows: &[StaticRow]) -> Report {
     let header = [name.to_owned()]
         .into_iter()
         .chain(["u", "F", "P"].map(|field| format!("l2 of {}", named(field, units))));
-    let ends = ["steps", "residuals", "exponent", "status"].map(str::to_owned);
+    let ends = ["steps", "Newton", "status"].map(str::to_owned);
     let mut table = Table::new(0, header.chain(ends));
     let mut notes = rows.first().map(held).unwrap_or_default();
     for (Level { value, problem }, row) in levels.iter().zip(rows) {
@@ -81,14 +81,12 @@ pub(super) fn path(name: &str, levels: &[Level], rows: &[StaticRow]) -> Report {
             let norms = errors.and_then(|errors| errors.get(field));
             norms.map_or_else(|| "-".to_owned(), |norms| table::error(norms.l2))
         };
-        let residuals = row.load_steps.iter().map(|step| step.residuals.len()).sum::<usize>();
         table.row([
             number::rounded(*value, 6),
             of("u"),
             of("F"),
             of("P"),
             row.load_steps.len().to_string(),
-            residuals.to_string(),
             exponent(row.exponent()),
             if row.stopped.is_none() { "ok".into() } else { "NOT REACHED".into() },
         ]);
