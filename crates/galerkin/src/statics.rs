@@ -319,6 +319,8 @@ struct Statics<const D: usize> {
     density: f64,
     numbering: Numbering<D>,
     pattern: Pattern,
+    /// Coefficients of the displacement before the load.
+    start_u: [Vec<f64>; D],
     /// The load at its beginning, and the whole one.
     start: OfLoad<D>,
     whole: OfLoad<D>,
@@ -364,6 +366,7 @@ impl<const D: usize> Statics<D> {
             given: components.each_ref().map(coefficients),
         };
         Ok(Self {
+            start_u: components.each_ref().map(coefficients),
             start: none.clone(),
             whole: none,
             F: vec![SMatrix::identity(); count],
@@ -387,21 +390,21 @@ impl<const D: usize> Statics<D> {
 
     /// Takes the place of an equilibrium, or of the undeformed body.
     fn begin(&mut self, from: Option<&Reached>) -> Result<(), StaticsError> {
-        let Self { components, start, .. } = self;
+        let Self { components, start, start_u: u, .. } = self;
         let OfLoad { forces, given } = start;
         let Some(from) = from else {
             components.iter_mut().for_each(|component| component.u.fill(0.0));
-            forces.iter_mut().chain(given).for_each(|values| values.fill(0.0));
+            forces.iter_mut().chain(given).chain(u).for_each(|values| values.fill(0.0));
             return Ok(());
         };
-        let own = components.iter_mut().map(|component| &mut component.u);
-        let own: Vec<&mut Vec<f64>> = own.chain(forces).chain(given).collect();
+        let own: Vec<&mut Vec<f64>> = u.iter_mut().chain(forces).chain(given).collect();
         let other: Vec<&Vec<f64>> = from.u.iter().chain(&from.forces).chain(&from.given).collect();
         let lengths = other.iter().map(|values| values.len());
         if !own.iter().map(|values| values.len()).eq(lengths) {
             return Err(StaticsError::OtherGrid);
         }
         own.into_iter().zip(other).for_each(|(own, other)| own.clone_from(other));
+        components.iter_mut().zip(&self.start_u).for_each(|(own, u)| own.u.clone_from(u));
         Ok(())
     }
 

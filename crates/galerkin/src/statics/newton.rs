@@ -211,18 +211,20 @@ where
         all
     }
 
-    /// The size of all that is rounded in the residual: its terms, and the displacements times the stiffness.
+    /// The size of all that is rounded in the residual: its terms, and the displacements times the stiffness. What is left of a load that is
+    /// taken back has the rounding of that load.
     fn magnitude(&self, stiffness: &Stiffness, factor: f64) -> f64 {
         let mut u = vec![0.0; self.numbering.count];
-        for (unknown, component) in self.numbering.unknown.iter().zip(&self.components) {
-            for (unknown, value) in unknown.iter().zip(&component.u) {
+        for (c, unknown) in self.numbering.unknown.iter().enumerate() {
+            let both = self.components[c].u.iter().zip(&self.start_u[c]);
+            for (unknown, (value, start)) in unknown.iter().zip(both) {
                 if let Some(unknown) = unknown {
-                    u[*unknown] = *value;
+                    u[*unknown] = value.abs() + start.abs();
                 }
             }
         }
         let of_displacements = norm(&self.pattern.magnitudes(&stiffness.values, &u));
-        let of_forces = (1.0 - factor) * norm(&self.unknowns_of(&self.start.forces))
+        let of_forces = norm(&self.unknowns_of(&self.start.forces))
             + factor * norm(&self.unknowns_of(&self.whole.forces));
         stiffness.magnitude + of_displacements + of_forces
     }
