@@ -254,7 +254,7 @@ fn load_levels_follow_each_other_to_the_states_of_single_runs() {
     let l2 = |row: &serde_json::Value, field: &str| row["errors"][field]["l2"].as_f64().unwrap();
     for (line, name, single, values) in [
         ("skew-2d --cells 6", "A", "--set A=", ["0.02", "0.06", "0.1"]),
-        ("thick-cylinder --cells 4", "moment", "--moment ", ["0.05", "0.15", "0.25"]),
+        ("thick-cylinder --cells 4", "moment", "--moment ", ["0.3", "0.35", "0.4"]),
     ] {
         let along = format!("--along {name}={}", values.join(","));
         let called = mms(at, &format!("run {line} --static {along} --json path.json"));
@@ -277,6 +277,9 @@ fn load_levels_follow_each_other_to_the_states_of_single_runs() {
         let alone = read_json(&at.join("alone.json"))["result"].clone();
         assert!(first(&rows[2]) < first(&alone), "{rows:?}");
     }
+    // The body is at rest in the second one.
+    let called = mms(at, "run thick-cylinder --cells 4 --static --along moment=0.05,0.25");
+    assert_eq!(called.status, 0, "{}{}", called.stdout, called.stderr);
     // The level that is not reached ends the path.
     let bar = "shape = 'box'\nlower = [0]\nupper = [1]";
     let sides = [
