@@ -296,7 +296,7 @@ fn load_levels_follow_each_other_to_the_states_of_single_runs() {
     for (call, words) in [
         ("thick-cylinder --static --cells 4 --along Ri=0.5,0.6", &["Ri = 0.6", "one body"][..]),
         ("skew-2d --static --along B=1,2", &["--along B=1"]),
-        ("skew-2d --static --along A=1,x", &["'x' is not a number"]),
+        ("skew-2d --static --along A=0.1,x", &["'x' is not a number"]),
         ("skew-2d --along A=0.1,0.2", &["--along", "add --static"]),
         ("skew-2d --static --moment 0.1 --along moment=0.1,0.2", &["leave --moment out"]),
     ] {
