@@ -246,7 +246,7 @@ class Perzyna(Flow):
         return (over / 200) ** 3 / mpfr(0.02)
 
     def after(self, X, t, steps):
-        length, at, z, flows = self.period / steps, ZERO, self.start(X), False
+        length, at, z, flows, began = self.period / steps, ZERO, self.start(X), False, False
         f = lambda t, z: self.beyond(self.kinematics(X, t)[0], z)
         rate = lambda t, z: self.rate(X, t, z)
         while at < t:
@@ -256,14 +256,16 @@ class Perzyna(Flow):
             to = min(at + length / parts, t)
             new = step(rate, at, z, to - at) if flows else z
             if (f(to, new) < 0) == flows:
-                # Where the particle begins or stops.
-                low = at + (to - at) / 64 if flows else at
+                # Where the particle begins or stops; the place where it has just begun is no end.
+                low = at + (to - at) / 64 if began else at
                 of = lambda s: f(s, step(rate, at, z, s - at) if flows else z)
                 if (of(low) > 0) == flows:
                     to = root(of, low, to)
                     new = step(rate, at, z, to - at) if flows else z
-                    flows = not flows
-            z, at = new, to
+                    flows = began = not flows
+                    z, at = new, to
+                    continue
+            z, at, began = new, to, False
         return z
 
 
