@@ -102,6 +102,7 @@ def run(
     dynamic: bool = False,
     load_steps: int | None = None,
     moment: float | None = None,
+    along: Mapping[str, Iterable[float | str]] | None = None,
     vtk: str | os.PathLike[str] | None = None,
     frames: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -205,6 +206,8 @@ def run(
         load_steps: Load steps of equal length; one that Newton's method does not take is halved. Default: 1.
         moment: Moment of the motion that is held, in periods of the solution. Default: 0.25, or another one where the body passes through
             rest then.
+        along: Load levels of an equilibrium, one after the other: values of a parameter, or of moment, as NAME=VALUE,VALUE,...; each begins
+            at the equilibrium of the one before, the first one at rest.
         vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium.
         frames: Number of particle files, spread evenly from the first state to the last. Default: 20.
         checkpoint: Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one.
