@@ -369,6 +369,16 @@ fn recordings_compared_with_each_other_have_the_orders_in_time_of_converge() {
     }
     let order = |scored: &Value| scored["orders"]["u"]["l2"]["local"][0].as_f64().unwrap();
     assert!((order(&scored) - order(&study)).abs() < 1e-9);
+    // Neither the other order of files nor a file twice has an order in time.
+    for (files, said) in [
+        ("of0.1 of0.2 of0.4", "stand in another order than the steps"),
+        ("of0.4 of0.4 of0.2", "equal to the last bit"),
+    ] {
+        let called = mms(place, &format!("score axis-aligned-1d {files} --differences 4,2,1"));
+        assert_eq!(called.status, 1, "{files}: {}", called.stdout);
+        let is_told = called.stdout.contains("PROBLEM") && called.stdout.contains(said);
+        assert!(is_told, "{files}: {}", called.stdout);
+    }
     refuses(place, &format!("{compared} 4,2,1.5"), &["another ratio than 2.0"]);
     refuses(place, &format!("{compared} 4,2"), &["2 time step(s) for 3 recording(s)"]);
     refuses(place, "score axis-aligned-1d of0.4 f --differences 2,1", &["f"]);

@@ -79,13 +79,42 @@ pub fn compare_recordings(
             return Err(ScoreError::Ratio { coarse: pair[0], fine: pair[1], ratio });
         }
     }
-    let rows = in_dimension!(
+    let mut rows = in_dimension!(
         exact,
         |exact| compare_all(exact, inputs, steps, options),
         else Err(ScoreError::Dimension)
     )?;
     let values = rows.iter().map(|row| (row.dt, (row.status == "ok").then_some(&row.differences)));
-    Ok(Differences { orders: orders(&values.collect::<Vec<_>>()), rows })
+    let orders = orders(&values.collect::<Vec<_>>());
+    judge_growth(&mut rows);
+    Ok(Differences { orders, rows })
+}
+
+/// Says of the last row that differences grow where those of an order in time fall.
+fn judge_growth(rows: &mut [DifferenceRow]) {
+    /// Differences that rounding alone leaves do not grow by so much.
+    const CLEAR: f64 = 1.5;
+    let of =
+        |row: &DifferenceRow| row.differences.get(&Quantity::Displacement).map(|norms| norms.l2);
+    let [first, .., last] = rows else { return };
+    if let (Some(before), Some(after)) = (of(first), of(last))
+        && after > CLEAR * before
+    {
+        let message = format!(
+            "the difference of u grows from {before:.3e} to {after:.3e} (l2) as the step falls from {} to {}: the recordings stand in another order \
+             than the steps of --differences, whose largest comes first, or the solver does not converge in time",
+            first.dt, last.dt
+        );
+        last.findings.push(Remark {
+            kind: "grows",
+            is_problem: true,
+            count: 1,
+            frames: 0,
+            message,
+        });
+        last.findings.sort_by_key(|finding| !finding.is_problem);
+        last.status = status(&last.findings);
+    }
 }
 
 fn compare_all<const D: usize>(
@@ -150,6 +179,15 @@ fn compare<const D: usize>(
             path: one.path().to_owned(),
             other: other.path().to_owned(),
         });
+    }
+    let is_same = |norms: &PerNorm<f64>| norms.linf == 0.0;
+    if differences.values().all(is_same) {
+        let what = format!(
+            "every field is equal to the last bit in {}, at {frames} time(s): both are of one run, the step has no effect, or the start alone is \
+             compared; no order in time shows",
+            other.path().display()
+        );
+        remarks.note("equal", true, what);
     }
     let left_out = coarse.found.timed.len() - frames;
     if left_out > 0 {
