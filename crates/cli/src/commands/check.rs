@@ -358,6 +358,10 @@ fn places(report: &CheckReport, parameters: &[BTreeMap<String, f64>]) -> String 
             places += "    there is no real F_zz here: no stretch across leaves no stress there, with these parameters and this motion; narrower \
                        ranges of the parameters keep away from it\n";
         }
+        if finding.what == "W" && finding.difference.is_nan() {
+            places += "    the strain energy has no value here: the deformation lies beyond the limit of the law, as where I1bar - 3 reaches Jm of Gent's, \
+                       and numbers that formulas of P and b have there mean nothing; smaller amplitudes keep away from it\n";
+        }
     }
     places
 }
