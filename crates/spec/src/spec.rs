@@ -392,7 +392,44 @@ const TAKEN_WORDS: &[&str] = &[
     "usize",
 ];
 
+/// Parameters that laws and densities take by their names where the file does not say otherwise.
+const TAKEN_BY_NAME: [&str; 6] = ["E", "nu", "lambda", "mu", "kappa", "rho0"];
+
+/// Adds the names in the texts of a value.
+fn add_names(value: &toml::Value, names: &mut BTreeSet<String>) {
+    match value {
+        toml::Value::String(text) => {
+            let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+            names.extend(words.map(str::to_owned));
+        }
+        toml::Value::Array(all) => all.iter().for_each(|value| add_names(value, names)),
+        toml::Value::Table(all) => all.values().for_each(|value| add_names(value, names)),
+        _ => {}
+    }
+}
+
 impl Spec {
+    /// Parameters that no formula, condition or bound of the file names: their values change nothing.
+    #[must_use]
+    pub fn unused_parameters(&self) -> Vec<&str> {
+        let Ok(mut table) = self.source.parse::<toml::Table>() else { return Vec::new() };
+        for words in ["name", "title", "reference"] {
+            table.remove(words);
+        }
+        if let Some(toml::Value::Table(parameters)) = table.get_mut("parameters") {
+            for (_, of_one) in parameters.iter_mut() {
+                if let toml::Value::Table(of_one) = of_one {
+                    of_one.remove("unit");
+                    of_one.remove("description");
+                }
+            }
+        }
+        let mut names = BTreeSet::new();
+        table.values().for_each(|value| add_names(value, &mut names));
+        let own = self.parameters.iter().map(|parameter| parameter.name.as_str());
+        own.filter(|own| !names.contains(*own) && !TAKEN_BY_NAME.contains(own)).collect()
+    }
+
     /// Forms displacements that vanish with a parameter, as `X*(cos(A*t) - 1)` does with `A`, from what is small with it: the
     /// difference of two large terms is left to no rounding.
     fn form_from_amplitude(&mut self) {

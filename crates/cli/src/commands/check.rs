@@ -92,7 +92,8 @@ pub(crate) fn check(options: &CheckOptions) -> Result<bool> {
             _ => String::new(),
         };
         terminal::say(&format!(
-            "{findings}{history_told}{}{}{}\n",
+            "{findings}{}{history_told}{}{}{}\n",
+            unused(spec),
             told.unwrap_or_default(),
             motion.as_ref().map(|motion| motion.text("  ")).unwrap_or_default(),
             blind::text(&blind)
@@ -308,6 +309,18 @@ fn text(
         };
     }
     text + &claims.text()
+}
+
+/// A remark on parameters without an effect.
+fn unused(spec: &Spec) -> String {
+    let names = spec.unused_parameters();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!(
+        "  remark: no formula names {}, so that values there change nothing: write it into a formula, or leave it out of [parameters]\n",
+        names.join(", ")
+    )
 }
 
 /// A place as specifications and tables of points have it.

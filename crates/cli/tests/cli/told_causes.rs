@@ -22,6 +22,8 @@ fn checks_and_advice_fit_the_specification() {
             "with a motion that goes on in one direction they are",
             "with hardening sy + K*alpha^(1/3)",
         ),
+        ("fibres", "", 0, "fibres: passed", "no formula names"),
+        ("stretched-out", "", 1, "no formula names spare, so that", "names A"),
         ("stretched-out", "", 1, "the strain energy has no value here", "F_zz"),
         ("no-stretch-across", "", 1, "there is no real F_zz here", "nothing of the kind"),
     ] {
