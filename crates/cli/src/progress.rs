@@ -1,11 +1,15 @@
 //! A progress bar for long work, on standard error, and only where a person sees it; or reports to a program that called for the work.
 
 use std::cell::{Cell, RefCell};
+use std::fmt;
 use std::io::{IsTerminal, stderr};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
+use indicatif::{
+    HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,
+};
+use mmsmith_interpret::histories_followed;
 use mmsmith_verify::Progress;
 
 use crate::terminal;
@@ -137,9 +141,14 @@ impl Bar {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         if let Ok(style) =
-            ProgressStyle::with_template("{wide_msg} [{bar:20}] {percent:>3}%, {prefix}")
+            ProgressStyle::with_template("{wide_msg}{histories} [{bar:20}] {percent:>3}%, {prefix}")
         {
-            bar.set_style(style.progress_chars("=> "));
+            let before = histories_followed();
+            let told = move |_: &ProgressState, text: &mut dyn fmt::Write| {
+                // What cannot be shown is left out.
+                let _ = text.write_str(&histories(histories_followed() - before));
+            };
+            bar.set_style(style.progress_chars("=> ").with_key("histories", told));
         }
         let watch = WATCH.with_borrow(Option::clone);
         let line = Line { bar, watch, begun: Instant::now(), predicted_s, first: OnceLock::new() };
@@ -201,6 +210,11 @@ impl Bar {
         line.bar.set_message(what());
         line.bar.set_position((share * LENGTH as f64) as u64);
     }
+}
+
+/// How many histories of particles were followed meanwhile, which bodies with memory need before they move; nothing of none.
+fn histories(followed: u64) -> String {
+    if followed == 0 { String::new() } else { format!(", {followed} histories of particles") }
 }
 
 impl Drop for Line {
@@ -265,6 +279,12 @@ mod tests {
 
     fn seconds(elapsed_s: u64, predicted_s: Option<f64>, share: f64) -> Option<f64> {
         left(Duration::from_secs(elapsed_s), predicted_s, share).map(|left| left.as_secs_f64())
+    }
+
+    #[test]
+    fn histories_are_told_where_there_are_any() {
+        assert_eq!(histories(0), "");
+        assert_eq!(histories(576), ", 576 histories of particles");
     }
 
     #[test]

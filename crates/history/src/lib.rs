@@ -39,4 +39,4 @@ pub use number::{Dual, Number};
 pub use stated::{StatedHistory, StatedHistoryError};
 pub use table::{AtPoint, AtTime, Grid, Series, Table, place};
 pub use tensor::{ENTRIES, Tensor, determinant, identity};
-pub use trajectory::{Change, HistoryError, Trajectory, divergence};
+pub use trajectory::{Change, HistoryError, Trajectory, divergence, followed};

@@ -1,6 +1,7 @@
 //! The history of one particle along an exact motion.
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use mmsmith_vocabulary::Smoothness;
 use thiserror::Error;
@@ -11,6 +12,15 @@ use crate::motion::Motion;
 use crate::number::{Dual, Number};
 use crate::sampled::Sampled;
 use crate::tensor::{Tensor, tensor};
+
+/// Histories that this process has followed.
+static FOLLOWED: AtomicU64 = AtomicU64::new(0);
+
+/// How many histories of particles this process has followed, for those who wait for a table of them.
+#[must_use]
+pub fn followed() -> u64 {
+    FOLLOWED.load(Ordering::Relaxed)
+}
 
 /// Why a history could not be followed.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -592,6 +602,7 @@ impl<const K: usize> Trajectory<K> {
         if law.variables().is_empty() && !law.has_branches() {
             return Ok(Self { states: vec![Vec::new(); times.len()], ..Self::empty() });
         }
+        FOLLOWED.fetch_add(1, Ordering::Relaxed);
         let sampled = Sampled::new(motion, before);
         let along = Along::new(law, &sampled);
         let z = law.initial(&along.steady, &motion.frame());

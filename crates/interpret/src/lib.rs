@@ -12,6 +12,7 @@ mod staged;
 mod table_file;
 
 pub use arrays::{Arrays, ArraysAtPoints, Quantity};
+pub use mmsmith_history::followed as histories_followed;
 pub use table_file::{FieldShape, Over, TableFile, TableFileError, TabulatedField};
 
 use history::{Chart, Histories, HistoryProblem, Moment, Prepared, Quantities};
