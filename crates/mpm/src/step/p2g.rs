@@ -272,7 +272,9 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
     ) {
         let &Self { c, domain, buffers: pool, is_affine, reads_grid, x, F } = self;
         let in_band = c.in_band(&band);
-        let set_first = reads_grid && band.strides != c.strides;
+        // In a window the nodes have other numbers, which its strides need not show: a body may be wide along one axis alone.
+        let is_window = band.strides != c.strides || band.nodes_before != c.nodes_before;
+        let set_first = reads_grid && is_window;
         let mut copies = Copies::new();
         let mut buffers = pool.take(domain, is_affine);
         for ids in ids.chunks(BLOCK) {

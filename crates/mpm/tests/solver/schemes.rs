@@ -2,7 +2,7 @@
 
 use mmsmith_mpm::{
     Annulus, Body, BodyForce, Grid, Integrator, Material, Mesh, NoBodyForce, Particles, Scalar,
-    Settings, SetupError, Shape, Simulation, StepError, Transfer,
+    Settings, SetupError, Shape, Simulated, Simulation, StepError, Transfer,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
@@ -536,30 +536,44 @@ fn a_turned_body_moves_as_the_body_does_turned() {
 /// `I - (I - P)^m` for XPIC(m).
 #[test]
 fn xpic_is_the_power_of_pic_that_it_is_named_after() {
-    let grid = open_grid::<2>(6);
-    let feather = Material::NeoHookean { lambda: 0.0, mu: 1e-200 };
-    let body = block(&grid);
-    let after = |v: &[Vector2<f64>], transfer: Transfer| {
-        let mut body = body.clone();
-        body.particles.v = v.to_vec();
-        let settings = settings(Shape::Gimp, Integrator::Usl, transfer);
-        let mut simulation = Simulation::new(grid.clone(), body, feather, settings).unwrap();
-        simulation.step(&NoBodyForce).unwrap();
-        simulation.particles().v.clone()
-    };
-    let v = &body.particles.v;
-    let mut rest = v.clone();
-    for m in 1..=5 {
-        // (I - P)^m v
-        let filtered = after(&rest, Transfer::Pic);
-        rest.iter_mut().zip(&filtered).for_each(|(rest, filtered)| *rest -= filtered);
-        let found = after(v, Transfer::Xpic(m));
-        for ((found, v), rest) in found.iter().zip(v).zip(&rest) {
-            assert!((found - (v - rest)).norm() < 1e-13, "{m}");
+    fn check<const D: usize>(cells: [usize; D])
+    where
+        f64: Simulated<D>,
+    {
+        let grid =
+            Grid { lower: SVector::zeros(), spacing: 1.0 / 6.0, cells, walls: [[false; 2]; D] };
+        let feather = Material::NeoHookean { lambda: 0.0, mu: 1e-200 };
+        let upper = grid.upper();
+        let inside = |X: &SVector<f64, D>| (0..D).all(|a| 0.2 < X[a] && X[a] < upper[a] - 0.2);
+        let body = disturb(Body::lattice(&grid, 2, 2.0, inside), grid.spacing);
+        let after = |v: &[SVector<f64, D>], transfer: Transfer| {
+            let mut body = body.clone();
+            body.particles.v = v.to_vec();
+            let settings = settings(Shape::Gimp, Integrator::Usl, transfer);
+            let mut simulation = Simulation::new(grid.clone(), body, feather, settings).unwrap();
+            simulation.step(&NoBodyForce).unwrap();
+            simulation.particles().v.clone()
+        };
+        let v = &body.particles.v;
+        let mut rest = v.clone();
+        for m in 1..=5 {
+            // (I - P)^m v
+            let filtered = after(&rest, Transfer::Pic);
+            rest.iter_mut().zip(&filtered).for_each(|(rest, filtered)| *rest -= filtered);
+            let found = after(v, Transfer::Xpic(m));
+            for ((found, v), rest) in found.iter().zip(v).zip(&rest) {
+                assert!((found - (v - rest)).norm() < 1e-13, "{cells:?}, {m}");
+            }
         }
+        let kept = after(v, Transfer::Flip);
+        assert!(kept.iter().zip(v).all(|(kept, v)| (kept - v).norm() < 1e-15));
     }
-    let kept = after(v, Transfer::Flip);
-    assert!(kept.iter().zip(v).all(|(kept, v)| (kept - v).norm() < 1e-15));
+    check([6]);
+    check([6, 6]);
+    check([4, 4, 4]);
+    // Several tiles, one after the other along one axis, and along two.
+    check([4, 4, 24]);
+    check([4, 9, 24]);
 }
 
 #[test]
