@@ -226,7 +226,7 @@ fn at_rest<T: RealField + Copy, const D: usize>(
         half_size: SVector::repeat(real(0.5 * spacing)),
         ..Particles::default()
     };
-    Body { particles, half_edges: Vec::new(), mesh: Some(mesh) }
+    Body { half_edges: Vec::new(), mesh: Some(mesh), ..particles.into() }
 }
 
 /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,

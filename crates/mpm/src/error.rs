@@ -295,6 +295,15 @@ pub enum SetupError {
         /// The first particle of this kind.
         particle: usize,
     },
+    /// A shape or a grid that serves no body that turns about its axis.
+    #[error(
+        "particles of a body that turns about its axis have the shape linear, ugimp, gimp, bspline2, bspline3 or gimp-bspline2, on a grid with one cell \
+         around the axis, not {shape}: write --shape gimp"
+    )]
+    Revolving {
+        /// Name of the shape.
+        shape: String,
+    },
     /// Mesh or polyhedra on a line.
     #[error("polygons and polyhedra have two or three dimensions; this body has {dimension}")]
     PolygonDimension {

@@ -15,7 +15,7 @@ use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::grid::state::GridState;
 use crate::grid::tiles::Tiles;
-use crate::grid::{Grid, Layout};
+use crate::grid::{Grid, Layout, Sides};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
 use crate::kernel::half_plane;
@@ -90,6 +90,10 @@ pub(crate) fn check<T: Lanes, const D: usize>(
         return Err(SetupError::HalvedStart { integrator: settings.integrator.to_string() });
     }
     check_particles(body, share)?;
+    let is_product = !matches!(settings.shape, Shape::Cpdi | Shape::Cpdi2);
+    if body.revolves && !(is_product && D == 3 && grid.cells.get(1) == Some(&1)) {
+        return Err(SetupError::Revolving { shape: settings.shape.to_string() });
+    }
     check_domains(body, settings.shape)?;
     check_mesh(grid, body, settings.shape, share)
 }
@@ -192,15 +196,21 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     share: Option<Share>,
 ) -> Result<State<T, D>, SetupError> {
     let Settings { shape, integrator, transfer, .. } = *settings;
-    let Body { mut particles, half_edges, mesh } = body;
+    let Body { mut particles, half_edges, mesh, revolves, sticks } = body;
     let count = particles.x.len();
-    let domain = domain::new(shape, half_edges, &particles.half_size, grid.spacing);
+    let domain = match revolves {
+        true => domain::revolving(shape, &particles.half_size, grid.spacing)?,
+        false => domain::new(shape, half_edges, &particles.half_size, grid.spacing),
+    };
     let corners = mesh.and_then(|mesh| {
         let at_corner = domain::at_corners(shape, &mesh)?;
         Some(SharedCorners::new(mesh, at_corner))
     });
     let shares = fill(&mut particles, &*law, transfer.is_affine())?;
     let projects = law.is_projected();
+    if revolves && projects {
+        return Err(SetupError::ProjectedHalfPlane);
+    }
     let fused = is_fused(integrator, transfer) && !projects;
     let filtered = transfer.is_filtered();
     let reprojects = integrator.reprojects() || filtered;
@@ -209,7 +219,8 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let grids = 1 + usize::from(reprojects) + usize::from(ahead) + usize::from(projects);
     let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
     let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
-    let mut layout = Layout::new(grid, bytes_per_node)?;
+    let sides = Sides { around: revolves.then_some(1), sticks };
+    let mut layout = Layout::with_sides(grid, &sides, bytes_per_node)?;
     let points = corners.as_ref().map_or(count, SharedCorners::count);
     let most_nodes = match &corners {
         Some(corners) => Domain::<T, D>::most_nodes(&corners.at_corner),

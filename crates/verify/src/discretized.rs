@@ -8,7 +8,7 @@ use mmsmith_runtime::{AnySolution, Solution};
 
 use crate::case::{Arithmetic, Case};
 use crate::dimension::in_arithmetic;
-use crate::error::{CaseError, SceneError, StudyError};
+use crate::error::{CaseError, StudyError};
 use crate::half_plane::{self, HalfPlane};
 use crate::observe::{self, Limits, Observed, Scales};
 use crate::on_grid::{OnGrid, Plan};
@@ -40,10 +40,8 @@ impl<'a> Discretized<'a> {
     ) -> Result<Self, CaseError> {
         if let (AnySolution::Three(exact_in_space), true) = (exact, case.scheme.updated().is_some())
             && let Some(own) = HalfPlane::new(exact_in_space.as_ref())
+            && !half_plane::turns_about_axis(exact)
         {
-            if let Some(why) = half_plane::needs_space(exact) {
-                return Err(SceneError::OfRevolution { why }.into());
-            }
             let (plan, floors, on_grid): (_, _, Box<dyn Simulate + 'a>) = match arithmetic {
                 Arithmetic::Double => InHalfPlane::judged(own, exact_in_space.as_ref(), case)?,
                 Arithmetic::Single(AnySolution::Three(model)) => {

@@ -22,8 +22,8 @@ pub(crate) struct HalfPlane<'a, T: Real> {
 }
 
 impl<'a, T: Real> HalfPlane<'a, T> {
-    /// `None` of a solution that is not axisymmetric. Whether it turns about the axis, for which a half plane has no component, is for
-    /// [`needs_space`] to tell.
+    /// `None` of a solution that is not axisymmetric. Whether it turns about the axis, for which this half plane has no component, is for
+    /// [`turns_about_axis`] to tell.
     pub(crate) fn new(space: &'a dyn Solution<T, 3>) -> Option<Self> {
         let Domain::Tube { inner, outer, lower, upper, around: Around::Axisymmetric } =
             space.domain()
@@ -47,14 +47,19 @@ impl<'a, T: Real> HalfPlane<'a, T> {
     }
 }
 
-/// Whether the motion of an axisymmetric solution turns about the axis, as far as a few places show.
-fn turns(space: &dyn Solution<f64, 3>) -> bool {
+/// Whether a solution is axisymmetric and its motion turns about the axis, as far as a few places show.
+#[must_use]
+pub fn turns_about_axis(exact: &AnySolution<f64>) -> bool {
+    let AnySolution::Three(space) = exact else { return false };
     let domain = space.domain();
-    (0..16).filter_map(|n| crate::points::interior(&domain, space.period(), n)).any(|(X, t)| {
-        let X = SVector::from([X[0].hypot(X[1]), 0.0, X[2]]);
-        let u = space.displacement(&X, t);
-        u[1].abs() > 1e-12 * u.norm()
-    })
+    is_axisymmetric(exact)
+        && (0..16).filter_map(|n| crate::points::interior(&domain, space.period(), n)).any(
+            |(X, t)| {
+                let X = SVector::from([X[0].hypot(X[1]), 0.0, X[2]]);
+                let u = space.displacement(&X, t);
+                u[1].abs() > 1e-12 * u.norm()
+            },
+        )
 }
 
 /// Why a body of revolution has no half plane that the updated Lagrangian formulation could run it in, in words; `None` where it has one, and
@@ -62,16 +67,12 @@ fn turns(space: &dyn Solution<f64, 3>) -> bool {
 #[must_use]
 pub fn needs_space(exact: &AnySolution<f64>) -> Option<&'static str> {
     let AnySolution::Three(space) = exact else { return None };
-    match space.domain() {
-        Domain::Tube { around: Around::Axisymmetric, .. } => turns(space.as_ref()).then_some(
-            "the body turns about its axis, and the updated formulation has the radius and the height alone",
-        ),
-        Domain::Tube { .. } => Some(
-            "the updated formulation runs a body of revolution in its half plane, and this one is not axisymmetric",
-        ),
-        _ => None,
-    }
+    let is_tube = matches!(space.domain(), Domain::Tube { .. });
+    (is_tube && !is_axisymmetric(exact)).then_some(NOT_AXISYMMETRIC)
 }
+
+/// Why the updated Lagrangian formulation does not run other bodies of revolution.
+pub(crate) const NOT_AXISYMMETRIC: &str = "the updated formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
 
 /// Whether nothing of a solution depends on the angle about the axis Z.
 #[must_use]

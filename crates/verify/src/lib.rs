@@ -99,7 +99,7 @@ pub use growth::{
     A_DIGIT, Grown, Growth, GrowthError, GrowthSettings, Harm, MOST_GROWTH, WaveGrowth,
     extremes_of, growth, harmful_growth, lambda_over_mu,
 };
-pub use half_plane::{is_axisymmetric, needs_space};
+pub use half_plane::{is_axisymmetric, needs_space, turns_about_axis};
 pub use history::{MOST_MOMENTS, Moment, Sums, energy_drift};
 pub use interrupt::{allow, interrupt};
 pub use inversion::{Inversion, inversion};

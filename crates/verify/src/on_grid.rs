@@ -100,7 +100,7 @@ where
     /// How many threads a step keeps busy, of a body that fills its grid; in the updated formulation.
     pub(crate) fn division(&self) -> Option<Division> {
         let Self { scene, case, .. } = self;
-        case.scheme.updated()?;
+        case.scheme.updated().filter(|_| !scene.revolves)?;
         Division::of_lattice(&scene.grid::<f64>(), case.per_cell)
     }
 

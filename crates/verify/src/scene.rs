@@ -3,7 +3,7 @@
 use mmsmith_clip::Side;
 use mmsmith_mpm::Grid;
 use mmsmith_runtime::{
-    AnySolution, Boundary, ComponentCondition, Condition, Domain, Real, Solution, Surface,
+    AnySolution, Around, Boundary, ComponentCondition, Condition, Domain, Real, Solution, Surface,
 };
 use nalgebra::SVector;
 
@@ -11,9 +11,10 @@ use crate::body::{refuse_centre, undeclared_planes};
 use crate::case::{Case, Extent};
 use crate::dimension::in_dimension;
 use crate::error::SceneError;
+use crate::half_plane::NOT_AXISYMMETRIC;
 use crate::points;
 use crate::scheme::Placement;
-use crate::side_on_grid::SideOnGrid;
+use crate::side_on_grid::{Given, SideOnGrid};
 
 /// Free cells beyond the furthest place that a free surface reaches.
 const MARGIN_CELLS: f64 = 3.0;
@@ -98,12 +99,13 @@ fn with_room<const D: usize>(
     end: f64,
     (mut lower, mut cells, spacing): (SVector<f64, D>, [usize; D], f64),
     walls: &[[bool; 2]; D],
+    revolves: bool,
 ) -> (SVector<f64, D>, [usize; D]) {
     if walls.as_flattened().iter().all(|is_wall| *is_wall) {
         return (lower, cells);
     }
     let upper = SVector::from_fn(|a, _| lower[a] + cells[a] as f64 * spacing);
-    let (furthest, corner) = (extremes(solution, end, &lower, &upper), lower);
+    let (furthest, corner) = (extremes(solution, end, (&lower, &upper), revolves), lower);
     let spare = MARGIN_CELLS + (OVERSHOOT * (upper - lower).norm() / spacing).ceil();
     for a in 0..D {
         let beyond = [corner[a] - furthest[0][a], furthest[1][a] - upper[a]];
@@ -115,12 +117,35 @@ fn with_room<const D: usize>(
     (lower, cells)
 }
 
-/// The least and the largest coordinates that places on the surface of a box have until `end`.
+/// As [`with_room`] for the half plane of a body that turns about its axis, where the grid has one cell around it.
+fn around_axis<const D: usize>(
+    solution: &dyn Solution<f64, D>,
+    end: f64,
+    (lower, cells, spacing): (SVector<f64, D>, [usize; D], f64),
+    walls: &[[bool; 2]; D],
+) -> (SVector<f64, D>, [usize; D]) {
+    let inner = lower[0];
+    let mut closed = *walls;
+    closed[0][0] |= inner == 0.0;
+    closed[1 % D] = [true; 2];
+    let (mut lower, mut cells) = with_room(solution, end, (lower, cells, spacing), &closed, true);
+    if lower[0] < 0.0 {
+        // As far as the axis, on lines of the grid.
+        let most = (inner / spacing + 1e-9).floor();
+        cells[0] -= ((inner - lower[0]) / spacing - most).round() as usize;
+        lower[0] = inner - most * spacing;
+    }
+    cells[1 % D] = 1;
+    (lower, cells)
+}
+
+/// The least and the largest coordinates that places on the surface of a box have until `end`; radii and heights where the box is that of a
+/// half plane.
 fn extremes<const D: usize>(
     solution: &dyn Solution<f64, D>,
     end: f64,
-    lower: &SVector<f64, D>,
-    upper: &SVector<f64, D>,
+    (lower, upper): (&SVector<f64, D>, &SVector<f64, D>),
+    revolves: bool,
 ) -> [SVector<f64, D>; 2] {
     // Places along each axis, corners included.
     let count = [2_usize, 9, 5][D.clamp(1, 3) - 1];
@@ -130,11 +155,15 @@ fn extremes<const D: usize>(
         if !steps.iter().any(|step| [0, count - 1].contains(step)) {
             continue;
         }
-        let X = SVector::from_fn(|a, _| {
-            lower[a] + (upper[a] - lower[a]) * steps[a] as f64 / (count - 1) as f64
+        let X = SVector::from_fn(|a, _| match revolves && a == 1 {
+            true => 0.0,
+            false => lower[a] + (upper[a] - lower[a]) * steps[a] as f64 / (count - 1) as f64,
         });
         for t in moments(solution.period(), end) {
-            let x: SVector<f64, D> = X + solution.displacement(&X, t);
+            let mut x: SVector<f64, D> = X + solution.displacement(&X, t);
+            if revolves {
+                (x[0], x[1 % D]) = (x[0].hypot(x[1 % D]), 0.0);
+            }
             // What is not finite is found when the run begins.
             (least, largest) = (least.zip_map(&x, f64::min), largest.zip_map(&x, f64::max));
         }
@@ -155,6 +184,8 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) spacing: f64,
     pub(crate) cells: [usize; D],
     pub(crate) walls: [[bool; 2]; D],
+    /// Which of the walls hold the body in all directions.
+    pub(crate) sticks: [[bool; 2]; D],
     /// Conditions on the two sides along each axis of a box; for an annulus the first pair, on the inner and the outer rim.
     pub(crate) sides: [[Condition; 2]; D],
     /// Which of these sides are walls that mirror the motion, for splines that are continued by their mirror images.
@@ -166,6 +197,8 @@ pub(crate) struct Scene<const D: usize> {
     pub(crate) boundary: Vec<BoundaryPart<D>>,
     /// The largest extent of the body.
     pub(crate) size: f64,
+    /// Whether this is the half plane of a body that turns about its axis, in the updated formulation.
+    pub(crate) revolves: bool,
 }
 
 /// A part of the boundary.
@@ -207,19 +240,39 @@ impl<const D: usize> Scene<D> {
             let planes = planes.map(|plane| (plane, Condition::Symmetry));
             return Err(SceneError::Undeclared { surfaces: moved.chain(planes).collect() });
         }
-        if matches!(domain, Domain::Tube { .. }) && case.scheme.updated().is_some() {
-            let why = "the updated formulation runs a body of revolution in its half plane, and this one is not axisymmetric";
+        let revolves = matches!(domain, Domain::Tube { .. }) && case.scheme.updated().is_some();
+        if revolves && !matches!(domain, Domain::Tube { around: Around::Axisymmetric, .. }) {
+            return Err(SceneError::OfRevolution { why: NOT_AXISYMMETRIC });
+        }
+        let is_lattice = matches!(placement, Some(Placement::Lattice { .. }));
+        if revolves && !is_lattice {
+            let why = "the updated formulation runs a body that turns about its axis on a lattice alone: leave --layout out";
             return Err(SceneError::OfRevolution { why });
         }
-        let mut walls = [[false; 2]; D];
+        let (mut walls, mut sticks) = ([[false; 2]; D], [[false; 2]; D]);
         let mut sides = [[Condition::TractionFree; 2]; D];
         let mut on_grid = [[SideOnGrid::Free; 2]; D];
         for boundary @ &Boundary { surface, condition } in solution.boundaries() {
             let modelled = SideOnGrid::of(solution, boundary);
-            let is_wall = modelled.is_wall();
-            if modelled.is_loaded() && case.scheme.updated().is_some() && clipped.is_none() {
-                let instead = instead(&domain);
-                return Err(SceneError::Unmodelled { surface, condition, instead });
+            let mut is_wall = modelled.is_wall();
+            // A particle that turns leaves a curved wall along the tangent, so that sliding there is more than no motion across it.
+            let is_curved = matches!(surface, Surface::Inner | Surface::Outer);
+            let is_loaded = modelled.is_loaded() || (revolves && is_curved && is_wall);
+            if is_loaded && case.scheme.updated().is_some() && clipped.is_none() {
+                let held = match (Given::of(solution, boundary), surface) {
+                    (Given::Nothing, _) => None,
+                    (Given::Rest, Surface::Lower(axis)) => Some((axis, 0)),
+                    (Given::Rest, Surface::Upper(axis)) => Some((axis, 1)),
+                    (Given::Rest, Surface::Inner) if revolves => Some((0, 0)),
+                    (Given::Rest, Surface::Outer) if revolves => Some((0, 1)),
+                    _ => {
+                        let instead = instead(&domain);
+                        return Err(SceneError::Unmodelled { surface, condition, instead });
+                    }
+                };
+                if let Some((axis, end)) = held {
+                    (sticks[axis][end], is_wall) = (true, true);
+                }
             }
             match surface {
                 Surface::Lower(axis) if axis < D => {
@@ -232,6 +285,8 @@ impl<const D: usize> Scene<D> {
                 }
                 Surface::FirstAngle => sides[1 % D][0] = condition,
                 Surface::LastAngle => sides[1 % D][1] = condition,
+                Surface::Inner if revolves => walls[0][0] = sticks[0][0],
+                Surface::Outer if revolves => walls[0][1] = sticks[0][1],
                 surface if is_wall && case.scheme.updated().is_some() => {
                     return Err(SceneError::Unmodelled { surface, condition, instead: "" });
                 }
@@ -255,7 +310,7 @@ impl<const D: usize> Scene<D> {
             Domain::Box { lower, upper } => {
                 let fitted = fitted_cells(&(upper - lower), solution.cell_length(), case.cells)?;
                 match placement {
-                    Some(_) => with_room(solution, end, (*lower, fitted, spacing), &walls),
+                    Some(_) => with_room(solution, end, (*lower, fitted, spacing), &walls, false),
                     None => (*lower, fitted),
                 }
             }
@@ -268,6 +323,14 @@ impl<const D: usize> Scene<D> {
                 } else {
                     (SVector::repeat(-half * spacing), [(2.0 * half) as usize; D])
                 }
+            }
+            Domain::Tube { inner, outer, lower, upper, .. } if revolves => {
+                let width = outer - inner;
+                let sides = SVector::from_fn(|a, _| if a == 2 { upper - lower } else { width });
+                let cells = fitted_cells(&sides, solution.cell_length(), case.cells)?;
+                let corner = [*inner, 0.0, *lower];
+                let corner = SVector::from_fn(|a, _| corner[a]);
+                around_axis(solution, end, (corner, cells, spacing), &walls)
             }
             Domain::Tube { inner, outer, lower, upper, .. } => {
                 // How many lie around the axis is for the grid to say.
@@ -283,7 +346,20 @@ impl<const D: usize> Scene<D> {
             Some(_) => [[false; 2]; D],
             None => mirrors(solution, &sides),
         };
-        Ok(Self { lower, spacing, cells, walls, sides, mirrors, domain, turn, boundary, size })
+        Ok(Self {
+            lower,
+            spacing,
+            cells,
+            walls,
+            sticks,
+            sides,
+            mirrors,
+            domain,
+            turn,
+            boundary,
+            size,
+            revolves,
+        })
     }
 
     /// As [`new`](Self::new) for particles that are clipped with the boundary: sides need not lie on lines of the grid.
@@ -359,7 +435,20 @@ impl<const D: usize> Scene<D> {
             _ => return Err(unknown()),
         };
         let mirrors = [[false; 2]; D];
-        Ok(Self { lower, spacing, cells, walls, sides, mirrors, domain, turn, boundary, size })
+        Ok(Self {
+            lower,
+            spacing,
+            cells,
+            walls,
+            sticks: [[false; 2]; D],
+            sides,
+            mirrors,
+            domain,
+            turn,
+            boundary,
+            size,
+            revolves: false,
+        })
     }
 
     /// The largest coordinate that a particle at rest may have, and at least the size of the body: what positions are rounded
@@ -410,6 +499,9 @@ impl<const D: usize> Scene<D> {
             Domain::Box { lower, upper } => {
                 (upper - lower).iter().map(|side| (side / self.spacing).round()).product()
             }
+            Domain::Tube { inner, outer, lower, upper, .. } if self.revolves => {
+                (outer - inner) * (upper - lower) / self.spacing.powi(2) / per_cell as f64
+            }
             _ => self.cells.iter().map(|&cells| cells as f64).product(),
         };
         body * (per_cell as f64).powi(D as i32)
@@ -422,9 +514,14 @@ impl<const D: usize> Scene<D> {
         let per_particle = scalar * (6 * D + 2 * D * D + 2) + 12 + exact;
         // A cache line, another for the step to come or for MUSL, and what sorting counts; with the padding beyond the walls.
         const PER_NODE: f64 = 64.0 + 64.0 + 4.0;
-        let nodes: f64 = self.cells.iter().map(|&cells| cells as f64 + 9.0).product();
         let particles = self.particles_expected(per_cell);
-        particles * per_particle as f64 + nodes * PER_NODE
+        particles * per_particle as f64 + self.nodes() * PER_NODE
+    }
+
+    /// Nodes of the grid, with the padding beyond its ends; around an axis there is one layer.
+    pub(crate) fn nodes(&self) -> f64 {
+        let layers = |(a, &cells)| if self.revolves && a == 1 { 1.0 } else { cells as f64 + 9.0 };
+        self.cells.iter().enumerate().map(layers).product()
     }
 
     /// How many bytes the exact fields keep of each particle, at most: what the body force needs, in values of the solver's
@@ -458,6 +555,12 @@ impl<const D: usize> Scene<D> {
                 Domain::Box { lower, upper } => {
                     let centre = centre(0.0);
                     (0..D).all(|axis| lower[axis] < centre[axis] && centre[axis] < upper[axis])
+                }
+                Domain::Tube { inner, outer, lower, upper, .. } if self.revolves => {
+                    let centre = centre(0.0);
+                    // One layer of particles is the half plane.
+                    let ranges = [[inner, outer], [0.0, distance], [lower, upper]];
+                    (0..D).all(|a| ranges[a][0] < centre[a] && centre[a] < ranges[a][1])
                 }
                 _ => true,
             }
@@ -526,6 +629,10 @@ fn instead<const D: usize>(domain: &Domain<f64, D>) -> &'static str {
         }
         Domain::Annulus { .. } => {
             " in the updated Lagrangian formulation; the total Lagrangian one does: --formulation total-lagrangian --shape bspline3 --grid spherical"
+        }
+        Domain::Tube { .. } => {
+            " of a body that turns about its axis in the updated Lagrangian formulation; the total Lagrangian one does: --formulation \
+             total-lagrangian --shape bspline3 --layout gauss --grid cylindrical --cfl 0.2 --cfl-speed p-wave"
         }
         _ => "",
     }

@@ -1,4 +1,5 @@
-//! Conditions as the updated formulation models them: by walls of its grid, and by tractions on clipped particles.
+//! Conditions as the updated formulation models them: by walls of its grid, on which a body slides or is held, and by tractions on clipped
+//! particles.
 
 use mmsmith_runtime::{Boundary, ComponentCondition, Condition, Solution, Surface};
 
@@ -51,13 +52,59 @@ impl SideOnGrid {
     }
 }
 
+/// The motion or the traction that is given on a side, as far as particles of a lattice can have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Given {
+    /// The side stands still: a wall holds it.
+    Rest,
+    /// The traction is none: the side is free.
+    Nothing,
+    /// Another one.
+    Other,
+}
+
+impl Given {
+    /// The given motion or traction of a side, at sampled places and times.
+    pub(crate) fn of<const D: usize>(exact: &dyn Solution<f64, D>, boundary: &Boundary) -> Self {
+        let domain = exact.domain();
+        let (mut motion, mut largest_motion) = (0.0_f64, 0.0_f64);
+        let (mut traction, mut largest_stress) = (0.0_f64, 0.0_f64);
+        for n in 0..PLACES {
+            let Some((X, _)) = points::surface(&domain, boundary.surface, n) else {
+                return Self::Other;
+            };
+            let t = exact.period() * points::quasirandom(n, D, D + 1);
+            motion = motion.max(exact.displacement(&X, t).amax());
+            let here = exact.traction(boundary.surface, &X, t).map_or(f64::NAN, |t| t.amax());
+            traction = if here.is_nan() { f64::INFINITY } else { traction.max(here) };
+            if let Some((X, t)) = points::interior(&domain, exact.period(), n) {
+                largest_motion = largest_motion.max(exact.displacement(&X, t).amax());
+                largest_stress = largest_stress.max(exact.first_piola_kirchhoff(&X, t).amax());
+            }
+        }
+        match boundary.condition {
+            Condition::PrescribedMotion if motion <= 4.0 * f64::EPSILON * largest_motion => {
+                Self::Rest
+            }
+            Condition::PrescribedTraction if traction <= NO_TRACTION * largest_stress => {
+                Self::Nothing
+            }
+            _ => Self::Other,
+        }
+    }
+}
+
+/// Places at which a side is looked at.
+const PLACES: usize = 64;
+/// Rounding of a traction, as a share of the largest stress.
+const NO_TRACTION: f64 = 1e-12;
+
 /// Whether a plane surface has no motion along its normal: none but for rounding, at sampled places and times.
 fn stands_still<const D: usize>(
     exact: &dyn Solution<f64, D>,
     surface: Surface,
     axis: usize,
 ) -> bool {
-    const PLACES: usize = 64;
     let domain = exact.domain();
     let (mut across, mut largest) = (0.0_f64, 0.0_f64);
     for n in 0..PLACES {

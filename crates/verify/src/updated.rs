@@ -1,6 +1,7 @@
 //! Runs in the updated Lagrangian formulation: from a solution to a grid, particles with their domains, and their motion.
 
 use std::cell::Cell;
+use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -55,10 +56,10 @@ pub(crate) fn bytes_expected<const D: usize>(
     let of_shape = if updated.placement.is_clipped() { of_polygons } else { of_shape };
     let of_transfer = if updated.transfer.is_affine() { D * D } else { 0 };
     let of_node = if updated.transfer.is_filtered() { D + 8 } else { 0 };
-    let nodes: f64 = scene.cells.iter().map(|&cells| cells as f64 + 9.0).product();
     let particles = scene.particles_expected(per_cell);
     scene.bytes_expected(per_cell, scalar, exact)
-        + scalar as f64 * (particles * (of_shape + of_transfer) as f64 + nodes * of_node as f64)
+        + scalar as f64
+            * (particles * (of_shape + of_transfer) as f64 + scene.nodes() * of_node as f64)
 }
 
 /// A body that a lattice clipped with its boundary makes, at rest.
@@ -223,6 +224,11 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     if exact.is_half_plane() {
         set_volumes_of_a_radian(&mut body.particles);
     }
+    if scene.revolves {
+        set_in_half_plane(&mut body.particles);
+        body.revolves = true;
+    }
+    body.sticks = scene.sticks;
     let law = law_of::<T, D>(model, case)?;
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());
@@ -257,6 +263,18 @@ fn set_volumes_of_a_radian<T: Real, const D: usize>(particles: &mut Particles<T,
     for ((X, volume), mass) in X.iter().zip(volume).zip(mass) {
         *volume *= X[0];
         *mass *= X[0];
+    }
+}
+
+/// Moves the particles of one layer to the half plane at the angle zero, and gives them the volumes and masses of all around the axis.
+fn set_in_half_plane<T: Real, const D: usize>(particles: &mut Particles<T, D>) {
+    let Particles { X, x, volume, mass, half_size, .. } = particles;
+    let thickness = half_size[1 % D] * T::nearest(2.0);
+    for (((X, x), volume), mass) in X.iter_mut().zip(x).zip(volume).zip(mass) {
+        (X[1 % D], x[1 % D]) = (T::zero(), T::zero());
+        let around = T::nearest(TAU) * X[0] / thickness;
+        *volume *= around;
+        *mass *= around;
     }
 }
 

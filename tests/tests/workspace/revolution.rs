@@ -25,6 +25,12 @@ const SERIES: &[Series] = &[
         call: "thick-cylinder --shape cpdi2 --layout clipped --cells 8,16,32 --periods 0.5",
         order: 2.0,
     },
+    // With a turn about the axis, in three components: held ends, and sliding ones.
+    Series {
+        call: "twisting-cylinder --formulation updated-lagrangian --shape gimp --cells 8,16,32 --periods 0.5",
+        order: 2.0,
+    },
+    Series { call: "turning-cylinder --cells 8,16,32 --periods 0.5", order: 2.0 },
     Series {
         call: "twisting-cylinder --formulation total-lagrangian --cfl 0.2 --cfl-speed p-wave --shape bspline2 --cells 8,16,32 --periods 0.5",
         order: 3.0,

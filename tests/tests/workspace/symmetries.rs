@@ -148,7 +148,7 @@ fn renumbered<const D: usize>(
     fn taken<V: Copy>(values: &mut Vec<V>, places: &[usize]) {
         *values = places.iter().map(|&p| values[p]).collect();
     }
-    let Body { mut particles, half_edges, mesh } = body;
+    let Body { mut particles, half_edges, mesh, .. } = body;
     let Particles { X, x, v, F, mass, volume, .. } = &mut particles;
     taken(X, &places);
     taken(x, &places);
@@ -160,7 +160,7 @@ fn renumbered<const D: usize>(
         let of = |p: usize| mesh.corners[p << D..(p + 1) << D].iter().copied();
         Mesh::cells(mesh.X.clone(), places.iter().flat_map(|&p| of(p)).collect())
     });
-    Body { particles, half_edges, mesh }
+    Body { half_edges, mesh, ..particles.into() }
 }
 
 /// The largest difference between particles of the image and images of the particles, in units of rounding of the largest values.

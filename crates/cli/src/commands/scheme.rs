@@ -77,7 +77,9 @@ impl Settled {
         // The mass matrix of splines is a product over the axes.
         let uneven = verify::has_uneven_density(exact);
         // Bodies that no clipped layout is of are left to the total formulation, which says what else there is.
-        let can_clip = !matches!(exact, AnySolution::One(_)) && needs_space.is_none();
+        let can_clip = !matches!(exact, AnySolution::One(_))
+            && needs_space.is_none()
+            && !verify::turns_about_axis(exact);
         let is_total = match options.formulation {
             Some(formulation) => formulation == Formulation::Total,
             None => {
@@ -130,7 +132,7 @@ impl Settled {
         {
             let reason = match needed.filter(|_| options.formulation.is_none()) {
                 Some(Boundary { surface, condition }) => {
-                    Some(format!("the updated formulation does not model {condition} on {surface}"))
+                    Some(format!("it imposes {condition} on {surface}"))
                 }
                 None => needs_space.filter(|_| options.formulation.is_none()).map(str::to_owned),
             };

@@ -23,7 +23,7 @@ fn result(path: &Path) -> Value {
     result
 }
 
-/// Twelve schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
+/// Thirteen schemes, each killed three times: once its first checkpoint is there, in the middle, and at its last one.
 #[cfg(unix)]
 #[test]
 fn a_killed_run_goes_on_to_the_same_bits() {
@@ -36,8 +36,13 @@ fn a_killed_run_goes_on_to_the_same_bits() {
         env!("CARGO_MANIFEST_DIR"),
         "/../../tests/data/specs/revolution/tube-maxwell.toml --shape cpdi2 --layout clipped --cells 8 --periods 0.1 --threads 2"
     );
-    let of_half_plane =
-        [file.to_owned(), format!("{file} --shape cpdi2 --layout clipped"), with_memory.into()];
+    let turning = "twisting-cylinder --formulation updated-lagrangian --shape gimp --cells 8 --periods 0.2 --threads 2";
+    let of_half_plane = [
+        file.to_owned(),
+        format!("{file} --shape cpdi2 --layout clipped"),
+        with_memory.into(),
+        turning.into(),
+    ];
     for scheme in of_half_plane.iter().map(String::as_str).chain([
         "thick-cylinder --cells 8 --formulation total-lagrangian --shape bspline2 --periods 0.3",
         "axis-aligned --cells 16 --vtk frames --frames 9 --history history.csv",

@@ -25,6 +25,7 @@ fn each_component_has_the_order_of_its_scheme() {
     const REST: &str = "--static --moment 0.125";
     const TOTAL: &str = "--formulation total-lagrangian --periods 0.1 --cfl 0.1 --cfl-speed p-wave";
     const CLIPPED: &str = "--layout clipped --periods 0.5";
+    const UPDATED: &str = "--formulation updated-lagrangian --periods 0.5";
     let place = tempfile::tempdir().unwrap();
     for (name, scheme, grids, expected) in [
         ("moving-rollers", format!("{REST} --shape linear"), "8,16", 2.0),
@@ -57,6 +58,10 @@ fn each_component_has_the_order_of_its_scheme() {
         ("sliding-without-image", format!("{REST} --shape bspline3"), "8,16", 4.0),
         ("sliding-without-image", format!("{TOTAL} --shape bspline3"), "8,16", 4.0),
         // Rollers that do not move are walls of the updated formulation, and conditions by component of the total one.
+        // Faces that stand still are held, and a traction of nothing is none.
+        ("held", format!("{UPDATED} --shape gimp"), "16,32", 2.0),
+        ("held", format!("{UPDATED} --shape cpdi"), "16,32", 2.0),
+        ("held", format!("{UPDATED} --shape gimp-bspline2"), "16,32", 2.0),
         ("rollers-at-rest", "--shape gimp".into(), "8,16", 2.0),
         ("rollers-at-rest", CLIPPED.into(), "16,32", 2.0),
         ("rollers-at-rest", format!("{REST} --shape bspline2"), "8,16", 3.0),

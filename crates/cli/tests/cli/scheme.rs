@@ -63,10 +63,7 @@ fn every_solution_runs_to_its_end_where_nothing_is_said() {
             assert_eq!(settings["cfl"], 0.4, "{name}");
         } else {
             assert!(first.starts_with("total Lagrangian, cubic splines on a "), "{first}");
-            assert!(
-                first.contains("the updated formulation does not model prescribed-"),
-                "{first}"
-            );
+            assert!(first.contains(": it imposes prescribed-"), "{first}");
             assert_eq!([&settings["frame"], &settings["shape"]], ["total", "bspline3"], "{name}");
             // The options of the second line give the same result.
             let (_, options) =

@@ -12,6 +12,7 @@ pub(crate) mod corners;
 pub(crate) mod cpdi;
 pub(crate) mod of_particles;
 pub(crate) mod product;
+pub(crate) mod revolving;
 pub(crate) mod shared_corners;
 
 use mmsmith_lanes::simd::Lanes;
@@ -20,6 +21,8 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::domain::cpdi::Parallelograms;
 use crate::domain::of_particles::Domain;
+use crate::domain::revolving::Revolving;
+use crate::error::SetupError;
 use crate::named::named;
 use crate::particles::mesh::{Interpolation, Mesh};
 use crate::shape::one_axis::{OnAxis, ProductShape};
@@ -74,19 +77,46 @@ pub(crate) fn new<T: Lanes, const D: usize>(
     half_size: &SVector<T, D>,
     spacing: T,
 ) -> Box<dyn Domain<T, D>> {
-    let boxes = half_size / spacing;
-    let product = |on_axis, l| Box::new(ProductShape { on_axis, l });
-    match shape {
-        // The points of Cpdi2 are corners.
-        Shape::Linear | Shape::Cpdi2 => product(OnAxis::Hat, SVector::zeros()),
-        Shape::Ugimp => product(OnAxis::FixedBox, boxes),
-        // Contiguous particles.
-        Shape::Gimp => product(OnAxis::StretchingBox, boxes),
-        Shape::Bspline2 => product(OnAxis::Quadratic, SVector::repeat(real(0.5))),
-        Shape::Bspline3 => product(OnAxis::Cubic, SVector::repeat(real(1.0))),
-        Shape::GimpBspline2 => product(OnAxis::QuadraticMean, boxes),
-        Shape::Cpdi => Box::new(Parallelograms::new(half_edges, half_size)),
+    match (of_product(shape, half_size / spacing), shape) {
+        (Some(product), _) => Box::new(product),
+        (None, _) => Box::new(Parallelograms::new(half_edges, half_size)),
     }
+}
+
+/// The domains of particles of a body that [revolves](crate::Body::revolves), with boxes of these half-sizes, on a grid of this spacing.
+///
+/// # Errors
+///
+/// For shapes that are no products over the axes.
+pub(crate) fn revolving<T: Lanes, const D: usize>(
+    shape: Shape,
+    half_size: &SVector<T, D>,
+    spacing: T,
+) -> Result<Box<dyn Domain<T, D>>, SetupError> {
+    let boxes = SVector::from([half_size[0] / spacing, half_size[D - 1] / spacing]);
+    match of_product(shape, boxes) {
+        Some(product) => Ok(Box::new(Revolving(product))),
+        None => Err(SetupError::Revolving { shape: shape.to_string() }),
+    }
+}
+
+/// A shape function that is a product over the axes, of boxes with these half-sizes in cells; none for parallelograms.
+fn of_product<T: Lanes, const D: usize>(
+    shape: Shape,
+    boxes: SVector<T, D>,
+) -> Option<ProductShape<T, D>> {
+    let (on_axis, l) = match shape {
+        // The points of Cpdi2 are corners.
+        Shape::Linear | Shape::Cpdi2 => (OnAxis::Hat, SVector::zeros()),
+        Shape::Ugimp => (OnAxis::FixedBox, boxes),
+        // Contiguous particles.
+        Shape::Gimp => (OnAxis::StretchingBox, boxes),
+        Shape::Bspline2 => (OnAxis::Quadratic, SVector::repeat(real(0.5))),
+        Shape::Bspline3 => (OnAxis::Cubic, SVector::repeat(real(1.0))),
+        Shape::GimpBspline2 => (OnAxis::QuadraticMean, boxes),
+        Shape::Cpdi => return None,
+    };
+    Some(ProductShape { on_axis, l })
 }
 
 /// The shape function by which the corners of a mesh reach nodes; none where a shape leaves the mesh alone.

@@ -7,7 +7,7 @@ use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::grid::bins::Band;
-use crate::grid::node::Node;
+use crate::grid::node::{Components, Node};
 use crate::grid::tiles::Tiles;
 use crate::grid::{Grid, Layout};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
@@ -59,6 +59,23 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         Self { strides: band.strides, nodes_before: band.nodes_before, ..*self }
     }
 
+    /// These constants for the half plane of a body of revolution, of the first axis and the last.
+    pub(crate) fn half_plane(&self) -> Constants<T, 2> {
+        let axes = [0, D - 1];
+        Constants {
+            lower: axes.map(|a| self.lower[a]).into(),
+            upper: axes.map(|a| self.upper[a]).into(),
+            walls: axes.map(|a| self.walls[a]),
+            inverse_spacing: self.inverse_spacing,
+            strides: axes.map(|a| self.strides[a]),
+            nodes_before: self.nodes_before,
+            tiles: self.tiles.half_plane(),
+            time_step: self.time_step,
+            least_mass: self.least_mass,
+            planted: self.planted,
+        }
+    }
+
     /// Position in cells, from the lower corner.
     #[inline(always)]
     pub(crate) fn in_cells(&self, x: &SVector<T, D>) -> [T; D] {
@@ -104,16 +121,18 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         ghost
     }
 
-    /// Applies a wall across `axis` to a node on it.
+    /// Applies a wall that holds these components to a node on it.
     #[inline(always)]
-    pub(crate) fn clear(&self, node: &mut Node<T, D>, axis: usize) {
+    pub(crate) fn clear(&self, node: &mut Node<T, D>, held: Components) {
         let kept = *node;
-        node.clear(axis);
-        if self.planted.is(Fault::WallsKeepVelocity) {
-            node.values[axis] = kept.values[axis];
-        }
-        if self.planted.is(Fault::WallsKeepAcceleration) {
-            node.values[D + axis] = kept.values[D + axis];
+        node.clear(held);
+        for a in held.each::<D>() {
+            if self.planted.is(Fault::WallsKeepVelocity) {
+                node.values[a] = kept.values[a];
+            }
+            if self.planted.is(Fault::WallsKeepAcceleration) {
+                node.values[D + a] = kept.values[D + a];
+            }
         }
     }
 

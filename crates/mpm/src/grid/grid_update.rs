@@ -14,7 +14,7 @@ use nalgebra::RealField;
 use crate::grid::Layout;
 use crate::grid::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
 use crate::grid::geometry::Constants;
-use crate::grid::node::Node;
+use crate::grid::node::{Components, Node};
 use crate::scheme::{Transfer, VelocityUpdate};
 use mmsmith_threads::coloring::Shared;
 use mmsmith_threads::disjoint::Partition;
@@ -36,10 +36,10 @@ pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
     /// Updates some nodes.
     fn update(self, c: &Constants<T, D>, nodes: &mut [Node<T, D>]);
 
-    /// A node's mirror image, across a wall along the axis if there is one.
+    /// A node's mirror image, in which these components change their signs.
     #[inline(always)]
-    fn flipped(self, node: Node<T, D>, axis: Option<usize>) -> Node<T, D> {
-        node.flipped(axis)
+    fn flipped(self, node: Node<T, D>, components: Components) -> Node<T, D> {
+        node.flipped(components)
     }
 
     /// Whether masses are among the sums.
@@ -47,10 +47,10 @@ pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
         true
     }
 
-    /// Applies a wall across `axis` to a node on it.
+    /// Applies a wall that holds these components to a node on it.
     #[inline(always)]
-    fn on_wall(self, c: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
-        c.clear(node, axis);
+    fn on_wall(self, c: &Constants<T, D>, node: &mut Node<T, D>, held: Components) {
+        c.clear(node, held);
     }
 }
 
@@ -175,8 +175,8 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Reprojection {
     }
 
     #[inline(always)]
-    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
-        node.clear(axis);
+    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, held: Components) {
+        node.clear(held);
     }
 }
 
@@ -194,10 +194,10 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for ScalarMean {
     }
 
     #[inline(always)]
-    fn on_wall(self, _: &Constants<T, D>, _: &mut Node<T, D>, _: usize) {}
+    fn on_wall(self, _: &Constants<T, D>, _: &mut Node<T, D>, _: Components) {}
 
     #[inline(always)]
-    fn flipped(self, node: Node<T, D>, _: Option<usize>) -> Node<T, D> {
+    fn flipped(self, node: Node<T, D>, _: Components) -> Node<T, D> {
         node
     }
 }
@@ -219,14 +219,14 @@ impl<T: RealField + Copy, S: NodeUpdate<T, D>, const D: usize> NodeUpdate<T, D> 
     fn update(self, _: &Constants<T, D>, _: &mut [Node<T, D>]) {}
 
     /// Half of what reaches a node on a plane of symmetry comes from the mirror image.
-    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, axis: usize) {
-        let mirrored = self.0.flipped(*node, Some(axis));
+    fn on_wall(self, _: &Constants<T, D>, node: &mut Node<T, D>, held: Components) {
+        let mirrored = self.0.flipped(*node, held);
         self.0.add(node, &mirrored);
     }
 
     #[inline(always)]
-    fn flipped(self, node: Node<T, D>, axis: Option<usize>) -> Node<T, D> {
-        self.0.flipped(node, axis)
+    fn flipped(self, node: Node<T, D>, components: Components) -> Node<T, D> {
+        self.0.flipped(node, components)
     }
 }
 
@@ -390,9 +390,9 @@ where
         }
     }
 
-    /// Folds a ghost node beyond a wall to its mirror image. The component along the axis `flip` changes its sign.
+    /// Folds a ghost node beyond a wall to its mirror image. The components `flip` change their signs.
     #[inline(always)]
-    fn fold(&self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Option<usize>) {
+    fn fold(&self, image: &mut Node<T, D>, ghost: Node<T, D>, flip: Components) {
         let mirrored = self.update.flipped(self.c.ghost(ghost), flip);
         self.update.add(image, &mirrored);
     }
@@ -413,8 +413,8 @@ where
     /// Applies walls to the rows from row `first` of the grid on, and sets the ghost nodes in these.
     pub(crate) fn on_walls(&self, nodes: &mut [Node<T, D>], first: usize) {
         let &Self { layout, c, update, .. } = self;
-        layout.on_walls(first, nodes, |node, axis| update.on_wall(c, node, axis));
-        layout.unfold_rows(nodes, &|node: Node<T, D>, axis| update.flipped(node, axis));
+        layout.on_walls(first, nodes, |node, held| update.on_wall(c, node, held));
+        layout.unfold_rows(nodes, &|node: Node<T, D>, flip| update.flipped(node, flip));
     }
 }
 
@@ -471,7 +471,7 @@ mod tests {
         let whole = GridUpdate::new(layout, c, update);
         layout.fold(&mut expected, |image, ghost, flip| whole.fold(image, ghost, flip));
         update.update(c, &mut expected);
-        layout.on_walls(0, &mut expected, |node, axis| update.on_wall(c, node, axis));
+        layout.on_walls(0, &mut expected, |node, held| update.on_wall(c, node, held));
         layout.unfold(&mut expected, Node::flipped);
         for rows_at_once in [1, 7, 8, 16, layout.dims[D - 1]] {
             let mut nodes = given(layout.nodes);

@@ -16,6 +16,7 @@ use mmsmith_threads::each;
 use nalgebra::{RealField, SVector};
 
 use crate::error::SetupError;
+use crate::grid::node::Components;
 
 /// Background grid: a box of cubic cells.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,21 +50,37 @@ pub(crate) const NODES_AT_ONCE: usize = 4096;
 /// Node indices along an axis are formed in 32 bits.
 const MAX_LAYERS: usize = i32::MAX as usize;
 
+/// A layer of nodes on a wall across an axis, and the components that it holds.
+#[derive(Clone, Copy, Debug)]
+struct WallLayer {
+    axis: usize,
+    layer: usize,
+    held: Components,
+}
+
+/// Sides of the grid, as a body has them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sides<const D: usize> {
+    /// The axis around which nothing changes, of a body that turns about another one: it has a single layer of nodes.
+    pub(crate) around: Option<usize>,
+    /// The walls to which the body sticks.
+    pub(crate) sticks: [[bool; 2]; D],
+}
+
+impl<const D: usize> Default for Sides<D> {
+    fn default() -> Self {
+        Self { around: None, sticks: [[false; 2]; D] }
+    }
+}
+
 /// A layer of ghost nodes beyond a wall, and the layer of its mirror image.
 #[derive(Clone, Copy, Debug)]
 struct Ghost {
     axis: usize,
     layer: usize,
     image: usize,
-    /// Whether the component across the wall changes its sign between the two (an odd number of reflections).
-    flips: bool,
-}
-
-impl Ghost {
-    /// The component that changes its sign.
-    fn flip(&self) -> Option<usize> {
-        self.flips.then_some(self.axis)
-    }
+    /// The components that change their signs between the two, by an odd number of reflections.
+    flip: Components,
 }
 
 /// Layout of the nodes in memory: node `(i, j, k)` is at `i strides[0] + j strides[1] + k strides[2]`, axis 0 fastest, with padding
@@ -79,13 +96,21 @@ pub(crate) struct Layout<const D: usize> {
     /// The first row that it holds.
     pub(crate) first_row: usize,
     ghosts: Vec<Ghost>,
-    /// Axis and layer of each wall.
-    walls: Vec<(usize, usize)>,
+    walls: Vec<WallLayer>,
 }
 
 impl<const D: usize> Layout<D> {
     /// Lays out the nodes of `grid`, if `bytes_per_node` times their number can be addressed at all.
     pub(crate) fn new<T>(grid: &Grid<T, D>, bytes_per_node: usize) -> Result<Self, SetupError> {
+        Self::with_sides(grid, &Sides::default(), bytes_per_node)
+    }
+
+    /// As [`new`](Self::new), with the sides that a body asks for.
+    pub(crate) fn with_sides<T>(
+        grid: &Grid<T, D>,
+        sides: &Sides<D>,
+        bytes_per_node: usize,
+    ) -> Result<Self, SetupError> {
         let too_large = || {
             let nodes = grid.cells.iter().fold(1_u128, |n, &c| n.saturating_mul(c as u128 + 9));
             let bytes = nodes.saturating_mul(bytes_per_node as u128);
@@ -103,7 +128,11 @@ impl<const D: usize> Layout<D> {
             if cells == 0 {
                 return Err(SetupError::NoCells { axis });
             }
-            let dim = cells.checked_add(1 + PAD_BELOW + PAD_ABOVE).ok_or_else(too_large)?;
+            let padding = 1 + PAD_BELOW + PAD_ABOVE;
+            let dim = match sides.around == Some(axis) {
+                true => 1,
+                false => cells.checked_add(padding).ok_or_else(too_large)?,
+            };
             if dim > MAX_LAYERS {
                 return Err(too_large());
             }
@@ -112,21 +141,27 @@ impl<const D: usize> Layout<D> {
             layout.nodes = layout.nodes.checked_mul(dim).ok_or_else(too_large)?;
             let (first, last) = (PAD_BELOW, PAD_BELOW + cells);
             let [lower, upper] = grid.walls[axis];
-            layout.walls.extend(lower.then_some((axis, first)));
-            layout.walls.extend(upper.then_some((axis, last)));
+            let [held_below, held_above] = sides.sticks[axis].map(|sticks| match sticks {
+                true => Components::ALL,
+                false => Components::along(axis),
+            });
+            let wall = |layer, held| WallLayer { axis, layer, held };
+            layout.walls.extend(lower.then_some(wall(first, held_below)));
+            layout.walls.extend(upper.then_some(wall(last, held_above)));
             for layer in (0..dim).filter(|&l| (lower && l < first) || (upper && l > last)) {
                 // Between two walls on a coarse grid a far layer is mirrored more than once.
                 let (low, high) = (first as isize, last as isize);
-                let (mut image, mut flips) = (layer as isize, false);
+                let (mut image, mut flip) = (layer as isize, Components::NONE);
                 while (lower && image < low) || (upper && image > high) {
-                    image = if lower && image < low { 2 * low - image } else { 2 * high - image };
-                    flips = !flips;
+                    let is_below = lower && image < low;
+                    image = if is_below { 2 * low - image } else { 2 * high - image };
+                    flip = flip.toggled(if is_below { held_below } else { held_above });
                 }
                 // Across from an open face the image may lie beyond all padding; no box reaches such a layer.
                 if let Ok(image) = usize::try_from(image)
                     && image < dim
                 {
-                    layout.ghosts.push(Ghost { axis, layer, image, flips });
+                    layout.ghosts.push(Ghost { axis, layer, image, flip });
                 }
             }
         }
@@ -173,35 +208,31 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, Some(axis))`, where the component along
-    /// `axis` changes its sign.
+    /// Folds the contributions to ghost nodes to their mirror images: `add(image, ghost, flip)`, where the components `flip`
+    /// change their signs.
     #[cfg(test)]
     pub(crate) fn fold<N: Copy + Send>(
         &self,
         nodes: &mut [N],
-        add: impl Fn(&mut N, N, Option<usize>) + Sync,
+        add: impl Fn(&mut N, N, Components) + Sync,
     ) {
         self.fold_rows(nodes, &add);
         self.fold_edge(&(0..self.dims[D - 1]), 0, nodes, &add);
     }
 
-    /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, Some(axis))`, with the axis as in `fold`.
+    /// Unfolds: sets ghost nodes to the mirrored values `mirror(image, flip)`, with `flip` as in `fold`.
     #[cfg(test)]
     pub(crate) fn unfold<N: Copy + Send>(
         &self,
         nodes: &mut [N],
-        mirror: impl Fn(N, Option<usize>) -> N + Sync,
+        mirror: impl Fn(N, Components) -> N + Sync,
     ) {
         self.unfold_rows(nodes, &mirror);
         self.unfold_edge(&(0..self.dims[D - 1]), 0, nodes, &mirror);
     }
 
     /// The part of [`fold`](Self::fold) that stays within a row, for some rows.
-    pub(crate) fn fold_rows<N: Copy>(
-        &self,
-        rows: &mut [N],
-        add: &impl Fn(&mut N, N, Option<usize>),
-    ) {
+    pub(crate) fn fold_rows<N: Copy>(&self, rows: &mut [N], add: &impl Fn(&mut N, N, Components)) {
         self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
             let ghost = rows[ghost];
             add(&mut rows[image], ghost, flip);
@@ -212,7 +243,7 @@ impl<const D: usize> Layout<D> {
     pub(crate) fn unfold_rows<N: Copy>(
         &self,
         rows: &mut [N],
-        mirror: &impl Fn(N, Option<usize>) -> N,
+        mirror: &impl Fn(N, Components) -> N,
     ) {
         self.for_ghosts_in_rows(rows.len(), |ghost, image, flip| {
             rows[ghost] = mirror(rows[image], flip);
@@ -226,7 +257,7 @@ impl<const D: usize> Layout<D> {
         edge: &Range<usize>,
         first: usize,
         rows: &mut [N],
-        add: &(impl Fn(&mut N, N, Option<usize>) + Sync),
+        add: &(impl Fn(&mut N, N, Components) + Sync),
     ) {
         self.for_ghosts_of_edge(edge, first, rows, |ghost, image, flip| add(image, *ghost, flip));
     }
@@ -237,7 +268,7 @@ impl<const D: usize> Layout<D> {
         edge: &Range<usize>,
         first: usize,
         rows: &mut [N],
-        mirror: &(impl Fn(N, Option<usize>) -> N + Sync),
+        mirror: &(impl Fn(N, Components) -> N + Sync),
     ) {
         self.for_ghosts_of_edge(edge, first, rows, |ghost, image, flip| {
             *ghost = mirror(*image, flip);
@@ -245,13 +276,13 @@ impl<const D: usize> Layout<D> {
     }
 
     /// Calls `visit(ghost, image, flip)` for every ghost node with its mirror image in the same row, among `nodes` nodes from the
-    /// beginning of a row on; `flip` is the component that changes its sign.
+    /// beginning of a row on; the components `flip` change their signs.
     #[inline(always)]
-    fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Option<usize>)) {
+    fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Components)) {
         for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
             let (ghost, image) = (g.layer * self.strides[g.axis], g.image * self.strides[g.axis]);
             self.for_layer(nodes, (g.axis, g.layer), |index| {
-                visit(index, index - ghost + image, g.flip());
+                visit(index, index - ghost + image, g.flip);
             });
         }
     }
@@ -264,7 +295,7 @@ impl<const D: usize> Layout<D> {
         edge: &Range<usize>,
         first: usize,
         rows: &mut [N],
-        visit: impl Fn(&mut N, &mut N, Option<usize>) + Sync,
+        visit: impl Fn(&mut N, &mut N, Components) + Sync,
     ) {
         let row = self.row();
         for g in self.ghosts.iter().filter(|g| g.axis == D - 1 && edge.contains(&g.layer)) {
@@ -277,7 +308,7 @@ impl<const D: usize> Layout<D> {
                 ghosts
                     .iter_mut()
                     .zip(images)
-                    .for_each(|(ghost, image)| visit(ghost, image, g.flip()));
+                    .for_each(|(ghost, image)| visit(ghost, image, g.flip));
             };
             if row <= NODES_AT_ONCE {
                 visit_all(ghosts, images);
@@ -304,14 +335,19 @@ impl<const D: usize> Layout<D> {
         if low < high { [0..low, high..end] } else { [0..end, end..end] }
     }
 
-    /// Calls `clear(node, axis)` for every node on a wall across `axis`, in the rows from row `first` on.
-    pub(crate) fn on_walls<N>(&self, first: usize, rows: &mut [N], clear: impl Fn(&mut N, usize)) {
-        for &(axis, layer) in &self.walls {
+    /// Calls `clear(node, held)` for every node on a wall, with the components that it holds, in the rows from row `first` on.
+    pub(crate) fn on_walls<N>(
+        &self,
+        first: usize,
+        rows: &mut [N],
+        clear: impl Fn(&mut N, Components),
+    ) {
+        for &WallLayer { axis, layer, held } in &self.walls {
             if axis < D - 1 {
-                self.for_layer(rows.len(), (axis, layer), |index| clear(&mut rows[index], axis));
+                self.for_layer(rows.len(), (axis, layer), |index| clear(&mut rows[index], held));
             } else if let Some(layer) = layer.checked_sub(first) {
                 let row = rows.chunks_mut(self.row()).nth(layer).unwrap_or_default();
-                row.iter_mut().for_each(|node| clear(node, axis));
+                row.iter_mut().for_each(|node| clear(node, held));
             }
         }
     }
@@ -361,7 +397,12 @@ mod tests {
                     *value = f64::NAN;
                 }
             }
-            layout.unfold(&mut field, |image, flip| if flip == Some(0) { -image } else { image });
+            layout.unfold(
+                &mut field,
+                |image, flip| {
+                    if flip == Components::along(0) { -image } else { image }
+                },
+            );
             for (a, b) in field.iter().zip(&exact) {
                 assert!((a - b).abs() < 1e-12, "{a} {b}");
             }

@@ -5,6 +5,38 @@ use nalgebra::{RealField, SVector};
 /// Numbers in a node: enough for three dimensions, and whole vector registers in both precisions.
 pub(crate) const LANES: usize = 8;
 
+/// Components of vectors: those that vanish on a wall, and change their signs in its mirror image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Components(u8);
+
+impl Components {
+    /// None of them.
+    pub(crate) const NONE: Self = Self(0);
+    /// All of them.
+    pub(crate) const ALL: Self = Self(u8::MAX);
+
+    /// The one along an axis.
+    pub(crate) const fn along(axis: usize) -> Self {
+        Self(1 << axis)
+    }
+
+    /// These and others.
+    pub(crate) const fn with(self, others: Self) -> Self {
+        Self(self.0 | others.0)
+    }
+
+    /// These and others, without those that are in both.
+    pub(crate) fn toggled(self, others: Self) -> Self {
+        Self(self.0 ^ others.0)
+    }
+
+    /// The axes of these components, of `D` dimensions.
+    #[inline(always)]
+    pub(crate) fn each<const D: usize>(self) -> impl Iterator<Item = usize> {
+        (0..D).filter(move |a| self.0 >> a & 1 == 1)
+    }
+}
+
 /// Values at a node in the order `[velocity, acceleration, mass, zeros]`, D + D + 1 numbers and padding, so that they go through
 /// vector instructions together. P2G sums momentum in place of velocity and force in place of acceleration; the grid update
 /// divides by the mass.
@@ -46,17 +78,19 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         self.values[2 * D]
     }
 
-    /// Clears the components across a wall, of velocity and acceleration.
+    /// Clears components of velocity and acceleration.
     #[inline(always)]
-    pub(crate) fn clear(&mut self, axis: usize) {
-        self.values[axis] = T::zero();
-        self.values[D + axis] = T::zero();
+    pub(crate) fn clear(&mut self, components: Components) {
+        for a in components.each::<D>() {
+            self.values[a] = T::zero();
+            self.values[D + a] = T::zero();
+        }
     }
 
-    /// The node, with the signs of one component of velocity and acceleration changed.
+    /// The node, with the signs of components of velocity and acceleration changed.
     #[inline(always)]
-    pub(crate) fn flipped(mut self, axis: Option<usize>) -> Self {
-        if let Some(a) = axis {
+    pub(crate) fn flipped(mut self, components: Components) -> Self {
+        for a in components.each::<D>() {
             self.values[a] = -self.values[a];
             self.values[D + a] = -self.values[D + a];
         }

@@ -114,6 +114,11 @@ impl<const D: usize> Tiles<D> {
         Self { axes }
     }
 
+    /// Their cuts along the first axis and the last.
+    pub(crate) fn half_plane(&self) -> Tiles<2> {
+        Tiles { axes: [self.axes[0], self.axes[D - 1]] }
+    }
+
     /// Number of layers.
     pub(crate) fn layers(&self) -> usize {
         self.axes[D - 1].count

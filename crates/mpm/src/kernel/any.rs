@@ -248,16 +248,16 @@ impl<T: Lanes> Factors<T> {
         Self { S: weights.S(axis, place), G: weights.G(axis, place), Z }
     }
 
-    /// The slope that goes with number `q` of a node in P2G: forces have gradients, affine momenta arms.
+    /// The slope that goes with number `q` of a node of vectors with `C` components in P2G: forces have gradients, affine momenta arms.
     #[inline(always)]
-    fn p2g_slope<const D: usize>(&self, is_affine: bool, q: usize) -> T {
-        if is_affine && q < D { self.Z } else { self.G }
+    fn p2g_slope<const C: usize>(&self, is_affine: bool, q: usize) -> T {
+        if is_affine && q < C { self.Z } else { self.G }
     }
 
     /// The slope that goes with number `q` of a node in G2P: the first vector has a gradient, the second a moment.
     #[inline(always)]
-    fn g2p_slope<const D: usize>(&self, is_affine: bool, q: usize) -> T {
-        if is_affine && q >= D { self.Z } else { self.G }
+    fn g2p_slope<const C: usize>(&self, is_affine: bool, q: usize) -> T {
+        if is_affine && q >= C { self.Z } else { self.G }
     }
 }
 
@@ -308,18 +308,18 @@ fn row<T: Lanes, const D: usize, const W: usize>(
 
 /// Contribution of a particle to a row of nodes, `value S + slope G` with the weights along axis 0.
 #[inline(always)]
-fn contributions_to_row<T: Lanes, const D: usize>(
+fn contributions_to_row<T: Lanes, const A: usize, const C: usize>(
     value: &[T; LANES],
-    slope: &[[T; LANES]; D],
-    row: &RowWeights<T, D>,
+    slope: &[[T; LANES]; A],
+    row: &RowWeights<T, A>,
     is_affine: bool,
 ) -> [[T; LANES]; 2] {
     let (mut to_value, mut to_slope) = (*value, slope[0]);
     for q in 0..LANES {
         to_value[q] *= row.S;
         to_slope[q] *= row.S;
-        for a in 1..D {
-            let factor = row.slopes[a].p2g_slope::<D>(is_affine, q);
+        for a in 1..A {
+            let factor = row.slopes[a].p2g_slope::<C>(is_affine, q);
             to_value[q] = slope[a][q].mul_add(factor, to_value[q]);
         }
     }
@@ -338,12 +338,26 @@ pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
     T: Lanes,
     L: Weights<T, D, W>,
 {
-    let start = weights.first_node() - first;
-    let value = &given.value[k].values;
     let slope = given.slope_factors(k, L::AFFINE);
-    for index in 0..rows::<D, W>() {
+    add_values(weights, strides, (band, first), &given.value[k].values, &slope);
+}
+
+/// P2G of values and slopes, `value[q]` and `slope[axis][q]`, with weights of `A` axes, to nodes of vectors with `C` components.
+#[inline(always)]
+pub(crate) fn add_values<T, L, const A: usize, const C: usize, const W: usize>(
+    weights: &L,
+    strides: &[usize; A],
+    (band, first): (&mut [Node<T, C>], usize),
+    value: &[T; LANES],
+    slope: &[[T; LANES]; A],
+) where
+    T: Lanes,
+    L: Weights<T, A, W>,
+{
+    let start = weights.first_node() - first;
+    for index in 0..rows::<A, W>() {
         let row = row(weights, start, strides, index);
-        let [to_value, to_slope] = contributions_to_row(value, &slope, &row, L::AFFINE);
+        let [to_value, to_slope] = contributions_to_row::<T, A, C>(value, slope, &row, L::AFFINE);
         let Some(nodes) = band.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
             beyond("a stencil beyond its band")
         };
@@ -351,7 +365,7 @@ pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
             let factors = Factors::of(weights, 0, i);
             for q in 0..LANES {
                 let with_slope =
-                    to_slope[q].mul_add(factors.p2g_slope::<D>(L::AFFINE, q), values[q]);
+                    to_slope[q].mul_add(factors.p2g_slope::<C>(L::AFFINE, q), values[q]);
                 values[q] = to_value[q].mul_add(factors.S, with_slope);
             }
         }
@@ -359,15 +373,29 @@ pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
 }
 
 /// Sums of G2P: all values of a node interpolated, `value[q]`, and their slopes, `slope[axis][q]`.
-struct InterpolationSums<T, const D: usize> {
-    value: [T; LANES],
-    slope: [[T; LANES]; D],
+pub(crate) struct InterpolationSums<T, const A: usize> {
+    pub(crate) value: [T; LANES],
+    pub(crate) slope: [[T; LANES]; A],
 }
 
-impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
+impl<T: Lanes, const A: usize> InterpolationSums<T, A> {
+    /// Sums over the nodes of a particle, whose vectors have `C` components.
     #[inline(always)]
-    fn zero() -> Self {
-        Self { value: [T::zero(); LANES], slope: [[T::zero(); LANES]; D] }
+    pub(crate) fn of<const C: usize, const W: usize>(
+        weights: &impl Weights<T, A, W>,
+        strides: &[usize; A],
+        nodes: &[Node<T, C>],
+    ) -> Self {
+        let mut sums = Self { value: [T::zero(); LANES], slope: [[T::zero(); LANES]; A] };
+        let start = weights.first_node();
+        for index in 0..rows::<A, W>() {
+            let row = row(weights, start, strides, index);
+            let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
+                beyond("a stencil beyond the grid")
+            };
+            sums.add_row(weights, &row, nodes);
+        }
+        sums
     }
 
     /// Adds a row of nodes.
@@ -375,11 +403,11 @@ impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
     /// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
     /// then cancel, and a particle on a wall stays there.
     #[inline(always)]
-    fn add_row<const W: usize, L: Weights<T, D, W>>(
+    fn add_row<const C: usize, const W: usize, L: Weights<T, A, W>>(
         &mut self,
         weights: &L,
-        row: &RowWeights<T, D>,
-        nodes: &[Node<T, D>; W],
+        row: &RowWeights<T, A>,
+        nodes: &[Node<T, C>; W],
     ) {
         let mut row_value = [T::zero(); LANES];
         let mut row_slope = [T::zero(); LANES];
@@ -387,7 +415,7 @@ impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
             let factors = Factors::of(weights, 0, i);
             for q in 0..LANES {
                 let nodal = nodes[i].values[q];
-                let slope = factors.g2p_slope::<D>(L::AFFINE, q);
+                let slope = factors.g2p_slope::<C>(L::AFFINE, q);
                 row_value[q] =
                     if i == 0 { nodal * factors.S } else { row_value[q] + nodal * factors.S };
                 row_slope[q] =
@@ -398,8 +426,8 @@ impl<T: Lanes, const D: usize> InterpolationSums<T, D> {
         for q in 0..LANES {
             value[q] += row_value[q] * row.S;
             slope[0][q] = row_slope[q].mul_add(row.S, slope[0][q]);
-            for a in 1..D {
-                let factor = row.slopes[a].g2p_slope::<D>(L::AFFINE, q);
+            for a in 1..A {
+                let factor = row.slopes[a].g2p_slope::<C>(L::AFFINE, q);
                 slope[a][q] = row_value[q].mul_add(factor, slope[a][q]);
             }
         }
@@ -417,14 +445,6 @@ where
     T: Lanes,
     L: Weights<T, D, W>,
 {
-    let mut sums = InterpolationSums::zero();
-    let start = weights.first_node();
-    for index in 0..rows::<D, W>() {
-        let row = row(weights, start, strides, index);
-        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-            beyond("a stencil beyond the grid")
-        };
-        sums.add_row(weights, &row, nodes);
-    }
+    let sums = InterpolationSums::of(weights, strides, nodes);
     Interpolated::new(weights, &sums.value, &sums.slope)
 }

@@ -2,7 +2,7 @@
 //!
 //! A [`block`] has the weights of 64 particles, whose data lie side by side in [`copies`]. Weights that are products over the axes
 //! come from [`product`], which hands the sums over nodes to [`lanes_plane`] in one and two dimensions, to [`lanes_space`] in three,
-//! and to [`any`] for the extended support of a large GIMP box. CPDI has weights and sums of its own in
+//! and to [`any`] for the extended support of a large GIMP box. Those of radius and height in [`revolving`] are such products, too. CPDI has weights and sums of its own in
 //! [`cpdi`];
 //! domains on shared corners, those of CPDI2 among them, have theirs in [`shared`],
 //! and these corners, where they reach nodes by hat functions, in [`points`]. Passes take both from [`buffers`], which outlive them.
@@ -21,6 +21,7 @@ mod lanes_space;
 pub(crate) mod points;
 pub(crate) mod prefetch;
 pub(crate) mod product;
+pub(crate) mod revolving;
 pub(crate) mod shared;
 
 /// Ends the run: a weight, a block or a node is not the one that the code around it has prepared. Checks of particles and layers rule it out;

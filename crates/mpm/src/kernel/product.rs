@@ -117,7 +117,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
 
     /// Shape, position and half-sizes of a particle whose box has extended support.
     #[inline(always)]
-    fn extended(&self, k: usize) -> Option<Extended<T, D>> {
+    pub(super) fn extended(&self, k: usize) -> Option<Extended<T, D>> {
         if !self.any_extended {
             return None;
         }
@@ -209,7 +209,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
 }
 
 /// A particle whose box has extended support.
-struct Extended<T, const D: usize> {
+pub(super) struct Extended<T, const D: usize> {
     on_axis: OnAxis,
     /// Position and half-sizes in cells, as in [`ProductWeights`].
     xi: [T; D],
@@ -217,7 +217,7 @@ struct Extended<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Extended<T, D> {
-    fn weights<const AFFINE: bool>(
+    pub(super) fn weights<const AFFINE: bool>(
         &self,
         strides: (&[usize; D], usize),
     ) -> ExtendedWeights<T, D, AFFINE> {
@@ -226,9 +226,9 @@ impl<T: Lanes, const D: usize> Extended<T, D> {
 }
 
 /// The weights of particle `k` of a block.
-struct ParticleWeights<'a, T, const D: usize, const W: usize, const AFFINE: bool> {
-    weights: &'a ProductWeights<T, D>,
-    k: usize,
+pub(super) struct ParticleWeights<'a, T, const D: usize, const W: usize, const AFFINE: bool> {
+    pub(super) weights: &'a ProductWeights<T, D>,
+    pub(super) k: usize,
 }
 
 impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Weights<T, D, W>

@@ -20,12 +20,24 @@ pub struct Body<T, const D: usize> {
     pub half_edges: Vec<SMatrix<T, D, D>>,
     /// The domains between shared corners, where there are such. Cells are used with CPDI2 alone.
     pub mesh: Option<Mesh<T, D>>,
+    /// Whether the particles are those of the half plane of a body of revolution about the last axis of space, `y = 0` in the reference
+    /// configuration, with the volumes and masses of all around the axis. The grid is then that of radius and height, with one cell along its second
+    /// axis, and the motion may turn about the axis.
+    pub revolves: bool,
+    /// On which [walls](Grid::walls) of the grid the body is held in all directions; on the others it slides.
+    pub sticks: [[bool; 2]; D],
 }
 
 /// Particles whose domains are boxes, all of the same half-size, without common corners.
 impl<T, const D: usize> From<Particles<T, D>> for Body<T, D> {
     fn from(particles: Particles<T, D>) -> Self {
-        Self { particles, half_edges: Vec::new(), mesh: None }
+        Self {
+            particles,
+            half_edges: Vec::new(),
+            mesh: None,
+            revolves: false,
+            sticks: [[false; 2]; D],
+        }
     }
 }
 
@@ -50,11 +62,9 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
     ) -> Self {
         let particles = Particles::lattice(grid, per_cell, density, inside);
         let half_edge = SMatrix::from_diagonal(&particles.half_size);
-        Self {
-            half_edges: vec![half_edge; particles.len()],
-            mesh: Some(cells_of_boxes(grid, &particles)),
-            particles,
-        }
+        let half_edges = vec![half_edge; particles.len()];
+        let mesh = Some(cells_of_boxes(grid, &particles));
+        Self { half_edges, mesh, ..particles.into() }
     }
 }
 
@@ -63,13 +73,13 @@ pub(crate) fn part<T: RealField + Copy, const D: usize>(
     body: &Body<T, D>,
     own: &Range<usize>,
 ) -> Body<T, D> {
-    let Body { particles, half_edges, mesh } = body;
+    let Body { particles, half_edges, mesh, revolves, sticks } = body;
     let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
     let particles = particles.some(&places);
     let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
     let own: Vec<usize> = own.clone().collect();
     let mesh = mesh.as_ref().map(|mesh| mesh.part(&own));
-    Body { particles, half_edges, mesh }
+    Body { particles, half_edges, mesh, revolves: *revolves, sticks: *sticks }
 }
 
 /// See [`Body::annulus`].
@@ -150,7 +160,8 @@ pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
         half_size: SVector::repeat(half * width),
         ..Particles::default()
     };
-    Ok(Body { particles, half_edges, mesh: Some(Mesh::cells(of_corners, corners)) })
+    let mesh = Some(Mesh::cells(of_corners, corners));
+    Ok(Body { half_edges, mesh, ..particles.into() })
 }
 
 /// Cosine and sine of `index` parts of a quarter turn, each of which has `per_quarter`; exact on the axes.

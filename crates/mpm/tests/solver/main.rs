@@ -10,6 +10,7 @@ mod ranks;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod registers;
+mod revolving;
 mod ring;
 mod schemes;
 mod state;

@@ -103,7 +103,7 @@ fn a_wall_is_a_mirror() {
                     }
                 }
                 let mesh = Mesh { x: moved, ..Mesh::cells(places, cells) };
-                Body { half_edges: Vec::new(), mesh: Some(mesh), particles: p }
+                Body { mesh: Some(mesh), ..p.into() }
             };
             let wall = Grid {
                 lower: vector![0.0, 0.0],

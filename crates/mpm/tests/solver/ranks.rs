@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
 use crate::polygons::loaded;
+use crate::revolving;
 use crate::schemes::{self, noise};
 
 /// A column: walls at its foot and sides, long enough for several processes.
@@ -509,6 +510,17 @@ pub(crate) fn polygon_settings() -> impl Iterator<Item = Settings<f64>> {
             Settings { time_step: 1.0 / 512.0, ..flying(settings) }
         })
     })
+}
+
+#[test]
+fn bodies_that_turn_about_their_axis_have_the_bits_of_one_process() {
+    for (inner, settings) in [0.0, 0.5].into_iter().cycle().zip(revolving::schemes()) {
+        let grid = revolving::grid(inner);
+        let mut whole = revolving::body(&grid, 1.0);
+        whole.particles.v.iter_mut().for_each(|v| v[2] += 40.0);
+        let settings = Settings { time_step: 1.0 / 512.0, ..settings };
+        agrees_on((&grid, &whole), settings, &[1, 2, 3], 16);
+    }
 }
 
 #[test]

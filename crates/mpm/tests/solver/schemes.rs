@@ -88,17 +88,17 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
     let vectors = |all: &[SVector<f64, D>]| all.iter().map(|x| x.cast()).collect();
     let matrices = |all: &[SMatrix<f64, D, D>]| all.iter().map(|A| A.cast()).collect();
     let p = &body.particles;
+    let particles = Particles {
+        X: vectors(&p.X),
+        x: vectors(&p.x),
+        v: vectors(&p.v),
+        F: matrices(&p.F),
+        mass: p.mass.iter().map(|&m| m as f32).collect(),
+        volume: p.volume.iter().map(|&V| V as f32).collect(),
+        half_size: p.half_size.cast(),
+        ..Particles::default()
+    };
     Body {
-        particles: Particles {
-            X: vectors(&p.X),
-            x: vectors(&p.x),
-            v: vectors(&p.v),
-            F: matrices(&p.F),
-            mass: p.mass.iter().map(|&m| m as f32).collect(),
-            volume: p.volume.iter().map(|&V| V as f32).collect(),
-            half_size: p.half_size.cast(),
-            ..Particles::default()
-        },
         half_edges: matrices(&body.half_edges),
         mesh: body.mesh.as_ref().map(|own| Mesh {
             interpolation: own.interpolation,
@@ -112,6 +112,7 @@ pub(crate) fn single<const D: usize>(body: &Body<f64, D>) -> Body<f32, D> {
             turn: own.turn.map(|turn| turn.cast()),
             numbers: None,
         }),
+        ..particles.into()
     }
 }
 

@@ -58,7 +58,7 @@ use recording::recording;
 use serde::Serialize;
 
 use crate::dimension::in_dimension;
-use crate::half_plane::{HalfPlane, needs_space};
+use crate::half_plane::{HalfPlane, turns_about_axis};
 use crate::order::Order;
 use crate::precision::Precision;
 
@@ -114,7 +114,7 @@ fn score_of_half_plane(
 ) -> Option<Result<Score, ScoreError>> {
     let AnySolution::Three(space) = exact else { return None };
     let plane = HalfPlane::new(space.as_ref())?;
-    if needs_space(exact).is_some() {
+    if turns_about_axis(exact) {
         return None;
     }
     let asked = &options.placing.axes;

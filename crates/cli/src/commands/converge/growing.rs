@@ -1,7 +1,7 @@
 //! Errors that grow under refinement.
 
 use mmsmith_solutions::{AnySolution, Domain};
-use mmsmith_verify::{Case, Field, Norm, Placement, Shape, Sweep, Updated};
+use mmsmith_verify::{Case, Field, Norm, Placement, Shape, Sweep, Updated, turns_about_axis};
 use serde_json::{Map, Value, json};
 
 use super::Converge;
@@ -84,7 +84,7 @@ fn summed(exact: &AnySolution<f64>, base: &Case) -> Option<(Shape, &'static str)
     let instead = match placement {
         // Polygons integrate.
         Placement::Clipped { .. } => return None,
-        Placement::Lattice { .. } if is_box => "--shape gimp-bspline2",
+        Placement::Lattice { .. } if is_box || turns_about_axis(exact) => "--shape gimp-bspline2",
         Placement::Lattice { .. } => "--layout clipped --shape cpdi2",
         Placement::BodyFitted => "--shape cpdi2",
     };

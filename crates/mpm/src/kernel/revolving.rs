@@ -1,0 +1,368 @@
+//! P2G and G2P in the half plane of a body of revolution that may turn about its axis, the last one of space.
+//!
+//! Particles live in space. Nodes have the place `(r, z)`, and vectors along `e_r`, `e_theta`, `e_z`, which are those of each particle's own
+//! half plane. With the test functions `N_i(r, z)` times these directions, the gradient of a velocity and the force of a stress are
+//!
+//! ```text
+//! | d_r v_r      -v_theta/r   d_z v_r     |
+//! | d_r v_theta   v_r/r       d_z v_theta |      f_i = -sum V0_p (tau_p G_ip + (tau_tt e_r - tau_rt e_theta) S_ip/r_p)
+//! | d_r v_z       0           d_z v_z     |
+//! ```
+//!
+//! A vector that changes its direction as a particle goes around the axis needs no further term: particles have it in fixed directions. The
+//! half planes at the angles zero and pi are one plane, where `v_r` and `v_theta` change their signs with `r`: particles next to the axis
+//! reach nodes as their images do as well, so that these components vanish there.
+
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_laws::fault::{Fault, Planted};
+use nalgebra::{Matrix2, Matrix3, RealField, SMatrix, SVector};
+
+use crate::grid::PAD_BELOW;
+use crate::grid::geometry::Constants;
+use crate::grid::node::{Components, LANES, Node};
+use crate::kernel::any::{Contributions, Interpolated, InterpolationSums, add_values};
+use crate::kernel::block::BlockWeights;
+use crate::kernel::copies::{BLOCK, Kinematics};
+use crate::kernel::product::{ParticleWeights, ProductWeights};
+use crate::shape::one_axis::{EXTENDED, ProductShape};
+use crate::shape::weights::Weights;
+
+/// The axes of space that a half plane has.
+const RADIUS: usize = 0;
+const HEIGHT: usize = 2;
+/// The direction around the axis.
+const AROUND: usize = 1;
+/// The components that vanish on the axis.
+const ACROSS_AXIS: Components = Components::along(RADIUS).with(Components::along(AROUND));
+
+/// Radius and height of a place in space.
+#[inline(always)]
+pub(crate) fn place<T: RealField + Copy, const D: usize>(x: &SVector<T, D>) -> SVector<T, 2> {
+    let [x, y, z] = [x[0], x[1 % D], x[D - 1]];
+    SVector::from([(x * x + y * y).sqrt(), z])
+}
+
+/// The deformation gradient within the half plane of a particle, which is across its second column: that points around the axis.
+#[inline(always)]
+pub(crate) fn in_half_plane<T: RealField + Copy, const D: usize>(
+    F: &SMatrix<T, D, D>,
+) -> SMatrix<T, 2, 2> {
+    let [around, last] = [1 % D, D - 1];
+    let (cos, sin) = (F[(around, around)], -F[(0, around)]);
+    let length = (cos * cos + sin * sin).sqrt();
+    let along_radius = |J: usize| (cos * F[(0, J)] + sin * F[(around, J)]) / length;
+    SMatrix::<T, 2, 2>::new(along_radius(0), along_radius(last), F[(last, 0)], F[(last, last)])
+}
+
+/// The weights of up to `BLOCK` particles.
+pub(crate) struct RevolvingWeights<T> {
+    product: ProductWeights<T, 2>,
+    shape: ProductShape<T, 2>,
+    is_affine: bool,
+    frames: [Frame<T>; BLOCK],
+    /// As in [`Constants`].
+    nodes_before: usize,
+    planted: Planted,
+}
+
+/// The directions of a particle's half plane.
+#[derive(Clone, Copy)]
+struct Frame<T> {
+    /// Cosine and sine of the angle from the first axis of space.
+    cos: T,
+    sin: T,
+    /// A cell over the radius.
+    per_radius: T,
+    /// Whether the particle's image reaches nodes that particles read.
+    is_next_to_axis: bool,
+}
+
+impl<T: Lanes> Frame<T> {
+    fn zero() -> Self {
+        Self { cos: T::one(), sin: T::zero(), per_radius: T::zero(), is_next_to_axis: false }
+    }
+
+    /// The columns are the directions.
+    #[inline(always)]
+    fn directions(&self) -> Matrix3<T> {
+        let (zero, one) = (T::zero(), T::one());
+        Matrix3::new(self.cos, -self.sin, zero, self.sin, self.cos, zero, zero, zero, one)
+    }
+
+    /// Components along these directions, from those along the axes of space.
+    #[inline(always)]
+    fn vector_in(&self, [x, y, z]: [T; 3]) -> [T; 3] {
+        [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
+    }
+
+    #[inline(always)]
+    fn vector_out<const D: usize>(&self, of: [T; 3]) -> SVector<T, D> {
+        let out = [self.cos * of[0] - self.sin * of[1], self.sin * of[0] + self.cos * of[1], of[2]];
+        SVector::from_fn(|i, _| out[i])
+    }
+
+    #[inline(always)]
+    fn matrix_in<const D: usize>(&self, of: &SMatrix<T, D, D>) -> Matrix3<T> {
+        let Q = self.directions();
+        Q.transpose() * Matrix3::from_fn(|i, j| of[(i.min(D - 1), j.min(D - 1))]) * Q
+    }
+
+    #[inline(always)]
+    fn matrix_out<const D: usize>(&self, of: &Matrix3<T>) -> SMatrix<T, D, D> {
+        let Q = self.directions();
+        let out = Q * of * Q.transpose();
+        SMatrix::from_fn(|i, j| out[(i, j)])
+    }
+
+    /// Contributions of particle `k` of a block to its nodes: values, and slopes along the radius and the height.
+    #[inline(always)]
+    fn given<const D: usize>(
+        &self,
+        contributions: &Contributions<T, D, BLOCK>,
+        k: usize,
+        (is_affine, planted): (bool, Planted),
+    ) -> ([T; LANES], [[T; LANES]; 2]) {
+        let from = &contributions.value[k].values;
+        let [momentum, force] =
+            [0, D].map(|first| self.vector_in(std::array::from_fn(|i| from[first + i])));
+        let flux = self.matrix_in::<D>(&contributions.stress_flux[k]);
+        let (mut value, mut slope) = ([T::zero(); LANES], [[T::zero(); LANES]; 2]);
+        for i in 0..3 {
+            (value[i], value[3 + i]) = (momentum[i], force[i]);
+            for (slope, axis) in slope.iter_mut().zip([RADIUS, HEIGHT]) {
+                slope[3 + i] = flux[(i, axis)];
+            }
+        }
+        if !planted.is(Fault::HoopStressDropped) {
+            value[3 + RADIUS] += flux[(AROUND, AROUND)] * self.per_radius;
+            value[3 + AROUND] -= flux[(RADIUS, AROUND)] * self.per_radius;
+        }
+        value[6] = from[2 * D];
+        if is_affine {
+            let affine = self.matrix_in::<D>(&contributions.affine[k]);
+            for i in 0..3 {
+                (slope[0][i], slope[1][i]) = (affine[(i, RADIUS)], affine[(i, HEIGHT)]);
+            }
+        }
+        (value, slope)
+    }
+
+    /// The values of the grid at a particle.
+    #[inline(always)]
+    fn interpolated<const D: usize, const W: usize, L: Weights<T, 2, W>>(
+        &self,
+        weights: &L,
+        sums: &InterpolationSums<T, 2>,
+    ) -> Interpolated<T, D> {
+        let InterpolationSums { value, slope } = sums;
+        let [velocity, second] = [0, 3].map(|first| std::array::from_fn(|i| value[first + i]));
+        let mut gradient = Matrix3::zeros();
+        for i in 0..3 {
+            (gradient[(i, RADIUS)], gradient[(i, HEIGHT)]) = (slope[0][i], slope[1][i]);
+        }
+        gradient[(RADIUS, AROUND)] = -velocity[AROUND] * self.per_radius;
+        gradient[(AROUND, AROUND)] = velocity[RADIUS] * self.per_radius;
+        let mut affine = SMatrix::zeros();
+        if L::AFFINE {
+            let mut own = Matrix3::zeros();
+            for rows in [[RADIUS, HEIGHT], [AROUND, AROUND]] {
+                let moments = Matrix2::from_fn(|i, a| slope[a][3 + rows[i]]);
+                let gradient = Matrix2::from_fn(|i, a| slope[a][rows[i]]);
+                let of_rows = weights.affine(moments, &gradient);
+                for (i, row) in rows.into_iter().enumerate() {
+                    (own[(row, RADIUS)], own[(row, HEIGHT)]) = (of_rows[(i, 0)], of_rows[(i, 1)]);
+                }
+            }
+            affine = self.matrix_out(&own);
+        }
+        Interpolated {
+            velocity: self.vector_out(velocity),
+            second: self.vector_out(second),
+            velocity_gradient: self.matrix_out(&gradient),
+            affine,
+        }
+    }
+}
+
+impl<T: Lanes> RevolvingWeights<T> {
+    pub(crate) fn new(shape: &ProductShape<T, 2>, is_affine: bool) -> Self {
+        Self {
+            product: ProductWeights::new(shape, is_affine),
+            shape: *shape,
+            is_affine,
+            frames: [Frame::zero(); BLOCK],
+            nodes_before: 0,
+            planted: Planted::here(),
+        }
+    }
+}
+
+/// The distances in memory between neighbouring nodes of the half plane.
+fn in_plane<const D: usize>(strides: &[usize; D]) -> [usize; 2] {
+    [strides[0], strides[D - 1]]
+}
+
+impl<T: Lanes, const D: usize> BlockWeights<T, D> for RevolvingWeights<T> {
+    fn compute(&mut self, c: &Constants<T, D>, ids: &[u32], kinematics: Kinematics<'_, T, D>) {
+        let plane = c.half_plane();
+        let (mut x, mut F) = ([SVector::zeros(); BLOCK], [SMatrix::zeros(); BLOCK]);
+        // Where the grid begins beside the axis the body has a hole there, and its nodes no images.
+        let has_axis = c.lower[RADIUS] == T::zero();
+        let reach = mmsmith_lanes::tensor::real((PAD_BELOW + 1) as f64);
+        for k in 0..BLOCK {
+            (x[k], F[k]) = (place(&kinematics.x[k]), in_half_plane(&kinematics.F[k]));
+            let radius = x[k][0];
+            let edge = plane.in_cells(&x[k])[0] - self.shape.half_size(0, F[k][(0, 0)]);
+            let frame = &mut self.frames[k];
+            *frame = Frame::zero();
+            if radius > T::zero() {
+                frame.cos = kinematics.x[k][0] / radius;
+                frame.sin = kinematics.x[k][1 % D] / radius;
+                frame.per_radius = c.spacing() / radius;
+            }
+            frame.is_next_to_axis = has_axis && edge < reach;
+        }
+        self.nodes_before = c.nodes_before as usize;
+        self.product.compute(&plane, ids, Kinematics { x: &x, F: &F });
+    }
+
+    fn p2g(
+        &mut self,
+        strides: &[usize; D],
+        band: &mut [Node<T, D>],
+        first: usize,
+        contributions: &Contributions<T, D, BLOCK>,
+        count: usize,
+    ) {
+        let (weights, strides) = (&*self, in_plane(strides));
+        let of_block = P2gOfBlock { weights, strides, band, first, contributions, count };
+        match (self.shape.width(), self.is_affine) {
+            (2, false) => dispatch(P2g::<_, D, 2, false>(of_block)),
+            (3, false) => dispatch(P2g::<_, D, 3, false>(of_block)),
+            (_, false) => dispatch(P2g::<_, D, 4, false>(of_block)),
+            (2, true) => dispatch(P2g::<_, D, 2, true>(of_block)),
+            (3, true) => dispatch(P2g::<_, D, 3, true>(of_block)),
+            (_, true) => dispatch(P2g::<_, D, 4, true>(of_block)),
+        }
+    }
+
+    fn g2p(
+        &mut self,
+        strides: &[usize; D],
+        nodes: &[Node<T, D>],
+        receiver: &mut [Interpolated<T, D>],
+    ) {
+        let of_block = G2pOfBlock { weights: self, strides: in_plane(strides), nodes, receiver };
+        match (self.shape.width(), self.is_affine) {
+            (2, false) => dispatch(G2p::<_, D, 2, false>(of_block)),
+            (3, false) => dispatch(G2p::<_, D, 3, false>(of_block)),
+            (_, false) => dispatch(G2p::<_, D, 4, false>(of_block)),
+            (2, true) => dispatch(G2p::<_, D, 2, true>(of_block)),
+            (3, true) => dispatch(G2p::<_, D, 3, true>(of_block)),
+            (_, true) => dispatch(G2p::<_, D, 4, true>(of_block)),
+        }
+    }
+}
+
+struct P2gOfBlock<'a, T, const D: usize> {
+    weights: &'a RevolvingWeights<T>,
+    strides: [usize; 2],
+    band: &'a mut [Node<T, D>],
+    first: usize,
+    contributions: &'a Contributions<T, D, BLOCK>,
+    count: usize,
+}
+
+struct P2g<'a, T, const D: usize, const W: usize, const AFFINE: bool>(P2gOfBlock<'a, T, D>);
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for P2g<'_, T, D, W, AFFINE>
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
+        let RevolvingWeights { product, planted, nodes_before, .. } = weights;
+        for k in 0..count.min(BLOCK) {
+            let frame = &weights.frames[k];
+            let given = frame.given(contributions, k, (AFFINE, *planted));
+            let nodes = (&mut *band, first, *nodes_before);
+            match product.extended(k) {
+                Some(extended) => {
+                    let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
+                    add::<_, _, D, EXTENDED>(frame, &weights, &strides, nodes, &given);
+                }
+                None => {
+                    let weights = ParticleWeights::<T, 2, W, AFFINE> { weights: product, k };
+                    add::<_, _, D, W>(frame, &weights, &strides, nodes, &given);
+                }
+            }
+        }
+    }
+}
+
+/// Adds a particle to the nodes of a band, and next to the axis its image.
+#[inline(always)]
+fn add<T: Lanes, L: Weights<T, 2, W>, const D: usize, const W: usize>(
+    frame: &Frame<T>,
+    weights: &L,
+    strides: &[usize; 2],
+    (band, first, nodes_before): (&mut [Node<T, D>], usize, usize),
+    (value, slope): &([T; LANES], [[T; LANES]; 2]),
+) {
+    if !frame.is_next_to_axis {
+        add_values(weights, strides, (band, first), value, slope);
+        return;
+    }
+    let mut own = [Node::zero(); EXTENDED * EXTENDED];
+    let own = &mut own[..W * W];
+    add_values(weights, &[1, W], (own, weights.first_node()), value, slope);
+    let start = weights.first_node() - first;
+    // The number of the first node along the radius; the axis has the number `PAD_BELOW`.
+    let along = (weights.first_node() + nodes_before) % strides[1];
+    for (index, node) in own.iter().enumerate() {
+        let place = start + index % W * strides[0] + index / W * strides[1];
+        band[place].add(node);
+        let number = along + index % W;
+        if number <= 2 * PAD_BELOW {
+            let image = place + 2 * PAD_BELOW * strides[0] - 2 * number * strides[0];
+            band[image].add(&node.flipped(ACROSS_AXIS));
+        }
+    }
+}
+
+struct G2pOfBlock<'a, T, const D: usize> {
+    weights: &'a RevolvingWeights<T>,
+    strides: [usize; 2],
+    nodes: &'a [Node<T, D>],
+    receiver: &'a mut [Interpolated<T, D>],
+}
+
+struct G2p<'a, T, const D: usize, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T, D>);
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for G2p<'_, T, D, W, AFFINE>
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(G2pOfBlock { weights, strides, nodes, receiver }) = self;
+        let RevolvingWeights { product, nodes_before, frames, .. } = weights;
+        for (k, (receiver, frame)) in receiver.iter_mut().zip(frames).enumerate() {
+            *receiver = match product.extended(k) {
+                Some(extended) => {
+                    let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
+                    frame.interpolated::<D, EXTENDED, _>(
+                        &weights,
+                        &InterpolationSums::of(&weights, &strides, nodes),
+                    )
+                }
+                None => {
+                    let weights = ParticleWeights::<T, 2, W, AFFINE> { weights: product, k };
+                    frame.interpolated::<D, W, _>(
+                        &weights,
+                        &InterpolationSums::of(&weights, &strides, nodes),
+                    )
+                }
+            };
+        }
+    }
+}
