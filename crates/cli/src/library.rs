@@ -57,6 +57,8 @@ const INCOMPRESSIBLE: &[(&str, &str)] = &[
 
 /// Specifications of bodies of revolution, which are compiled in as text.
 const REVOLUTION: &[(&str, &str)] = &[
+    ("bulging-plate", include_str!("../library/revolution/bulging-plate.toml")),
+    ("swelling-sphere", include_str!("../library/revolution/swelling-sphere.toml")),
     ("thick-cylinder", include_str!("../library/revolution/thick-cylinder.toml")),
     ("twisting-cylinder", include_str!("../library/revolution/twisting-cylinder.toml")),
 ];

@@ -48,7 +48,7 @@ const SERIES: &[Series] = &[
     },
     // Clamped around, loaded on both faces.
     Series {
-        call: "tests/data/specs/revolution/bulging-plate.toml --load-steps 2",
+        call: "bulging-plate --load-steps 2",
         cells: &[
             ("linear", "32,64"),
             ("bspline2", "16,32"),
