@@ -216,7 +216,8 @@ def run(
             1000 evenly spread steps; json then has them too.
         profile: Say how long each pass of the steps took, and how many threads the tiles of particles keep busy.
         plot: Draw the difference of the energy from the exact one over time to this SVG file.
-        picture: Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis.
+        picture: Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis, of a body of
+            revolution its half plane.
         at: Time of the picture in periods of the solution, at most periods. Default: the end of the run.
         stress: Stress that the colours of the picture show. Default: von-mises.
             `von-mises`: Von Mises' equivalent stress.

@@ -54,7 +54,7 @@ pub(crate) struct RunOptions {
 /// A picture of the particles.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis
+    /// Draw the particles, coloured by their Cauchy stress, to this SVG file; in 3D seen along the third axis, of a body of revolution its half plane
     #[arg(long = "picture", value_name = "FILE", conflicts_with = "checkpoint")]
     pub(crate) file: Option<PathBuf>,
     /// Time of the picture in periods of the solution, at most --periods. Default: the end of the run

@@ -63,10 +63,41 @@ impl Stress {
     }
 }
 
-/// The particles of a frame with a value each, and a note below them. In space those nearest to a viewer on the third axis are drawn last.
+/// Coordinates that a picture has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum View {
+    /// The first two; in space those nearest to a viewer on the third axis are drawn last.
+    Plane,
+    /// Radius and height about the third axis.
+    HalfPlane,
+}
+
+impl View {
+    /// The view of a body of revolution, whose frames of the half plane are plane themselves; and of other bodies.
+    fn of(is_axisymmetric: bool, frame: &Frame) -> Self {
+        let is_in_space = frame.points.iter().any(|x| x[2] != 0.0);
+        if is_axisymmetric && is_in_space { Self::HalfPlane } else { Self::Plane }
+    }
+
+    fn place(self, x: &[f64; 3]) -> [f64; 2] {
+        match self {
+            Self::Plane => [x[0], x[1]],
+            Self::HalfPlane => [x[0].hypot(x[1]), x[2]],
+        }
+    }
+
+    fn axes(self) -> [&'static str; 2] {
+        match self {
+            Self::Plane => ["x", "y"],
+            Self::HalfPlane => ["r", "z"],
+        }
+    }
+}
+
+/// The particles of a frame with a value each, and a note below them.
 pub(super) fn draw(
     title: &str,
-    frame: &Frame,
+    (frame, view): (&Frame, View),
     values: &[f64],
     range: (f64, f64),
     units: Option<Units>,
@@ -74,11 +105,10 @@ pub(super) fn draw(
 ) -> String {
     let mut order: Vec<usize> = (0..frame.points.len()).collect();
     order.sort_by(|&a, &b| frame.points[a][2].total_cmp(&frame.points[b][2]));
-    let points: Vec<[f64; 2]> =
-        order.iter().map(|&p| [frame.points[p][0], frame.points[p][1]]).collect();
+    let points: Vec<[f64; 2]> = order.iter().map(|&p| view.place(&frame.points[p])).collect();
     let values: Vec<f64> = order.iter().map(|&p| values[p]).collect();
     let unit = units.map_or("", Units::stress);
-    let axes = ["x", "y"].map(|axis| with_unit(axis, units.map(Units::length)));
+    let axes = view.axes().map(|axis| with_unit(axis, units.map(Units::length)));
     let axes = [axes[0].as_str(), axes[1].as_str()];
     Particles { title, points: &points, values: &values, range, unit, axes, note }.svg()
 }
@@ -123,8 +153,14 @@ impl Picture {
         &mut self.snapshot
     }
 
-    /// Draws what the run left, with a note on the run.
-    pub(super) fn write(self, selection: &Selection, row: &Row, note: &str) -> Result<()> {
+    /// Draws what the run left, with a note on the run; bodies of revolution by radius and height.
+    pub(super) fn write(
+        self,
+        selection: &Selection,
+        is_axisymmetric: bool,
+        row: &Row,
+        note: &str,
+    ) -> Result<()> {
         let Some(output) = self.output else { return Ok(()) };
         let Some(frame) = &self.snapshot.frame else {
             match &row.status {
@@ -147,7 +183,14 @@ impl Picture {
             self.stress.words(),
             number::rounded(frame.time, 4)
         );
-        output.write_text(&draw(&title, frame, &values, range(&values), units, note))
+        output.write_text(&draw(
+            &title,
+            (frame, View::of(is_axisymmetric, frame)),
+            &values,
+            range(&values),
+            units,
+            note,
+        ))
     }
 }
 

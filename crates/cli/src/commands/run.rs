@@ -103,7 +103,12 @@ pub(super) fn follow(options: &RunOptions, origin: Origin<'_>) -> Result<bool> {
         // Last, since a run that stopped may have no picture.
         if let Some(picture) = picture {
             let note = format!("{}, {cells} cells", problem.setting(case.plan().extent));
-            match picture.write(&problem.selection, &ran.row, &note) {
+            match picture.write(
+                &problem.selection,
+                is_axisymmetric(&problem.model.exact),
+                &ran.row,
+                &note,
+            ) {
                 Err(error) if !passed => terminal::error(error),
                 written => written?,
             }

@@ -8,7 +8,7 @@ use mmsmith_verify::{
 
 use super::{GRID, studied};
 use crate::arguments::{Precision, Stress};
-use crate::commands::picture::{draw, range};
+use crate::commands::picture::{View, draw, range};
 use crate::commands::problem::Model;
 use crate::svg::{Curve, Plot, beside};
 use crate::units::Units;
@@ -62,7 +62,14 @@ pub(super) fn svg() -> Result<String> {
     let frame = snapshot.frame.context("the ring's run stopped before its end")?;
     let hoop = Stress::Hoop.values(&frame)?;
     let note = format!("{} particles that fit the rims, {SHOWN} cells, cpdi2", frame.points.len());
-    let ring = draw("Hoop stress of the expanding ring", &frame, &hoop, range(&hoop), units, &note);
+    let ring = draw(
+        "Hoop stress of the expanding ring",
+        (&frame, View::Plane),
+        &hoop,
+        range(&hoop),
+        units,
+        &note,
+    );
 
     let mut curves = Vec::new();
     for one in schemes() {

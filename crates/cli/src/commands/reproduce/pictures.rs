@@ -8,7 +8,7 @@ use mmsmith_vtk::{Frame, read};
 
 use super::{CD, FRAMES, GRID, PROBLEMS};
 use crate::arguments::Stress;
-use crate::commands::picture::{draw, range};
+use crate::commands::picture::{View, draw, range};
 use crate::commands::problem::Model;
 use crate::commands::scheme::usual;
 use crate::library::Selection;
@@ -95,7 +95,7 @@ fn capitalized(text: &str) -> String {
 }
 
 fn picture(title: &str, frame: &Frame, values: &[f64], range: (f64, f64), said: &str) -> Picture {
-    let svg = draw(title, frame, values, range, Some(Units::SI), "");
+    let svg = draw(title, (frame, View::Plane), values, range, Some(Units::SI), "");
     let (least, most) = extremes(values.iter().copied());
     let caption = format!(
         "{title}, at t = {} s: {} particles at their current positions, from {} to {} Pa. The colour bar spans 98 % of the \
