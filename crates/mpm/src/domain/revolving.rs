@@ -1,7 +1,7 @@
 //! Domains of particles of a body of revolution that may turn about its axis: boxes or points in the half plane through each particle.
 
 use mmsmith_lanes::simd::Lanes;
-use mmsmith_lanes::tensor::real;
+use mmsmith_lanes::tensor::{determinant, real};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::of_particles::{Domain, OfBlock, Reached, axis_too_large};
@@ -66,9 +66,14 @@ impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
         let OfBlock { c, ids, tiles, kinematics } = of_block;
         let (x, F) = (kinematics.x, kinematics.F);
-        ids.iter()
-            .enumerate()
-            .all(|(k, &p)| self.diagnose(c, p as usize, tiles[k], &x[k], &F[k]).is_clean())
+        ids.iter().enumerate().all(|(k, &p)| {
+            let l = self.half_size(c, p as usize, &F[k]);
+            let place = Self::on_grid(c, &x[k]);
+            let is_valid = determinant(&F[k]) > T::zero()
+                && c.axis_outside(&place).is_none()
+                && axis_too_large(&l).is_none();
+            is_valid && self.is_in_tile(c, p as usize, tiles[k], &x[k], &F[k])
+        })
     }
 
     fn invalidity(

@@ -14,6 +14,7 @@
 //! reach nodes as their images do as well, so that these components vanish there.
 
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::tensor::real;
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{Matrix2, Matrix3, RealField, SMatrix, SVector};
 
@@ -82,13 +83,6 @@ impl<T: Lanes> Frame<T> {
         Self { cos: T::one(), sin: T::zero(), per_radius: T::zero(), is_next_to_axis: false }
     }
 
-    /// The columns are the directions.
-    #[inline(always)]
-    fn directions(&self) -> Matrix3<T> {
-        let (zero, one) = (T::zero(), T::one());
-        Matrix3::new(self.cos, -self.sin, zero, self.sin, self.cos, zero, zero, zero, one)
-    }
-
     /// Components along these directions, from those along the axes of space.
     #[inline(always)]
     fn vector_in(&self, [x, y, z]: [T; 3]) -> [T; 3] {
@@ -96,22 +90,24 @@ impl<T: Lanes> Frame<T> {
     }
 
     #[inline(always)]
-    fn vector_out<const D: usize>(&self, of: [T; 3]) -> SVector<T, D> {
-        let out = [self.cos * of[0] - self.sin * of[1], self.sin * of[0] + self.cos * of[1], of[2]];
-        SVector::from_fn(|i, _| out[i])
+    fn vector_out(&self, [r, around, z]: [T; 3]) -> [T; 3] {
+        [self.cos * r - self.sin * around, self.sin * r + self.cos * around, z]
     }
 
     #[inline(always)]
     fn matrix_in<const D: usize>(&self, of: &SMatrix<T, D, D>) -> Matrix3<T> {
-        let Q = self.directions();
-        Q.transpose() * Matrix3::from_fn(|i, j| of[(i.min(D - 1), j.min(D - 1))]) * Q
+        let row = |i: usize| [0, 1, 2].map(|j: usize| of[(i.min(D - 1), j.min(D - 1))]);
+        let rows = [0, 1, 2].map(row);
+        let across = [0, 1, 2].map(|j| self.vector_in(rows.map(|row| row[j])));
+        let own = [0, 1, 2].map(|i| self.vector_in(across.map(|column| column[i])));
+        Matrix3::from_fn(|i, j| own[i][j])
     }
 
     #[inline(always)]
     fn matrix_out<const D: usize>(&self, of: &Matrix3<T>) -> SMatrix<T, D, D> {
-        let Q = self.directions();
-        let out = Q * of * Q.transpose();
-        SMatrix::from_fn(|i, j| out[(i, j)])
+        let across = [0, 1, 2].map(|j| self.vector_out([0, 1, 2].map(|i| of[(i, j)])));
+        let own = [0, 1, 2].map(|i| self.vector_out(across.map(|column| column[i])));
+        SMatrix::from_fn(|i, j| own[i][j])
     }
 
     /// Contributions of particle `k` of a block to its nodes: values, and slopes along the radius and the height.
@@ -175,9 +171,10 @@ impl<T: Lanes> Frame<T> {
             }
             affine = self.matrix_out(&own);
         }
+        let [velocity, second] = [velocity, second].map(|of| self.vector_out(of));
         Interpolated {
-            velocity: self.vector_out(velocity),
-            second: self.vector_out(second),
+            velocity: SVector::from_fn(|i, _| velocity[i]),
+            second: SVector::from_fn(|i, _| second[i]),
             velocity_gradient: self.matrix_out(&gradient),
             affine,
         }
@@ -197,6 +194,43 @@ impl<T: Lanes> RevolvingWeights<T> {
     }
 }
 
+/// Sets the frames of a block of particles, and what of their kinematics lies in their half planes.
+struct Frames<'a, T, const D: usize> {
+    c: &'a Constants<T, D>,
+    plane: &'a Constants<T, 2>,
+    shape: &'a ProductShape<T, 2>,
+    kinematics: Kinematics<'a, T, D>,
+    frames: &'a mut [Frame<T>; BLOCK],
+    in_plane: (&'a mut [SVector<T, 2>; BLOCK], &'a mut [SMatrix<T, 2, 2>; BLOCK]),
+}
+
+impl<T: Lanes, const D: usize> Loop for Frames<'_, T, D> {
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { c, plane, shape, kinematics, frames, in_plane: (x, F) } = self;
+        // Where the grid begins beside the axis the body has a hole there, and its nodes no images.
+        let has_axis = c.lower[RADIUS] == T::zero();
+        let reach = real((PAD_BELOW + 1) as f64);
+        let spacing = c.spacing();
+        for k in 0..BLOCK {
+            (x[k], F[k]) = (place(&kinematics.x[k]), in_half_plane(&kinematics.F[k]));
+            let radius = x[k][0];
+            let edge = plane.in_cells(&x[k])[0] - shape.half_size(0, F[k][(0, 0)]);
+            let is_next_to_axis = has_axis && edge < reach;
+            let inverse = radius.recip();
+            frames[k] = match radius > T::zero() {
+                true => Frame {
+                    cos: kinematics.x[k][0] * inverse,
+                    sin: kinematics.x[k][1 % D] * inverse,
+                    per_radius: spacing * inverse,
+                    is_next_to_axis,
+                },
+                false => Frame { is_next_to_axis, ..Frame::zero() },
+            };
+        }
+    }
+}
+
 /// The distances in memory between neighbouring nodes of the half plane.
 fn in_plane<const D: usize>(strides: &[usize; D]) -> [usize; 2] {
     [strides[0], strides[D - 1]]
@@ -206,22 +240,8 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for RevolvingWeights<T> {
     fn compute(&mut self, c: &Constants<T, D>, ids: &[u32], kinematics: Kinematics<'_, T, D>) {
         let plane = c.half_plane();
         let (mut x, mut F) = ([SVector::zeros(); BLOCK], [SMatrix::zeros(); BLOCK]);
-        // Where the grid begins beside the axis the body has a hole there, and its nodes no images.
-        let has_axis = c.lower[RADIUS] == T::zero();
-        let reach = mmsmith_lanes::tensor::real((PAD_BELOW + 1) as f64);
-        for k in 0..BLOCK {
-            (x[k], F[k]) = (place(&kinematics.x[k]), in_half_plane(&kinematics.F[k]));
-            let radius = x[k][0];
-            let edge = plane.in_cells(&x[k])[0] - self.shape.half_size(0, F[k][(0, 0)]);
-            let frame = &mut self.frames[k];
-            *frame = Frame::zero();
-            if radius > T::zero() {
-                frame.cos = kinematics.x[k][0] / radius;
-                frame.sin = kinematics.x[k][1 % D] / radius;
-                frame.per_radius = c.spacing() / radius;
-            }
-            frame.is_next_to_axis = has_axis && edge < reach;
-        }
+        let (frames, in_plane) = (&mut self.frames, (&mut x, &mut F));
+        dispatch(Frames { c, plane: &plane, shape: &self.shape, kinematics, frames, in_plane });
         self.nodes_before = c.nodes_before as usize;
         self.product.compute(&plane, ids, Kinematics { x: &x, F: &F });
     }
