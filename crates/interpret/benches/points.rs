@@ -5,9 +5,10 @@
 
 use mmsmith_interpret::{Arrays, Quantity, interpret_staged};
 use mmsmith_runtime::nalgebra::SVector;
-use mmsmith_runtime::{AnySolution, BLOCK, Solution};
+use mmsmith_runtime::{AnySolution, BLOCK, Domain, Solution};
 use mmsmith_spec::Spec;
 use mmsmith_stage::{FieldName, Staged};
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -44,11 +45,26 @@ fn tell_of_memory(name: &str, text: &str) {
     }
 }
 
+/// Multiples of irrational numbers: spread over the body, and no lattice.
+fn share(n: usize, axis: usize) -> f64 {
+    const STEPS: [f64; 3] = [0.618_033_988_75, 0.754_877_666_25, 0.569_840_290_998];
+    (n as f64 * STEPS[axis]).fract()
+}
+
 fn tell_of_blocks<const D: usize>(name: &str, solution: &dyn Solution<f64, D>) {
     const COUNT: usize = POINTS / 4;
-    let steps = [0.618_033_988_75, 0.754_877_666_25, 0.569_840_290_998];
     let X: Vec<SVector<f64, D>> = (0..COUNT)
-        .map(|n| SVector::from_fn(|i, _| 0.5 + 0.5 * (n as f64 * steps[i]).fract()))
+        .map(|n| match solution.domain() {
+            Domain::Annulus { inner, outer } => {
+                let radius = inner + (outer - inner) * share(n, 0);
+                let (sin, cos) = (share(n, 1) * FRAC_PI_2).sin_cos();
+                SVector::from_fn(|i, _| radius * if i == 0 { cos } else { sin })
+            }
+            Domain::Box { lower, upper } => {
+                SVector::from_fn(|i, _| lower[i] + (upper[i] - lower[i]) * share(n, i))
+            }
+            _ => SVector::zeros(),
+        })
         .collect();
     let points = solution.body_force_at(&X);
     let ids: Vec<u32> = (0..COUNT as u32).collect();
@@ -78,17 +94,16 @@ fn tell_of_blocks<const D: usize>(name: &str, solution: &dyn Solution<f64, D>) {
 fn main() {
     tell_of_memory("bar-j2", include_str!("../../../mms-specs/with-memory/bar-j2.toml"));
     tell_of_memory("block-j2", include_str!("../../../mms-specs/with-memory/block-j2.toml"));
+    tell_of_memory("ring-simo", include_str!("../../../mms-specs/with-memory/ring-simo.toml"));
+    tell_of_memory("block-j2-3d", include_str!("../../../mms-specs/with-memory/block-j2-3d.toml"));
     let text = include_str!("../../../mms-specs/ring.toml");
     let spec = Spec::parse(text, "ring.toml").unwrap();
     let staged = Staged::of(&spec, spec.derive().unwrap());
     let AnySolution::Two(ring) = interpret_staged(&spec, &staged, []).unwrap() else { return };
-    // Multiples of irrational numbers: spread over the ring, and no lattice.
     let X: Vec<SVector<f64, 2>> = (0..POINTS)
         .map(|n| {
-            let [R, angle] =
-                [0.618_033_988_75, 0.754_877_666_25].map(|step| (n as f64 * step).fract());
-            let (sin, cos) = (angle * std::f64::consts::FRAC_PI_2).sin_cos();
-            [(0.5 + 0.5 * R) * cos, (0.5 + 0.5 * R) * sin].into()
+            let (sin, cos) = (share(n, 1) * FRAC_PI_2).sin_cos();
+            SVector::from([cos, sin]) * (0.5 + 0.5 * share(n, 0))
         })
         .collect();
     let mut b = vec![SVector::zeros(); POINTS];
