@@ -341,7 +341,7 @@ fn error_of<T: Lanes, const D: usize>(
             });
             let x = corner.as_ref().unwrap_or(x);
             let position = x.iter().map(|&x| figure(x)).collect();
-            let axis = c.axis_outside(x).unwrap_or(0);
+            let axis = c.axis_outside(&domain.on_grid(c, x)).unwrap_or(0);
             let (lower, upper) = c.range(axis);
             let (lower, upper) = (figure(lower), figure(upper));
             StepError::LeftGrid { step, time, particle, position, axis, lower, upper }

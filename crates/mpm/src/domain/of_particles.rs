@@ -53,6 +53,11 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
     /// Data of each of the `before` particles here move with them to other processes; collective. Default: there are none.
     fn follow(&mut self, _moved: &Move, _before: usize) {}
 
+    /// The place on the grid of a particle at a position. Default: that position.
+    fn on_grid(&self, _c: &Constants<T, D>, x: &SVector<T, D>) -> SVector<T, D> {
+        *x
+    }
+
     /// The lower edges of a particle's domain along all axes, in cells from the lower corner of the grid.
     fn edges(
         &self,
@@ -74,7 +79,7 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
         F: &SMatrix<T, D, D>,
     ) -> Option<Invalid> {
         Invalid::of_deformation(x, F)
-            .or_else(|| c.axis_outside(x).map(|_| Invalid::LeftGrid))
+            .or_else(|| c.axis_outside(&self.on_grid(c, x)).map(|_| Invalid::LeftGrid))
             .or_else(|| axis_too_large(&self.half_size(c, p, F)).map(|_| Invalid::TooLarge))
     }
 

@@ -39,8 +39,7 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
         _: &SMatrix<T, D, D>,
         l: &SVector<T, D>,
     ) -> [Reached<T>; D] {
-        let is_extended = l.iter().any(|&l| l > self.extended_above());
-        let width = if is_extended { EXTENDED } else { self.width() };
+        let width = self.width_of(l);
         let xi = c.in_cells(x);
         std::array::from_fn(|a| Reached { edge: xi[a] - l[a], width })
     }

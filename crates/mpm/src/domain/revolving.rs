@@ -1,32 +1,18 @@
 //! Domains of particles of a body of revolution that may turn about its axis: boxes or points in the half plane through each particle.
 
 use mmsmith_lanes::simd::Lanes;
-use mmsmith_lanes::tensor::{determinant, real};
+use mmsmith_lanes::tensor::real;
 use nalgebra::{SMatrix, SVector};
 
-use crate::domain::of_particles::{Domain, OfBlock, Reached, axis_too_large};
+use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::revolving::{RevolvingWeights, in_half_plane, place};
-use crate::shape::one_axis::{EXTENDED, ProductShape};
-use crate::step::health::Invalid;
+use crate::shape::one_axis::ProductShape;
 
 /// Domains whose weights are products over radius and height.
 #[derive(Debug)]
 pub(crate) struct Revolving<T>(pub(crate) ProductShape<T, 2>);
-
-impl<T: Lanes> Revolving<T> {
-    /// The place of a particle on the grid, in the middle of its one cell around the axis.
-    fn on_grid<const D: usize>(c: &Constants<T, D>, x: &SVector<T, D>) -> SVector<T, D> {
-        let [radius, height] = place(x).into();
-        let middle = c.lower[1 % D] + c.spacing() * real(0.5);
-        SVector::from_fn(|a, _| match a {
-            0 => radius,
-            1 => middle,
-            _ => height,
-        })
-    }
-}
 
 impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
     fn weights(&self, is_affine: bool) -> Box<dyn BlockWeights<T, D>> {
@@ -57,34 +43,27 @@ impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
         _: &SMatrix<T, D, D>,
         l: &SVector<T, D>,
     ) -> [Reached<T>; D] {
-        let is_extended = l.iter().any(|&l| l > self.0.extended_above());
-        let width = if is_extended { EXTENDED } else { self.0.width() };
-        let xi = c.in_cells(&Self::on_grid(c, x));
+        let width = self.0.width_of(l);
+        let xi = c.in_cells(&self.on_grid(c, x));
         std::array::from_fn(|a| Reached { edge: xi[a] - l[a], width })
     }
 
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
         let OfBlock { c, ids, tiles, kinematics } = of_block;
         let (x, F) = (kinematics.x, kinematics.F);
-        ids.iter().enumerate().all(|(k, &p)| {
-            let l = self.half_size(c, p as usize, &F[k]);
-            let place = Self::on_grid(c, &x[k]);
-            let is_valid = determinant(&F[k]) > T::zero()
-                && c.axis_outside(&place).is_none()
-                && axis_too_large(&l).is_none();
-            is_valid && self.is_in_tile(c, p as usize, tiles[k], &x[k], &F[k])
-        })
+        ids.iter()
+            .enumerate()
+            .all(|(k, &p)| self.diagnose(c, p as usize, tiles[k], &x[k], &F[k]).is_clean())
     }
 
-    fn invalidity(
-        &self,
-        c: &Constants<T, D>,
-        p: usize,
-        x: &SVector<T, D>,
-        F: &SMatrix<T, D, D>,
-    ) -> Option<Invalid> {
-        Invalid::of_deformation(x, F)
-            .or_else(|| c.axis_outside(&Self::on_grid(c, x)).map(|_| Invalid::LeftGrid))
-            .or_else(|| axis_too_large(&self.half_size(c, p, F)).map(|_| Invalid::TooLarge))
+    /// Radius and height, in the middle of the one cell around the axis.
+    fn on_grid(&self, c: &Constants<T, D>, x: &SVector<T, D>) -> SVector<T, D> {
+        let [radius, height] = place(x).into();
+        let middle = c.lower[1 % D] + c.spacing() * real(0.5);
+        SVector::from_fn(|a, _| match a {
+            0 => radius,
+            1 => middle,
+            _ => height,
+        })
     }
 }

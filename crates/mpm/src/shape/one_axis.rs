@@ -243,6 +243,12 @@ impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
         }
     }
 
+    /// Nodes along each axis of a box with these half-sizes, in cells.
+    pub(crate) fn width_of<const N: usize>(&self, l: &SVector<T, N>) -> usize {
+        let is_extended = l.iter().any(|&l| l > self.extended_above());
+        if is_extended { EXTENDED } else { self.width() }
+    }
+
     /// Half-size beyond which the support is extended.
     pub(crate) fn extended_above(&self) -> T {
         match self.on_axis {
