@@ -285,8 +285,8 @@ impl<const D: usize> Scene<D> {
                 }
                 Surface::FirstAngle => sides[1 % D][0] = condition,
                 Surface::LastAngle => sides[1 % D][1] = condition,
-                Surface::Inner if revolves => walls[0][0] = sticks[0][0],
-                Surface::Outer if revolves => walls[0][1] = sticks[0][1],
+                Surface::Inner if revolves => walls[0][0] = is_wall,
+                Surface::Outer if revolves => walls[0][1] = is_wall,
                 surface if is_wall && case.scheme.updated().is_some() => {
                     return Err(SceneError::Unmodelled { surface, condition, instead: "" });
                 }

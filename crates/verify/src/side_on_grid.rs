@@ -64,31 +64,16 @@ pub(crate) enum Given {
 }
 
 impl Given {
-    /// The given motion or traction of a side, at sampled places and times.
+    /// The given motion or traction of a side.
     pub(crate) fn of<const D: usize>(exact: &dyn Solution<f64, D>, boundary: &Boundary) -> Self {
-        let domain = exact.domain();
-        let (mut motion, mut largest_motion) = (0.0_f64, 0.0_f64);
-        let (mut traction, mut largest_stress) = (0.0_f64, 0.0_f64);
-        for n in 0..PLACES {
-            let Some((X, _)) = points::surface(&domain, boundary.surface, n) else {
-                return Self::Other;
-            };
-            let t = exact.period() * points::quasirandom(n, D, D + 1);
-            motion = motion.max(exact.displacement(&X, t).amax());
-            let here = exact.traction(boundary.surface, &X, t).map_or(f64::NAN, |t| t.amax());
-            traction = if here.is_nan() { f64::INFINITY } else { traction.max(here) };
-            if let Some((X, t)) = points::interior(&domain, exact.period(), n) {
-                largest_motion = largest_motion.max(exact.displacement(&X, t).amax());
-                largest_stress = largest_stress.max(exact.first_piola_kirchhoff(&X, t).amax());
-            }
-        }
-        match boundary.condition {
-            Condition::PrescribedMotion if motion <= 4.0 * f64::EPSILON * largest_motion => {
+        let &Boundary { surface, condition } = boundary;
+        match condition {
+            Condition::PrescribedMotion
+                if (0..D).all(|axis| stands_still(exact, surface, axis)) =>
+            {
                 Self::Rest
             }
-            Condition::PrescribedTraction if traction <= NO_TRACTION * largest_stress => {
-                Self::Nothing
-            }
+            Condition::PrescribedTraction if has_no_traction(exact, surface) => Self::Nothing,
             _ => Self::Other,
         }
     }
@@ -99,7 +84,24 @@ const PLACES: usize = 64;
 /// Rounding of a traction, as a share of the largest stress.
 const NO_TRACTION: f64 = 1e-12;
 
-/// Whether a plane surface has no motion along its normal: none but for rounding, at sampled places and times.
+/// Whether a surface has no traction: none but for rounding, at sampled places and times.
+fn has_no_traction<const D: usize>(exact: &dyn Solution<f64, D>, surface: Surface) -> bool {
+    let domain = exact.domain();
+    let (mut all_known, mut traction, mut largest) = (true, 0.0_f64, 0.0_f64);
+    for n in 0..PLACES {
+        let Some((X, _)) = points::surface(&domain, surface, n) else { return false };
+        let t = exact.period() * points::quasirandom(n, D, D + 1);
+        let here = exact.traction(surface, &X, t).map_or(f64::NAN, |here| here.amax());
+        all_known &= !here.is_nan();
+        traction = traction.max(here);
+        if let Some((X, t)) = points::interior(&domain, exact.period(), n) {
+            largest = largest.max(exact.first_piola_kirchhoff(&X, t).amax());
+        }
+    }
+    all_known && traction <= NO_TRACTION * largest
+}
+
+/// Whether a surface has no motion along an axis: none but for rounding, at sampled places and times.
 fn stands_still<const D: usize>(
     exact: &dyn Solution<f64, D>,
     surface: Surface,

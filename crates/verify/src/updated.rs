@@ -259,23 +259,28 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
 
 /// Gives particles of a half plane the volumes and masses of a radian about the axis. The radius of the centre integrates it exactly.
 fn set_volumes_of_a_radian<T: Real, const D: usize>(particles: &mut Particles<T, D>) {
+    scale_by_radius(particles, |radius| radius);
+}
+
+/// Scales the volumes and masses of particles by a factor for their reference radius.
+fn scale_by_radius<T: Real, const D: usize>(
+    particles: &mut Particles<T, D>,
+    factor: impl Fn(T) -> T,
+) {
     let Particles { X, volume, mass, .. } = particles;
     for ((X, volume), mass) in X.iter().zip(volume).zip(mass) {
-        *volume *= X[0];
-        *mass *= X[0];
+        let factor = factor(X[0]);
+        *volume *= factor;
+        *mass *= factor;
     }
 }
 
 /// Moves the particles of one layer to the half plane at the angle zero, and gives them the volumes and masses of all around the axis.
 fn set_in_half_plane<T: Real, const D: usize>(particles: &mut Particles<T, D>) {
-    let Particles { X, x, volume, mass, half_size, .. } = particles;
+    let Particles { X, x, half_size, .. } = particles;
+    X.iter_mut().chain(x).for_each(|place| place[1 % D] = T::zero());
     let thickness = half_size[1 % D] * T::nearest(2.0);
-    for (((X, x), volume), mass) in X.iter_mut().zip(x).zip(volume).zip(mass) {
-        (X[1 % D], x[1 % D]) = (T::zero(), T::zero());
-        let around = T::nearest(TAU) * X[0] / thickness;
-        *volume *= around;
-        *mass *= around;
-    }
+    scale_by_radius(particles, |radius| T::nearest(TAU) * radius / thickness);
 }
 
 /// Gives particles of a body whose density differs from place to place their masses.

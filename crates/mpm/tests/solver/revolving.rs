@@ -9,18 +9,9 @@ use mmsmith_mpm::{
 };
 use nalgebra::{Matrix3, Rotation3, SVector, Vector2, Vector3, vector};
 
-use crate::schemes::{INTEGRATORS, TRANSFERS, noise, settings};
+use crate::schemes::{noise, settings, some_schemes};
 
 const SOFT: Material<f64> = Material::NeoHookean { lambda: 60.0, mu: 40.0 };
-const SHAPES: [Shape; 6] = [
-    Shape::Linear,
-    Shape::Ugimp,
-    Shape::Gimp,
-    Shape::Bspline2,
-    Shape::Bspline3,
-    Shape::GimpBspline2,
-];
-
 /// The grid of radius and height: from the axis on, or beside it.
 pub(crate) fn grid(inner: f64) -> Grid<f64, 3> {
     let walls = [[false; 2], [false; 2], [true, false]];
@@ -68,13 +59,9 @@ fn after(grid: &Grid<f64, 3>, body: &Body<f64, 3>, settings: Settings<f64>) -> P
     run.particles().clone()
 }
 
-/// Every shape with every integrator, each transfer in turn.
+/// Every shape that serves such a body, with every integrator and each transfer in turn.
 pub(crate) fn schemes() -> impl Iterator<Item = Settings<f64>> {
-    SHAPES.into_iter().enumerate().flat_map(|(s, shape)| {
-        INTEGRATORS.into_iter().enumerate().map(move |(i, integrator)| {
-            settings(shape, integrator, TRANSFERS[(i + s) % TRANSFERS.len()])
-        })
-    })
+    some_schemes().filter(|of| !matches!(of.shape, Shape::Cpdi | Shape::Cpdi2))
 }
 
 /// Nothing depends on where around the axis a particle is.
