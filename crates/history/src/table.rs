@@ -107,7 +107,9 @@ impl<const D: usize> Grid<D> {
         (0..self.pieces()).flat_map(of_piece).collect()
     }
 
-    fn pieces(&self) -> usize {
+    /// Pieces in time.
+    #[must_use]
+    pub fn pieces(&self) -> usize {
         self.knots.len().saturating_sub(1)
     }
 

@@ -12,8 +12,10 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
+mod packed;
 mod prepared;
 
+use packed::Packing;
 pub(crate) use prepared::{Moment, Prepared, Quantities};
 
 /// The relative tolerance of trajectories of laws with flow.
@@ -662,6 +664,15 @@ impl<const D: usize> Tables<D> {
             Some(OverAxes::Two(table)) => table.at_all_of(&own(axes, &q), fields.clone()),
             Some(OverAxes::Three(table)) => table.at_all_of(&own(axes, &q), fields.clone()),
         }
+    }
+
+    /// How series of some quantities are packed, whose kinds are known.
+    fn packing(&self, kinds: &[usize], quantities: &Range<usize>) -> Option<Packing> {
+        Some(match self.table.as_ref()? {
+            OverAxes::One(table) => Packing::new(table, self.error, kinds, quantities),
+            OverAxes::Two(table) => Packing::new(table, self.error, kinds, quantities),
+            OverAxes::Three(table) => Packing::new(table, self.error, kinds, quantities),
+        })
     }
 
     /// The polynomials at a time.

@@ -1,13 +1,12 @@
 //! Series in time of particles that stay at their places, from tables or from their own histories.
 
+use super::packed::{MOST_TERMS, Packed, PackedTime};
 use super::{Histories, Tables, is_identity, turn_tensor, turn_tensors, turn_vector};
-use mmsmith_history::{AtPoint, AtTime};
+use mmsmith_history::AtPoint;
 use mmsmith_runtime::Real;
 use mmsmith_runtime::nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
-use std::array;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// A field, or several, by their place among the quantities of tables.
@@ -30,15 +29,7 @@ pub(crate) struct Prepared<'a, const D: usize> {
 
 enum SeriesOfAll {
     /// From tables, all with the same pieces.
-    OfTables {
-        /// How many fields there are.
-        count: usize,
-        /// Coefficients of a series of one piece, with zeros up to a multiple of [`SIDE_BY_SIDE`].
-        padded: usize,
-        pieces: usize,
-        /// For each piece, particle and field the coefficients: at a time those of all particles are next to each other.
-        coefficients: Vec<f64>,
-    },
+    OfTables(Packed),
     /// From the history of each particle; none where it could not be followed.
     Own(Vec<Option<AtPoint>>),
 }
@@ -50,19 +41,15 @@ struct Place<const D: usize> {
     frame: [[f64; D]; D],
 }
 
-/// Terms of a series that are summed side by side.
-const SIDE_BY_SIDE: usize = 4;
 /// Particles whose series are formed at a time.
 const CHUNK: usize = 1024;
 
-/// Polynomials in time of a table, at most, with zeros up to a multiple of [`SIDE_BY_SIDE`].
-const MOST_TERMS: usize = 32;
-
-/// The polynomials at a time, for [`Prepared`].
+/// A time, for [`Prepared`].
 pub(crate) struct Moment {
     t: f64,
-    piece: usize,
-    polynomials: [f64; MOST_TERMS],
+    packed: PackedTime,
+    /// How many polynomials series have.
+    terms: usize,
 }
 
 /// How many numbers of a type hold all digits of a double.
@@ -73,8 +60,8 @@ const fn parts<T>() -> usize {
 impl Moment {
     /// Appends the time and its polynomials to `values`, so that no block of particles forms them anew.
     pub(crate) fn put<T: Real>(&self, t: T, values: &mut Vec<T>) {
-        values.extend([t, T::nearest(self.piece as f64)]);
-        for &polynomial in &self.polynomials {
+        values.extend([t, T::nearest(self.packed.half as f64)]);
+        for &polynomial in &self.packed.polynomials[..self.terms] {
             let mut rest = polynomial;
             for _ in 0..parts::<T>() {
                 let part = T::nearest(rest);
@@ -87,23 +74,26 @@ impl Moment {
     /// From values that [`put`](Self::put) appended.
     #[inline]
     pub(crate) fn of<T: Real>(values: &[T]) -> Self {
-        let (&[t, piece], polynomials) = values.split_at(2) else {
+        let (&[t, half], all) = values.split_at(2) else {
             panic!("a time and its piece are needed, not {} values", values.len())
         };
-        let mut own = [0.0; MOST_TERMS];
-        for (own, parts) in own.iter_mut().zip(polynomials.chunks_exact(parts::<T>())) {
+        let terms = all.len() / parts::<T>();
+        let mut polynomials = [0.0; MOST_TERMS];
+        for (own, parts) in polynomials.iter_mut().zip(all.chunks_exact(parts::<T>())) {
             *own = parts.iter().rev().fold(0.0, |sum, part| sum + part.to_f64());
         }
-        Self { t: t.to_f64(), piece: piece.to_f64() as usize, polynomials: own }
+        Self {
+            t: t.to_f64(),
+            packed: PackedTime { half: half.to_f64() as usize, polynomials },
+            terms,
+        }
     }
 }
 
 /// The body forces of particles from series of tables.
 struct Forces<'a, 'b, T, const D: usize> {
     points: &'a Prepared<'a, D>,
-    coefficients: &'a [f64],
-    /// Coefficients of a series of one piece.
-    padded: usize,
+    series: &'a Packed,
     moment: &'a Moment,
     particles: &'a [u32],
     b: &'b mut [SVector<T, D>],
@@ -114,13 +104,10 @@ impl<T: Real, const D: usize> WithSimd for Forces<'_, '_, T, D> {
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        let Self { points, coefficients, padded, moment, particles, b } = self;
-        let polynomials = &moment.polynomials[..padded];
+        let Self { points, series, moment, particles, b } = self;
         for (&n, b) in particles.iter().zip(b) {
             let n = n as usize;
-            let first = (moment.piece * points.len() + n) * D * padded;
-            let own = &coefficients[first..][..D * padded];
-            let own: [f64; D] = array::from_fn(|k| sum(&own[k * padded..][..padded], polynomials));
+            let own: [f64; D] = series.values(n, &moment.packed);
             let own = if points.is_cartesian {
                 own.map(|own| own + 0.0)
             } else {
@@ -129,19 +116,6 @@ impl<T: Real, const D: usize> WithSimd for Forces<'_, '_, T, D> {
             *b = SVector::from_fn(|i, _| T::nearest(own[i]));
         }
     }
-}
-
-/// A series of the polynomials at a time.
-#[inline(always)]
-fn sum(coefficients: &[f64], polynomials: &[f64]) -> f64 {
-    let mut sums = [0.0; SIDE_BY_SIDE];
-    let terms = coefficients.as_chunks::<SIDE_BY_SIDE>().0;
-    for (c, p) in terms.iter().zip(polynomials.as_chunks::<SIDE_BY_SIDE>().0) {
-        for m in 0..SIDE_BY_SIDE {
-            sums[m] += c[m] * p[m];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 impl<'a, const D: usize> Prepared<'a, D> {
@@ -157,11 +131,19 @@ impl<'a, const D: usize> Prepared<'a, D> {
             Quantities::Internal => D + D * D..D + D * D + histories.names.len(),
         };
         let place = |X: &[f64; D]| Place { X: *X, frame: histories.particle(*X).frame };
-        let series = if tables.table.is_some() {
-            SeriesOfAll::of_tables(histories, &tables, &range, X)
-        } else {
-            let own = |X: &[f64; D]| histories.own_series(*X, tables.end, &range);
-            SeriesOfAll::Own(X.par_iter().map(own).collect())
+        let series = match tables.packing(&histories.kinds(), &range) {
+            Some(packing) => {
+                let mut packed = Packed::new(packing, X.len());
+                for (chunk, places) in X.chunks(CHUNK).enumerate() {
+                    let all = tables.at_all(histories, places, &range);
+                    (chunk * CHUNK..).zip(&all).for_each(|(n, series)| packed.set(n, series));
+                }
+                SeriesOfAll::OfTables(packed)
+            }
+            None => {
+                let own = |X: &[f64; D]| histories.own_series(*X, tables.end, &range);
+                SeriesOfAll::Own(X.par_iter().map(own).collect())
+            }
         };
         let particles: Vec<_> = X.par_iter().map(place).collect();
         let is_cartesian = particles.iter().all(|own| is_identity(&own.frame));
@@ -174,35 +156,33 @@ impl<'a, const D: usize> Prepared<'a, D> {
 
     pub(crate) fn bytes(&self) -> usize {
         let of_series = match &self.series {
-            SeriesOfAll::OfTables { count, padded, pieces, .. } => pieces * count * padded,
+            SeriesOfAll::OfTables(packed) => packed.bytes_per_particle(),
             SeriesOfAll::Own(all) => {
-                all.iter().flatten().next().map_or(0, |series| series.coefficients(0).len() * D)
+                let first = all.iter().flatten().next();
+                first.map_or(0, |series| size_of::<f64>() * D * series.coefficients(0).len())
             }
         };
-        size_of::<Place<D>>() + 8 * of_series
+        size_of::<Place<D>>() + of_series
     }
 
     /// The values of a time that all particles need.
     pub(crate) fn moment(&self, t: f64) -> Moment {
-        let AtTime { piece, polynomials } = self.tables.at_time(t);
-        let mut own = [0.0; MOST_TERMS];
-        own[..polynomials.len()].copy_from_slice(&polynomials);
-        Moment { t, piece, polynomials: own }
+        let terms = match &self.series {
+            SeriesOfAll::OfTables(packed) => packed.terms(),
+            SeriesOfAll::Own(_) => 0,
+        };
+        Moment { t, packed: PackedTime::of(&self.tables.at_time(t)), terms }
     }
 
     /// Field `k` of particle `n` in its frame.
     #[inline]
     fn value(&self, n: usize, k: usize, moment: &Moment) -> f64 {
-        let (count, padded, coefficients) = match &self.series {
+        match &self.series {
             SeriesOfAll::Own(all) => {
-                return all[n].as_ref().map_or(f64::NAN, |series| series.value(k, moment.t));
+                all[n].as_ref().map_or(f64::NAN, |series| series.value(k, moment.t))
             }
-            SeriesOfAll::OfTables { count, padded, coefficients, .. } => {
-                (*count, *padded, coefficients)
-            }
-        };
-        let first = ((moment.piece * self.len() + n) * count + k) * padded;
-        sum(&coefficients[first..][..padded], &moment.polynomials[..padded])
+            SeriesOfAll::OfTables(packed) => packed.value(n, k, &moment.packed),
+        }
     }
 
     /// The body forces of particles with the given numbers.
@@ -212,11 +192,10 @@ impl<'a, const D: usize> Prepared<'a, D> {
         moment: &Moment,
         b: &mut [SVector<T, D>],
     ) {
-        if let SeriesOfAll::OfTables { padded, coefficients, .. } = &self.series
+        if let SeriesOfAll::OfTables(series) = &self.series
             && self.has(moment.t)
         {
-            let padded = *padded;
-            let forces = Forces { points: self, coefficients, padded, moment, particles, b };
+            let forces = Forces { points: self, series, moment, particles, b };
             return Arch::new().dispatch(forces);
         }
         for (n, b) in particles.iter().zip(b) {
@@ -237,7 +216,10 @@ impl<'a, const D: usize> Prepared<'a, D> {
             let found = self.histories.response(*X, moment.t);
             return found.map_or([f64::NAN; D], |response| response.b);
         }
-        let own: [f64; D] = std::array::from_fn(|a| self.value(n, a, moment));
+        let own: [f64; D] = match &self.series {
+            SeriesOfAll::OfTables(packed) => packed.values(n, &moment.packed),
+            SeriesOfAll::Own(_) => std::array::from_fn(|a| self.value(n, a, moment)),
+        };
         turn_vector(frame, |a| own[a])
     }
 
@@ -262,32 +244,5 @@ impl<'a, const D: usize> Prepared<'a, D> {
         let mut own: Vec<f64> = (0..names.len()).map(|k| self.value(n, k, moment)).collect();
         turn_tensors(&self.histories.tensors, frame, &mut own);
         own
-    }
-}
-
-impl SeriesOfAll {
-    fn of_tables<const D: usize>(
-        histories: &Histories<D>,
-        tables: &Tables<D>,
-        range: &Range<usize>,
-        X: &[[f64; D]],
-    ) -> Self {
-        let in_time = tables.at_time(0.0).polynomials.len().max(1);
-        let padded = in_time.next_multiple_of(SIDE_BY_SIDE);
-        let (mut pieces, mut coefficients) = (1, Vec::new());
-        for (chunk, places) in X.chunks(CHUNK).enumerate() {
-            for (n, series) in (chunk * CHUNK..).zip(tables.at_all(histories, places, range)) {
-                pieces = series.coefficients(0).len() / in_time;
-                coefficients.resize(pieces * X.len() * range.len() * padded, 0.0);
-                for piece in 0..pieces {
-                    let first = (piece * X.len() + n) * range.len() * padded;
-                    for quantity in 0..range.len() {
-                        let own = &series.coefficients(quantity)[piece * in_time..][..in_time];
-                        coefficients[first + quantity * padded..][..in_time].copy_from_slice(own);
-                    }
-                }
-            }
-        }
-        Self::OfTables { count: range.len(), padded, pieces, coefficients }
     }
 }
