@@ -33,7 +33,7 @@ INTEGRATORS = ["cd", "usl", "usf", "musl"]
 REVOLUTION = Path(__file__).resolve().parents[1] / "data" / "specs" / "revolution"
 PLANE = ["axis-aligned", "ring", "swirl", "skew-2d"]
 
-# Each shape with each transfer, on a problem and with an integrator of their own; f32; whole rings; space.
+# Each shape with each transfer, on a problem and with an integrator of their own; f32; whole rings; space, with rows for seven processes.
 CASES = [
     f"{PLANE[(s + t) % 3]} --cells 64 --periods 0.05 --shape {shape} --transfer {transfer} --integrator {INTEGRATORS[(s + 2 * t) % 4]}"
     for s, shape in enumerate(SHAPES)
@@ -43,11 +43,11 @@ CASES = [
     "ring --cells 64 --periods 0.05 --precision f32 --shape bspline2 --transfer apic",
     "ring --cells 64 --periods 0.1 --extent full",
     "ring --cells 64 --periods 0.1 --shape cpdi2 --layout body-fitted",
-    "axis-aligned-3d --cells 56 --periods 0.01",
+    "axis-aligned-3d --cells 64 --periods 0.005",
     "ring --cells 64 --periods 0.1 --shape cpdi2 --layout clipped --grid-angle 20",
     "swirl --cells 64 --periods 0.1 --shape bspline3 --layout clipped --transfer apic --integrator usf",
     "skew-2d --cells 64 --periods 0.1 --shape bspline2 --layout clipped --transfer xpic2 --integrator musl --grid-shift 0.3",
-    "sphere-shell --cells 56 --periods 0.01 --shape cpdi2 --layout clipped",
+    "sphere-shell --cells 64 --periods 0.005 --shape cpdi2 --layout clipped",
     # In the half plane of a body of revolution.
     f"{REVOLUTION}/ring-in-walls.toml --cells 64 --periods 0.05",
     f"{REVOLUTION}/ring-in-walls.toml --cells 64 --periods 0.05 --shape cpdi2 --layout clipped",
