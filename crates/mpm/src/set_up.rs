@@ -41,10 +41,9 @@ pub(crate) fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn Bl
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
         Law::WithMemory(law) => {
-            return match law.of_half_plane() {
-                Some(law) => half_plane::of_law(law, planted),
-                None => Box::new(MemoryBlocks::new(law.clone())),
-            };
+            let of_half_plane =
+                law.of_half_plane().and_then(|law| half_plane::of_law(law, planted));
+            return of_half_plane.unwrap_or_else(|| Box::new(MemoryBlocks::new(law.clone())));
         }
     };
     // One law has kernels of its own; those of `AnyLaw` serve every law.
@@ -199,7 +198,8 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let Body { mut particles, half_edges, mesh, revolves, sticks } = body;
     let count = particles.x.len();
     let domain = match revolves {
-        true => domain::revolving(shape, &particles.half_size, grid.spacing)?,
+        true => domain::revolving(shape, &particles.half_size, grid.spacing)
+            .ok_or_else(|| SetupError::Revolving { shape: shape.to_string() })?,
         false => domain::new(shape, half_edges, &particles.half_size, grid.spacing),
     };
     let corners = mesh.and_then(|mesh| {

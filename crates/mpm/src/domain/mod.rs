@@ -22,7 +22,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::cpdi::Parallelograms;
 use crate::domain::of_particles::Domain;
 use crate::domain::revolving::Revolving;
-use crate::error::SetupError;
+use crate::kernel::block::in_same_dimension;
 use crate::named::named;
 use crate::particles::mesh::{Interpolation, Mesh};
 use crate::shape::one_axis::{OnAxis, ProductShape};
@@ -83,21 +83,16 @@ pub(crate) fn new<T: Lanes, const D: usize>(
     }
 }
 
-/// The domains of particles of a body that [revolves](crate::Body::revolves), with boxes of these half-sizes, on a grid of this spacing.
-///
-/// # Errors
-///
-/// For shapes that are no products over the axes.
+/// The domains of particles of a body that [revolves](crate::Body::revolves), with boxes of these half-sizes, on a grid of this spacing; none
+/// elsewhere than in space, and for shapes that are no products over the axes.
 pub(crate) fn revolving<T: Lanes, const D: usize>(
     shape: Shape,
     half_size: &SVector<T, D>,
     spacing: T,
-) -> Result<Box<dyn Domain<T, D>>, SetupError> {
+) -> Option<Box<dyn Domain<T, D>>> {
     let boxes = SVector::from([half_size[0] / spacing, half_size[D - 1] / spacing]);
-    match of_product(shape, boxes) {
-        Some(product) => Ok(Box::new(Revolving(product))),
-        None => Err(SetupError::Revolving { shape: shape.to_string() }),
-    }
+    let in_space: Box<dyn Domain<T, 3>> = Box::new(Revolving(of_product(shape, boxes)?));
+    in_same_dimension::<_, Box<dyn Domain<T, D>>>(in_space)
 }
 
 /// A shape function that is a product over the axes, of boxes with these half-sizes in cells; none for parallelograms.

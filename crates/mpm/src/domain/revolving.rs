@@ -2,7 +2,7 @@
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
@@ -14,17 +14,15 @@ use crate::shape::one_axis::ProductShape;
 #[derive(Debug)]
 pub(crate) struct Revolving<T>(pub(crate) ProductShape<T, 2>);
 
-impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
-    fn weights(&self, is_affine: bool) -> Box<dyn BlockWeights<T, D>> {
+impl<T: Lanes> Domain<T, 3> for Revolving<T> {
+    fn weights(&self, is_affine: bool) -> Box<dyn BlockWeights<T, 3>> {
         Box::new(RevolvingWeights::new(&self.0, is_affine))
     }
 
-    fn half_size(&self, _: &Constants<T, D>, _: usize, F: &SMatrix<T, D, D>) -> SVector<T, D> {
+    fn half_size(&self, _: &Constants<T, 3>, _: usize, F: &Matrix3<T>) -> Vector3<T> {
         let F = in_half_plane(F);
-        SVector::from_fn(|a, _| match a {
-            1 => T::zero(),
-            _ => self.0.half_size(a / 2, F[(a / 2, a / 2)]),
-        })
+        let [radius, height] = [0, 1].map(|a| self.0.half_size(a, F[(a, a)]));
+        Vector3::new(radius, T::zero(), height)
     }
 
     fn beyond_box(&self) -> f64 {
@@ -37,18 +35,18 @@ impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
 
     fn reached(
         &self,
-        c: &Constants<T, D>,
+        c: &Constants<T, 3>,
         _: usize,
-        x: &SVector<T, D>,
-        _: &SMatrix<T, D, D>,
-        l: &SVector<T, D>,
-    ) -> [Reached<T>; D] {
+        x: &Vector3<T>,
+        _: &Matrix3<T>,
+        l: &Vector3<T>,
+    ) -> [Reached<T>; 3] {
         let width = self.0.width_of(l);
         let xi = c.in_cells(&self.on_grid(c, x));
         std::array::from_fn(|a| Reached { edge: xi[a] - l[a], width })
     }
 
-    fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
+    fn are_valid(&self, of_block: OfBlock<'_, T, 3>) -> bool {
         let OfBlock { c, ids, tiles, kinematics } = of_block;
         let (x, F) = (kinematics.x, kinematics.F);
         ids.iter()
@@ -57,13 +55,9 @@ impl<T: Lanes, const D: usize> Domain<T, D> for Revolving<T> {
     }
 
     /// Radius and height, in the middle of the one cell around the axis.
-    fn on_grid(&self, c: &Constants<T, D>, x: &SVector<T, D>) -> SVector<T, D> {
+    fn on_grid(&self, c: &Constants<T, 3>, x: &Vector3<T>) -> Vector3<T> {
         let [radius, height] = place(x).into();
-        let middle = c.lower[1 % D] + c.spacing() * real(0.5);
-        SVector::from_fn(|a, _| match a {
-            0 => radius,
-            1 => middle,
-            _ => height,
-        })
+        let middle = c.lower[1] + c.spacing() * real(0.5);
+        Vector3::new(radius, middle, height)
     }
 }

@@ -1,5 +1,6 @@
 //! Blocks of 64 particles: their stresses, and what their weights are to P2G and G2P.
 
+use std::any::Any;
 use std::sync::Arc;
 
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
@@ -271,6 +272,13 @@ fn stress_fluxes<const SHORT: bool, T: Lanes, L: LibraryLaw<T>, const D: usize>(
         contributions.stress_flux[k] = tau * -(contributions.volume[k] * c.inverse_spacing);
     }
     short
+}
+
+/// A value for one number of dimensions as the same for another one, which has to be the same number. Kernels that have a meaning in one
+/// alone are so compiled for no other.
+pub(crate) fn in_same_dimension<Of: 'static, As: 'static>(of: Of) -> Option<As> {
+    let mut of = Some(of);
+    (&mut of as &mut dyn Any).downcast_mut::<Option<As>>()?.take()
 }
 
 #[cfg(test)]

@@ -17,19 +17,19 @@ use mmsmith_laws::{
     AnyLaw, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, Hoop, InternalVariable, LawInSpace,
     LawWithMemory, LibraryLaw, Material, NeoHookean, of_half_plane, with_hoop_stretch,
 };
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use crate::grid::geometry::Constants;
 use crate::kernel::any::Contributions;
-use crate::kernel::block::{BlockIncrement, BlockLaw};
+use crate::kernel::block::{BlockIncrement, BlockLaw, in_same_dimension};
 use crate::kernel::copies::BLOCK;
 
-/// The law of space for blocks of particles in a half plane.
+/// The law of space for blocks of particles in a half plane; none elsewhere than in two dimensions.
 pub(crate) fn of_law<T: Lanes, const D: usize>(
     law: &LawInSpace<T>,
     planted: Planted,
-) -> Box<dyn BlockLaw<T, D>> {
-    match law {
+) -> Option<Box<dyn BlockLaw<T, D>>> {
+    let in_half_plane: Box<dyn BlockLaw<T, 2>> = match law {
         LawInSpace::Library(Material::NeoHookean { lambda, mu }) => {
             Box::new(HalfPlane(OfLibrary(NeoHookean { lambda: *lambda, mu: *mu, planted })))
         }
@@ -38,21 +38,22 @@ pub(crate) fn of_law<T: Lanes, const D: usize>(
         }
         LawInSpace::Own(law) => Box::new(HalfPlane(OfCaller(law.clone()))),
         LawInSpace::WithMemory(law) => Box::new(WithMemory::new(law.clone())),
-    }
+    };
+    in_same_dimension::<_, Box<dyn BlockLaw<T, D>>>(in_half_plane)
 }
 
 /// Particles of a half plane, with the stresses of a law of space.
 struct HalfPlane<S>(S);
 
 /// A law of space as particles of a half plane ask for it.
-trait StressesOfSpace<T, const D: usize>: Send + Sync {
+trait StressesOfSpace<T>: Send + Sync {
     /// Sets the stress fluxes of particles with these deformation gradients and internal variables, and the radial forces on them.
     fn set(
         &self,
-        c: &Constants<T, D>,
-        F: &[SMatrix<T, D, D>; BLOCK],
+        c: &Constants<T, 2>,
+        F: &[Matrix2<T>; BLOCK],
         internal: &[T],
-        contributions: &mut Contributions<T, D, BLOCK>,
+        contributions: &mut Contributions<T, 2, BLOCK>,
         radial: &mut [T; BLOCK],
     );
 }
@@ -75,11 +76,11 @@ fn hoops<T: Lanes>(internal: &[T]) -> [Hoop<T>; BLOCK] {
 
 /// Sets the stress flux of a particle of a block; returns the force of the stress around the axis.
 #[inline(always)]
-fn set_flux<T: Lanes, const D: usize>(
-    c: &Constants<T, D>,
-    (n, F): (usize, &SMatrix<T, D, D>),
-    (tau, around, hoop): (&SMatrix<T, D, D>, T, Hoop<T>),
-    contributions: &mut Contributions<T, D, BLOCK>,
+fn set_flux<T: Lanes>(
+    c: &Constants<T, 2>,
+    (n, F): (usize, &Matrix2<T>),
+    (tau, around, hoop): (&Matrix2<T>, T, Hoop<T>),
+    contributions: &mut Contributions<T, 2, BLOCK>,
 ) -> T {
     let volume = contributions.volume[n];
     let in_plane = c.planted.stress_in_forces(*tau, F);
@@ -90,18 +91,18 @@ fn set_flux<T: Lanes, const D: usize>(
     -volume * around / hoop.radius()
 }
 
-impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for HalfPlane<S> {
+impl<T: Lanes, S: StressesOfSpace<T>> BlockLaw<T, 2> for HalfPlane<S> {
     fn stress(
         &self,
-        c: &Constants<T, D>,
-        F: &[SMatrix<T, D, D>; BLOCK],
+        c: &Constants<T, 2>,
+        F: &[Matrix2<T>; BLOCK],
         internal: &[T],
-        contributions: &mut Contributions<T, D, BLOCK>,
+        contributions: &mut Contributions<T, 2, BLOCK>,
     ) {
         let mut radial = [T::zero(); BLOCK];
         self.0.set(c, F, internal, contributions, &mut radial);
         for (force, value) in radial.iter().zip(&mut contributions.value) {
-            value.values[D] += *force;
+            value.values[2] += *force;
         }
     }
 
@@ -109,7 +110,7 @@ impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for Half
         Hoop::<T>::COUNT
     }
 
-    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
+    fn initial(&self, X: &Vector2<T>) -> Vec<T> {
         Hoop::at_rest(X).to_vec()
     }
 
@@ -121,36 +122,36 @@ impl<T: Lanes, S: StressesOfSpace<T, D>, const D: usize> BlockLaw<T, D> for Half
         true
     }
 
-    fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
+    fn evolve(&self, increment: BlockIncrement<'_, T, 2>, internal: &mut [T]) {
         for (x, q) in increment.x.iter().zip(internal.chunks_exact_mut(Hoop::<T>::COUNT)) {
             Hoop::follow(x, q);
         }
     }
 }
 
-impl<T: Lanes, L: LibraryLaw<T>, const D: usize> StressesOfSpace<T, D> for OfLibrary<L> {
+impl<T: Lanes, L: LibraryLaw<T>> StressesOfSpace<T> for OfLibrary<L> {
     fn set(
         &self,
-        c: &Constants<T, D>,
-        F: &[SMatrix<T, D, D>; BLOCK],
+        c: &Constants<T, 2>,
+        F: &[Matrix2<T>; BLOCK],
         internal: &[T],
-        contributions: &mut Contributions<T, D, BLOCK>,
+        contributions: &mut Contributions<T, 2, BLOCK>,
         radial: &mut [T; BLOCK],
     ) {
         dispatch(Stress { F, c, law: self.0, internal, contributions, radial });
     }
 }
 
-struct Stress<'a, T, L, const D: usize> {
-    F: &'a [SMatrix<T, D, D>; BLOCK],
-    c: &'a Constants<T, D>,
+struct Stress<'a, T, L> {
+    F: &'a [Matrix2<T>; BLOCK],
+    c: &'a Constants<T, 2>,
     law: L,
     internal: &'a [T],
-    contributions: &'a mut Contributions<T, D, BLOCK>,
+    contributions: &'a mut Contributions<T, 2, BLOCK>,
     radial: &'a mut [T; BLOCK],
 }
 
-impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
+impl<T: Lanes, L: LibraryLaw<T>> Loop for Stress<'_, T, L> {
     #[inline(always)]
     fn run<V: Vectors>(mut self, _: V) {
         let hoops = hoops(self.internal);
@@ -160,7 +161,7 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
     }
 }
 
-impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
+impl<T: Lanes, L: LibraryLaw<T>> Stress<'_, T, L> {
     /// Sets the stress fluxes of all particles of a block, and their radial forces, by the short form of the law or the full one; returns
     /// whether the short form holds for all of them.
     #[inline(always)]
@@ -169,7 +170,7 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
         let mut short = true;
         for n in 0..BLOCK {
             let (F, hoop) = (&F[n], hoops[n]);
-            let (tau, around, is_short) = law.kirchhoff_with_hoop::<SHORT, D>(F, hoop.stretch);
+            let (tau, around, is_short) = law.kirchhoff_with_hoop::<SHORT, 2>(F, hoop.stretch);
             short &= is_short;
             radial[n] = set_flux(c, (n, F), (&tau, around, hoop), contributions);
         }
@@ -177,13 +178,13 @@ impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Stress<'_, T, L, D> {
     }
 }
 
-impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
+impl<T: Lanes> StressesOfSpace<T> for OfCaller<T> {
     fn set(
         &self,
-        c: &Constants<T, D>,
-        F: &[SMatrix<T, D, D>; BLOCK],
+        c: &Constants<T, 2>,
+        F: &[Matrix2<T>; BLOCK],
         internal: &[T],
-        contributions: &mut Contributions<T, D, BLOCK>,
+        contributions: &mut Contributions<T, 2, BLOCK>,
         radial: &mut [T; BLOCK],
     ) {
         let mut block = BlockOfStresses::at_rest();
@@ -194,7 +195,7 @@ impl<T: Lanes, const D: usize> StressesOfSpace<T, D> for OfCaller<T> {
         block.evaluate(self.0.as_ref());
         for (n, radial) in radial.iter_mut().enumerate() {
             let tau = product(&block.stress(n), &in_space[n].transpose());
-            let in_plane = SMatrix::from_fn(|i, j| tau[(i, j)]);
+            let in_plane = Matrix2::from_fn(|i, j| tau[(i, j)]);
             *radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(2, 2)], hoops[n]), contributions);
         }
     }
@@ -223,13 +224,13 @@ impl<T: Lanes> WithMemory<T> {
     }
 }
 
-impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
+impl<T: Lanes> BlockLaw<T, 2> for WithMemory<T> {
     fn stress(
         &self,
-        c: &Constants<T, D>,
-        F: &[SMatrix<T, D, D>; BLOCK],
+        c: &Constants<T, 2>,
+        F: &[Matrix2<T>; BLOCK],
         internal: &[T],
-        contributions: &mut Contributions<T, D, BLOCK>,
+        contributions: &mut Contributions<T, 2, BLOCK>,
     ) {
         let hoops: Vec<Hoop<T>> = internal.chunks_exact(self.count()).map(Hoop::of).collect();
         let in_space: Vec<Matrix3<T>> =
@@ -238,9 +239,9 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
         block.kirchhoff(self.law.as_ref(), &in_space, &self.own(internal));
         for (n, hoop) in hoops.into_iter().enumerate() {
             let tau = block.stress(n);
-            let in_plane = SMatrix::from_fn(|i, j| tau[((2 * i) % 3, (2 * j) % 3)]);
+            let in_plane = Matrix2::from_fn(|i, j| tau[((2 * i) % 3, (2 * j) % 3)]);
             let radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(1, 1)], hoop), contributions);
-            contributions.value[n].values[D] += radial;
+            contributions.value[n].values[2] += radial;
         }
     }
 
@@ -248,7 +249,7 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
         self.count()
     }
 
-    fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
+    fn initial(&self, X: &Vector2<T>) -> Vec<T> {
         Hoop::at_rest_with(self.law.as_ref(), X)
     }
 
@@ -256,7 +257,7 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for WithMemory<T> {
         true
     }
 
-    fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {
+    fn evolve(&self, increment: BlockIncrement<'_, T, 2>, internal: &mut [T]) {
         let BlockIncrement { time, start, end, x } = increment;
         let mut own = self.own(internal);
         let (mut from, mut to) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));

@@ -16,7 +16,7 @@
 use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
 use mmsmith_lanes::tensor::real;
 use mmsmith_laws::fault::{Fault, Planted};
-use nalgebra::{Matrix2, Matrix3, RealField, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, RealField, Vector2, Vector3};
 
 use crate::grid::PAD_BELOW;
 use crate::grid::geometry::Constants;
@@ -38,21 +38,22 @@ const ACROSS_AXIS: Components = Components::along(RADIUS).with(Components::along
 
 /// Radius and height of a place in space.
 #[inline(always)]
-pub(crate) fn place<T: RealField + Copy, const D: usize>(x: &SVector<T, D>) -> SVector<T, 2> {
-    let [x, y, z] = [x[0], x[1 % D], x[D - 1]];
-    SVector::from([(x * x + y * y).sqrt(), z])
+pub(crate) fn place<T: RealField + Copy>(x: &Vector3<T>) -> Vector2<T> {
+    Vector2::new((x.x * x.x + x.y * x.y).sqrt(), x.z)
 }
 
 /// The deformation gradient within the half plane of a particle, which is across its second column: that points around the axis.
 #[inline(always)]
-pub(crate) fn in_half_plane<T: RealField + Copy, const D: usize>(
-    F: &SMatrix<T, D, D>,
-) -> SMatrix<T, 2, 2> {
-    let [around, last] = [1 % D, D - 1];
-    let (cos, sin) = (F[(around, around)], -F[(0, around)]);
+pub(crate) fn in_half_plane<T: RealField + Copy>(F: &Matrix3<T>) -> Matrix2<T> {
+    let (cos, sin) = (F[(AROUND, AROUND)], -F[(RADIUS, AROUND)]);
     let length = (cos * cos + sin * sin).sqrt();
-    let along_radius = |J: usize| (cos * F[(0, J)] + sin * F[(around, J)]) / length;
-    SMatrix::<T, 2, 2>::new(along_radius(0), along_radius(last), F[(last, 0)], F[(last, last)])
+    let along_radius = |J: usize| (cos * F[(RADIUS, J)] + sin * F[(AROUND, J)]) / length;
+    Matrix2::new(
+        along_radius(RADIUS),
+        along_radius(HEIGHT),
+        F[(HEIGHT, RADIUS)],
+        F[(HEIGHT, HEIGHT)],
+    )
 }
 
 /// The weights of up to `BLOCK` particles.
@@ -95,33 +96,32 @@ impl<T: Lanes> Frame<T> {
     }
 
     #[inline(always)]
-    fn matrix_in<const D: usize>(&self, of: &SMatrix<T, D, D>) -> Matrix3<T> {
-        let row = |i: usize| [0, 1, 2].map(|j: usize| of[(i.min(D - 1), j.min(D - 1))]);
-        let rows = [0, 1, 2].map(row);
+    fn matrix_in(&self, of: &Matrix3<T>) -> Matrix3<T> {
+        let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| of[(i, j)]));
         let across = [0, 1, 2].map(|j| self.vector_in(rows.map(|row| row[j])));
         let own = [0, 1, 2].map(|i| self.vector_in(across.map(|column| column[i])));
         Matrix3::from_fn(|i, j| own[i][j])
     }
 
     #[inline(always)]
-    fn matrix_out<const D: usize>(&self, of: &Matrix3<T>) -> SMatrix<T, D, D> {
+    fn matrix_out(&self, of: &Matrix3<T>) -> Matrix3<T> {
         let across = [0, 1, 2].map(|j| self.vector_out([0, 1, 2].map(|i| of[(i, j)])));
         let own = [0, 1, 2].map(|i| self.vector_out(across.map(|column| column[i])));
-        SMatrix::from_fn(|i, j| own[i][j])
+        Matrix3::from_fn(|i, j| own[i][j])
     }
 
     /// Contributions of particle `k` of a block to its nodes: values, and slopes along the radius and the height.
     #[inline(always)]
-    fn given<const D: usize>(
+    fn given(
         &self,
-        contributions: &Contributions<T, D, BLOCK>,
+        contributions: &Contributions<T, 3, BLOCK>,
         k: usize,
         (is_affine, planted): (bool, Planted),
     ) -> ([T; LANES], [[T; LANES]; 2]) {
         let from = &contributions.value[k].values;
         let [momentum, force] =
-            [0, D].map(|first| self.vector_in(std::array::from_fn(|i| from[first + i])));
-        let flux = self.matrix_in::<D>(&contributions.stress_flux[k]);
+            [0, 3].map(|first| self.vector_in(std::array::from_fn(|i| from[first + i])));
+        let flux = self.matrix_in(&contributions.stress_flux[k]);
         let (mut value, mut slope) = ([T::zero(); LANES], [[T::zero(); LANES]; 2]);
         for i in 0..3 {
             (value[i], value[3 + i]) = (momentum[i], force[i]);
@@ -133,9 +133,9 @@ impl<T: Lanes> Frame<T> {
             value[3 + RADIUS] += flux[(AROUND, AROUND)] * self.per_radius;
             value[3 + AROUND] -= flux[(RADIUS, AROUND)] * self.per_radius;
         }
-        value[6] = from[2 * D];
+        value[6] = from[6];
         if is_affine {
-            let affine = self.matrix_in::<D>(&contributions.affine[k]);
+            let affine = self.matrix_in(&contributions.affine[k]);
             for i in 0..3 {
                 (slope[0][i], slope[1][i]) = (affine[(i, RADIUS)], affine[(i, HEIGHT)]);
             }
@@ -145,11 +145,11 @@ impl<T: Lanes> Frame<T> {
 
     /// The values of the grid at a particle.
     #[inline(always)]
-    fn interpolated<const D: usize, const W: usize, L: Weights<T, 2, W>>(
+    fn interpolated<const W: usize, L: Weights<T, 2, W>>(
         &self,
         weights: &L,
         sums: &InterpolationSums<T, 2>,
-    ) -> Interpolated<T, D> {
+    ) -> Interpolated<T, 3> {
         let InterpolationSums { value, slope } = sums;
         let [velocity, second] = [0, 3].map(|first| std::array::from_fn(|i| value[first + i]));
         let mut gradient = Matrix3::zeros();
@@ -158,7 +158,7 @@ impl<T: Lanes> Frame<T> {
         }
         gradient[(RADIUS, AROUND)] = -velocity[AROUND] * self.per_radius;
         gradient[(AROUND, AROUND)] = velocity[RADIUS] * self.per_radius;
-        let mut affine = SMatrix::zeros();
+        let mut affine = Matrix3::zeros();
         if L::AFFINE {
             let mut own = Matrix3::zeros();
             for rows in [[RADIUS, HEIGHT], [AROUND, AROUND]] {
@@ -173,8 +173,8 @@ impl<T: Lanes> Frame<T> {
         }
         let [velocity, second] = [velocity, second].map(|of| self.vector_out(of));
         Interpolated {
-            velocity: SVector::from_fn(|i, _| velocity[i]),
-            second: SVector::from_fn(|i, _| second[i]),
+            velocity: velocity.into(),
+            second: second.into(),
             velocity_gradient: self.matrix_out(&gradient),
             affine,
         }
@@ -195,16 +195,16 @@ impl<T: Lanes> RevolvingWeights<T> {
 }
 
 /// Sets the frames of a block of particles, and what of their kinematics lies in their half planes.
-struct Frames<'a, T, const D: usize> {
-    c: &'a Constants<T, D>,
+struct Frames<'a, T> {
+    c: &'a Constants<T, 3>,
     plane: &'a Constants<T, 2>,
     shape: &'a ProductShape<T, 2>,
-    kinematics: Kinematics<'a, T, D>,
+    kinematics: Kinematics<'a, T, 3>,
     frames: &'a mut [Frame<T>; BLOCK],
-    in_plane: (&'a mut [SVector<T, 2>; BLOCK], &'a mut [SMatrix<T, 2, 2>; BLOCK]),
+    in_plane: (&'a mut [Vector2<T>; BLOCK], &'a mut [Matrix2<T>; BLOCK]),
 }
 
-impl<T: Lanes, const D: usize> Loop for Frames<'_, T, D> {
+impl<T: Lanes> Loop for Frames<'_, T> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { c, plane, shape, kinematics, frames, in_plane: (x, F) } = self;
@@ -221,7 +221,7 @@ impl<T: Lanes, const D: usize> Loop for Frames<'_, T, D> {
             frames[k] = match radius > T::zero() {
                 true => Frame {
                     cos: kinematics.x[k][0] * inverse,
-                    sin: kinematics.x[k][1 % D] * inverse,
+                    sin: kinematics.x[k][1] * inverse,
                     per_radius: spacing * inverse,
                     is_next_to_axis,
                 },
@@ -232,14 +232,14 @@ impl<T: Lanes, const D: usize> Loop for Frames<'_, T, D> {
 }
 
 /// The distances in memory between neighbouring nodes of the half plane.
-fn in_plane<const D: usize>(strides: &[usize; D]) -> [usize; 2] {
-    [strides[0], strides[D - 1]]
+fn in_plane(strides: &[usize; 3]) -> [usize; 2] {
+    [strides[RADIUS], strides[HEIGHT]]
 }
 
-impl<T: Lanes, const D: usize> BlockWeights<T, D> for RevolvingWeights<T> {
-    fn compute(&mut self, c: &Constants<T, D>, ids: &[u32], kinematics: Kinematics<'_, T, D>) {
+impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
+    fn compute(&mut self, c: &Constants<T, 3>, ids: &[u32], kinematics: Kinematics<'_, T, 3>) {
         let plane = c.half_plane();
-        let (mut x, mut F) = ([SVector::zeros(); BLOCK], [SMatrix::zeros(); BLOCK]);
+        let (mut x, mut F) = ([Vector2::zeros(); BLOCK], [Matrix2::zeros(); BLOCK]);
         let (frames, in_plane) = (&mut self.frames, (&mut x, &mut F));
         dispatch(Frames { c, plane: &plane, shape: &self.shape, kinematics, frames, in_plane });
         self.nodes_before = c.nodes_before as usize;
@@ -248,56 +248,54 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for RevolvingWeights<T> {
 
     fn p2g(
         &mut self,
-        strides: &[usize; D],
-        band: &mut [Node<T, D>],
+        strides: &[usize; 3],
+        band: &mut [Node<T, 3>],
         first: usize,
-        contributions: &Contributions<T, D, BLOCK>,
+        contributions: &Contributions<T, 3, BLOCK>,
         count: usize,
     ) {
         let (weights, strides) = (&*self, in_plane(strides));
         let of_block = P2gOfBlock { weights, strides, band, first, contributions, count };
         match (self.shape.width(), self.is_affine) {
-            (2, false) => dispatch(P2g::<_, D, 2, false>(of_block)),
-            (3, false) => dispatch(P2g::<_, D, 3, false>(of_block)),
-            (_, false) => dispatch(P2g::<_, D, 4, false>(of_block)),
-            (2, true) => dispatch(P2g::<_, D, 2, true>(of_block)),
-            (3, true) => dispatch(P2g::<_, D, 3, true>(of_block)),
-            (_, true) => dispatch(P2g::<_, D, 4, true>(of_block)),
+            (2, false) => dispatch(P2g::<_, 2, false>(of_block)),
+            (3, false) => dispatch(P2g::<_, 3, false>(of_block)),
+            (_, false) => dispatch(P2g::<_, 4, false>(of_block)),
+            (2, true) => dispatch(P2g::<_, 2, true>(of_block)),
+            (3, true) => dispatch(P2g::<_, 3, true>(of_block)),
+            (_, true) => dispatch(P2g::<_, 4, true>(of_block)),
         }
     }
 
     fn g2p(
         &mut self,
-        strides: &[usize; D],
-        nodes: &[Node<T, D>],
-        receiver: &mut [Interpolated<T, D>],
+        strides: &[usize; 3],
+        nodes: &[Node<T, 3>],
+        receiver: &mut [Interpolated<T, 3>],
     ) {
         let of_block = G2pOfBlock { weights: self, strides: in_plane(strides), nodes, receiver };
         match (self.shape.width(), self.is_affine) {
-            (2, false) => dispatch(G2p::<_, D, 2, false>(of_block)),
-            (3, false) => dispatch(G2p::<_, D, 3, false>(of_block)),
-            (_, false) => dispatch(G2p::<_, D, 4, false>(of_block)),
-            (2, true) => dispatch(G2p::<_, D, 2, true>(of_block)),
-            (3, true) => dispatch(G2p::<_, D, 3, true>(of_block)),
-            (_, true) => dispatch(G2p::<_, D, 4, true>(of_block)),
+            (2, false) => dispatch(G2p::<_, 2, false>(of_block)),
+            (3, false) => dispatch(G2p::<_, 3, false>(of_block)),
+            (_, false) => dispatch(G2p::<_, 4, false>(of_block)),
+            (2, true) => dispatch(G2p::<_, 2, true>(of_block)),
+            (3, true) => dispatch(G2p::<_, 3, true>(of_block)),
+            (_, true) => dispatch(G2p::<_, 4, true>(of_block)),
         }
     }
 }
 
-struct P2gOfBlock<'a, T, const D: usize> {
+struct P2gOfBlock<'a, T> {
     weights: &'a RevolvingWeights<T>,
     strides: [usize; 2],
-    band: &'a mut [Node<T, D>],
+    band: &'a mut [Node<T, 3>],
     first: usize,
-    contributions: &'a Contributions<T, D, BLOCK>,
+    contributions: &'a Contributions<T, 3, BLOCK>,
     count: usize,
 }
 
-struct P2g<'a, T, const D: usize, const W: usize, const AFFINE: bool>(P2gOfBlock<'a, T, D>);
+struct P2g<'a, T, const W: usize, const AFFINE: bool>(P2gOfBlock<'a, T>);
 
-impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
-    for P2g<'_, T, D, W, AFFINE>
-{
+impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for P2g<'_, T, W, AFFINE> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
@@ -309,11 +307,11 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
             match product.extended(k) {
                 Some(extended) => {
                     let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
-                    add::<_, _, D, EXTENDED>(frame, &weights, &strides, nodes, &given);
+                    add::<_, _, EXTENDED>(frame, &weights, &strides, nodes, &given);
                 }
                 None => {
                     let weights = ParticleWeights::<T, 2, W, AFFINE> { weights: product, k };
-                    add::<_, _, D, W>(frame, &weights, &strides, nodes, &given);
+                    add::<_, _, W>(frame, &weights, &strides, nodes, &given);
                 }
             }
         }
@@ -322,11 +320,11 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 
 /// Adds a particle to the nodes of a band, and next to the axis its image.
 #[inline(always)]
-fn add<T: Lanes, L: Weights<T, 2, W>, const D: usize, const W: usize>(
+fn add<T: Lanes, L: Weights<T, 2, W>, const W: usize>(
     frame: &Frame<T>,
     weights: &L,
     strides: &[usize; 2],
-    (band, first, nodes_before): (&mut [Node<T, D>], usize, usize),
+    (band, first, nodes_before): (&mut [Node<T, 3>], usize, usize),
     (value, slope): &([T; LANES], [[T; LANES]; 2]),
 ) {
     if !frame.is_next_to_axis {
@@ -350,18 +348,16 @@ fn add<T: Lanes, L: Weights<T, 2, W>, const D: usize, const W: usize>(
     }
 }
 
-struct G2pOfBlock<'a, T, const D: usize> {
+struct G2pOfBlock<'a, T> {
     weights: &'a RevolvingWeights<T>,
     strides: [usize; 2],
-    nodes: &'a [Node<T, D>],
-    receiver: &'a mut [Interpolated<T, D>],
+    nodes: &'a [Node<T, 3>],
+    receiver: &'a mut [Interpolated<T, 3>],
 }
 
-struct G2p<'a, T, const D: usize, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T, D>);
+struct G2p<'a, T, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T>);
 
-impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
-    for G2p<'_, T, D, W, AFFINE>
-{
+impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for G2p<'_, T, W, AFFINE> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self(G2pOfBlock { weights, strides, nodes, receiver }) = self;
@@ -370,14 +366,14 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
             *receiver = match product.extended(k) {
                 Some(extended) => {
                     let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
-                    frame.interpolated::<D, EXTENDED, _>(
+                    frame.interpolated::<EXTENDED, _>(
                         &weights,
                         &InterpolationSums::of(&weights, &strides, nodes),
                     )
                 }
                 None => {
                     let weights = ParticleWeights::<T, 2, W, AFFINE> { weights: product, k };
-                    frame.interpolated::<D, W, _>(
+                    frame.interpolated::<W, _>(
                         &weights,
                         &InterpolationSums::of(&weights, &strides, nodes),
                     )
