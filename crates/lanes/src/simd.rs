@@ -8,7 +8,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use bytemuck::Pod;
 use nalgebra::RealField;
-use pulp::{Arch, Scalar, Simd, WithSimd};
+#[cfg(not(target_family = "wasm"))]
+use pulp::Arch;
+use pulp::{Scalar, Simd, WithSimd};
 
 use crate::tensor::real;
 
@@ -495,11 +497,11 @@ static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx2 as u8);
 impl Registers {
     /// The registers that this processor has.
     pub fn present() -> Vec<Self> {
-        match Arch::new() {
-            #[cfg(target_arch = "x86_64")]
-            Arch::V3(_) | Arch::V4(_) => vec![Self::Scalar, Self::Avx2],
-            _ => vec![Self::Scalar],
+        #[cfg(target_arch = "x86_64")]
+        if matches!(Arch::new(), Arch::V3(_) | Arch::V4(_)) {
+            return vec![Self::Scalar, Self::Avx2];
         }
+        vec![Self::Scalar]
     }
 
     /// Keeps all kernels of this process from wider registers than these. No result depends on it.
@@ -524,7 +526,10 @@ pub fn dispatch<L: Loop>(work: L) {
             None => Scalar::new().vectorize(Instance(work, Scalar::new())),
         }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    // Whoever compiles a module of WebAssembly chooses its instructions.
+    #[cfg(target_family = "wasm")]
+    Scalar::new().vectorize(Instance(work, Scalar::new()));
+    #[cfg(not(any(target_arch = "x86_64", target_family = "wasm")))]
     Arch::new().dispatch(Instance(work, Scalar::new()));
 }
 

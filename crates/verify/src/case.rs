@@ -3,7 +3,7 @@
 use mmsmith_laws::{HalfPlane, ReturnMap, Stressed, Volume, with_memory, with_projected_volume};
 use mmsmith_mpm::fault::{Fault, Planted};
 use mmsmith_mpm::{Integrator, Law, Material, SetupError, Shape};
-use mmsmith_runtime::{AnySolution, Real, Solution};
+use mmsmith_runtime::{Real, Solution};
 use mmsmith_stated_law::Compiled;
 
 use crate::error::{CaseError, SceneError};
@@ -118,8 +118,16 @@ pub enum Arithmetic<'a> {
     /// `f64`.
     Double,
     /// `f32`, with the solution built in that precision for the body force.
-    Single(&'a AnySolution<f32>),
+    Single(&'a InSinglePrecision),
 }
+
+/// A solution in single precision.
+#[cfg(feature = "single-precision")]
+pub type InSinglePrecision = mmsmith_runtime::AnySolution<f32>;
+
+/// Nothing: the crate is compiled without the feature `single-precision`.
+#[cfg(not(feature = "single-precision"))]
+pub type InSinglePrecision = std::convert::Infallible;
 
 impl Case {
     /// Checks the settings that need no solution to be judged.

@@ -27,13 +27,18 @@ macro_rules! in_dimension {
 macro_rules! in_arithmetic {
     ($exact:expr, $arithmetic:expr, |$s:ident, $m:ident| $body:expr, else $otherwise:expr) => {{
         use mmsmith_runtime::AnySolution::{One, Three, Two};
-        use $crate::case::Arithmetic::{Double, Single};
+        #[cfg(feature = "single-precision")]
+        use $crate::case::Arithmetic::Single;
+        use $crate::case::Arithmetic::Double;
         match ($exact, $arithmetic) {
             (One(s), Double) => in_arithmetic!(@ s, s, $s, $m, $body),
             (Two(s), Double) => in_arithmetic!(@ s, s, $s, $m, $body),
             (Three(s), Double) => in_arithmetic!(@ s, s, $s, $m, $body),
+            #[cfg(feature = "single-precision")]
             (One(s), Single(One(m))) => in_arithmetic!(@ s, m, $s, $m, $body),
+            #[cfg(feature = "single-precision")]
             (Two(s), Single(Two(m))) => in_arithmetic!(@ s, m, $s, $m, $body),
+            #[cfg(feature = "single-precision")]
             (Three(s), Single(Three(m))) => in_arithmetic!(@ s, m, $s, $m, $body),
             _ => $otherwise,
         }

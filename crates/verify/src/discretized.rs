@@ -44,6 +44,7 @@ impl<'a> Discretized<'a> {
         {
             let (plan, floors, on_grid): (_, _, Box<dyn Simulate + 'a>) = match arithmetic {
                 Arithmetic::Double => InHalfPlane::judged(own, exact_in_space.as_ref(), case)?,
+                #[cfg(feature = "single-precision")]
                 Arithmetic::Single(AnySolution::Three(model)) => {
                     InHalfPlane::judged(own, model.as_ref(), case)?
                 }

@@ -80,7 +80,7 @@ mod whole_file;
 pub use axis::OnAxis;
 pub use blind::{BlindSpot, blind_spots};
 pub use body::forgotten_cell_length;
-pub use case::{Arithmetic, Case, CflSpeed, Extent};
+pub use case::{Arithmetic, Case, CflSpeed, Extent, InSinglePrecision};
 pub use check::{
     BLUNT, Change, CheckError, CheckReport, Finding, NoBody, OWN_ERROR_FACTOR, TOLERANCE, Verdict,
     body_of, check, has_body,
