@@ -6,6 +6,7 @@ For the Python that runs it. CI builds the library once, with the tests; maturin
 is made in .ci/long.
 """
 
+import os
 import shutil
 import sys
 import sysconfig
@@ -30,8 +31,14 @@ information.mkdir()
 groups = {"console_scripts": project["scripts"], **project["entry-points"]}
 lines = [line for group, entries in groups.items() for line in [f"[{group}]", *(f"{key} = {value}" for key, value in entries.items())]]
 (information / "entry_points.txt").write_text("\n".join(lines) + "\n")
-for script, place in project["scripts"].items():
+scripts = [Path(sysconfig.get_path("scripts")) / script for script in project["scripts"]]
+for path, place in zip(scripts, project["scripts"].values()):
     module, function = place.split(":")
-    path = Path(sysconfig.get_path("scripts")) / script
     path.write_text(f"#!{sys.executable}\nimport sys\n\nfrom {module} import {function}\n\nsys.exit({function}())\n")
     path.chmod(0o755)
+
+# Without the list of its files pip cannot put another build in the place of this one.
+record = information / "RECORD"
+record.touch()
+files = [path for folder in [site / name, information] for path in sorted(folder.rglob("*")) if path.is_file()]
+record.write_text("".join(f"{os.path.relpath(path, site)},,\n" for path in files + scripts))
