@@ -136,7 +136,7 @@ end
 
 # The number of a point of the table, by its position; nothing where there is no such point.
 function mmsmith_point_of(table, X)
-    least = 1e-12 * maximum(abs, table.places; init = 0.0)
+    least = 1e-12 * mapreduce(abs, max, table.places; init = 0.0)
     is_here(k) = all(abs(X[i] - table.places[i, k]) <= 1e-9 * abs(table.places[i, k]) + least for i in 1:table.dimension)
     return findfirst(is_here, 1:length(table.of_points))
 end
