@@ -40,7 +40,9 @@ def call(command, **options):
     if done.returncode != 0 and b"no table over the body is accurate" in done.stderr:
         raise NeedsPoints(done.stderr.decode())
     if done.returncode != 0:
-        raise SystemExit(f"{' '.join(str(word) for word in command)}: {done.stderr.decode()[-3000:]}{done.stdout.decode()[-500:]}")
+        # What it has printed may be numbers.
+        told = [text.decode(errors="replace") for text in (done.stderr, done.stdout)]
+        raise SystemExit(f"{' '.join(str(word) for word in command)}: {told[0][-3000:]}{told[1][-500:]}")
     return done.stdout
 
 
