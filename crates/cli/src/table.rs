@@ -20,6 +20,8 @@ pub(crate) struct Table {
     flow: Option<usize>,
 }
 
+/// The characters of a number with a remark, as a slope with the runs that stopped, at most.
+const LONGEST_NUMBER: usize = 24;
 /// Columns of blanks between two columns of a table.
 const GAP: usize = 2;
 
@@ -194,8 +196,10 @@ impl Table {
             let missing = columns - row.len();
             let row = row.iter().map(String::as_str).chain(std::iter::repeat_n("", missing));
             let cells = row.enumerate().map(|(column, cell)| {
+                // The reason in the place of a number takes lines, so that the table fits on paper.
+                let is_sentence = index > 0 && cell.chars().count() > LONGEST_NUMBER;
                 let cell = html::text(cell);
-                match (index, column < self.words) {
+                match (index, column < self.words || is_sentence) {
                     (0, true) => format!("<th scope=\"col\">{cell}</th>"),
                     (0, false) => format!("<th scope=\"col\" class=\"number\">{cell}</th>"),
                     (_, true) => format!("<td>{cell}</td>"),
@@ -365,8 +369,10 @@ mod tests {
     fn html_text_cannot_leave_its_cell() {
         let mut table = Table::new(1, ["what", "n"]);
         table.row(["<b>", "1"]);
+        table.row(["c", "stopped: a particle left the grid"]);
         let text = table.html("a & b");
         assert!(text.contains("<td>&lt;b&gt;</td><td class=\"number\">1</td>"), "{text}");
+        assert!(text.contains("<td>stopped: a particle left the grid</td>"), "{text}");
         assert!(text.contains("<caption><span>a &amp; b</span></caption>"), "{text}");
     }
 }
