@@ -145,10 +145,7 @@ rules! {
         ["ring-solved", "solved-thin-ring"];
     Work WholeDivergence "whole divergence": "linear part and remainder" => "Div P in one form, where nothing joins with the inertia",
         "the split is of use for what cancels against the inertia alone",
-        [
-            "bumps", "cylindrical", "rotating-cylindrical", "skew-3d", "spherical", "swirl",
-            "waves-of-one-size",
-        ];
+        ["bumps", "cylindrical", "rotating-cylindrical", "skew-3d", "spherical", "swirl"];
     Work Isochoric "isochoric laws": "W(J^(-2/3) I1) in components" => "the chain rule over J and I1",
         "Piola's identity leaves six terms of some hundred",
         [
