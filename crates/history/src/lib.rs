@@ -37,6 +37,6 @@ pub use maxwell::{ElasticPart, Maxwell};
 pub use motion::Motion;
 pub use number::{Dual, Number};
 pub use stated::{StatedHistory, StatedHistoryError};
-pub use table::{AtPoint, AtTime, Grid, Series, Table, place};
+pub use table::{AtPoint, AtTime, Grid, Series, Table, place, polynomials_into};
 pub use tensor::{ENTRIES, Tensor, determinant, identity};
 pub use trajectory::{Change, HistoryError, Trajectory, divergence, followed};

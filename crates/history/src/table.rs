@@ -48,8 +48,8 @@ fn polynomials(x: f64, n: usize) -> Vec<f64> {
     values
 }
 
-/// As [`polynomials`], as many as there is room for.
-pub(crate) fn polynomials_into(x: f64, values: &mut [f64]) {
+/// The Chebyshev polynomials at a place between -1 and 1, as many as there is room for.
+pub fn polynomials_into(x: f64, values: &mut [f64]) {
     let (mut last, mut next) = (1.0, x);
     for value in values {
         *value = last;
@@ -650,22 +650,21 @@ fn transform<const D: usize>(column: &mut [f64], along: &[Transform; D]) {
     }
 }
 
-/// Where a time is among the pieces of series, and the polynomials there.
-#[derive(Clone, Debug, PartialEq)]
+/// Where a time is among the pieces of series.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtTime {
     /// The piece.
     pub piece: usize,
-    /// The values of the polynomials, by which a series' coefficients of this piece are multiplied.
-    pub polynomials: Vec<f64>,
+    /// The place in the piece, from -1 to 1.
+    pub x: f64,
 }
 
 impl<const D: usize> Grid<D> {
-    /// The polynomials at a time.
+    /// Where a time is.
     #[must_use]
     pub fn at_time(&self, time: f64) -> AtTime {
         let piece = piece_of(&self.knots, time);
-        let x = within([self.knots[piece], self.knots[piece + 1]], time);
-        AtTime { piece, polynomials: polynomials(x, self.in_time) }
+        AtTime { piece, x: within([self.knots[piece], self.knots[piece + 1]], time) }
     }
 }
 

@@ -675,10 +675,10 @@ impl<const D: usize> Tables<D> {
         })
     }
 
-    /// The polynomials at a time.
+    /// Where a time is among the pieces of the table.
     fn at_time(&self, t: f64) -> AtTime {
         match &self.table {
-            None => AtTime { piece: 0, polynomials: Vec::new() },
+            None => AtTime { piece: 0, x: 0.0 },
             Some(OverAxes::One(table)) => table.grid().at_time(t),
             Some(OverAxes::Two(table)) => table.grid().at_time(t),
             Some(OverAxes::Three(table)) => table.grid().at_time(t),

@@ -5,7 +5,7 @@
 //! coefficients are small, have them in single precision. Which polynomials these are follows from the table alone, so that it is the
 //! same for any part of a body.
 
-use mmsmith_history::{AtPoint, AtTime, Table};
+use mmsmith_history::{AtPoint, AtTime, Table, polynomials_into};
 use std::ops::Range;
 
 /// Terms of a series that are summed side by side.
@@ -28,18 +28,17 @@ pub(super) struct PackedTime {
 }
 
 impl PackedTime {
-    pub(super) fn of(time: &AtTime) -> Self {
-        // The second polynomial is the place in the piece, from -1 to 1.
-        let x = time.polynomials.get(1).copied().unwrap_or(0.0);
-        let is_late = x > 0.0;
-        let x = if is_late { 2.0 * x - 1.0 } else { 2.0 * x + 1.0 };
+    pub(super) fn of(time: AtTime) -> Self {
+        let is_late = time.x > 0.0;
+        let x = if is_late { 2.0 * time.x - 1.0 } else { 2.0 * time.x + 1.0 };
         let mut polynomials = [0.0; MOST_TERMS];
-        let (mut last, mut next) = (1.0, x);
-        for value in &mut polynomials {
-            *value = last;
-            (last, next) = (next, 2.0 * x * next - last);
-        }
+        polynomials_into(x, &mut polynomials);
         Self { half: 2 * time.piece + usize::from(is_late), polynomials }
+    }
+
+    #[inline(always)]
+    fn groups(&self) -> &[[f64; SIDE_BY_SIDE]] {
+        self.polynomials.as_chunks().0
     }
 }
 
@@ -96,9 +95,9 @@ pub(super) struct Packing {
     quantities: usize,
     pieces: usize,
     in_time: usize,
-    /// Coefficients in double precision: a multiple of [`SIDE_BY_SIDE`].
+    /// Groups of [`SIDE_BY_SIDE`] coefficients in double precision.
     doubles: usize,
-    /// Coefficients after these, in single precision.
+    /// Groups after these, in single precision.
     singles: usize,
     halves: Halves,
 }
@@ -119,25 +118,30 @@ impl Packing {
             of_kind.map(|own| table.largest(own)).fold(0.0, f64::max)
         };
         // Polynomials in space are at most one: a bound of each coefficient in time, at any place.
-        let bounds: Vec<f64> =
-            table.columns().map(|column| column.iter().map(|c| c.abs()).sum()).collect();
+        let bound = |column: &[f64]| column.iter().map(|c| c.abs()).sum();
+        let steps = pieces * in_time;
+        let columns = table.columns().skip(quantities.start * steps).take(quantities.len() * steps);
+        let bounds: Vec<f64> = columns.map(bound).collect();
         // The sums of the bounds from each degree on as shares of the scale, the largest of all series.
         let mut rests = vec![0.0_f64; in_time];
-        for quantity in quantities.clone().filter(|own| scale(*own) > 0.0) {
-            let own = &bounds[quantity * pieces * in_time..][..pieces * in_time];
+        for (quantity, own) in quantities.clone().zip(bounds.chunks_exact(steps)) {
+            let scale = scale(quantity);
+            if scale == 0.0 {
+                continue;
+            }
             for (piece, half) in
                 own.chunks_exact(in_time).flat_map(|piece| [(piece, 0), (piece, 1)])
             {
                 let mut rest = 0.0;
                 for (most, bound) in rests.iter_mut().zip(halves.bounds(half, piece)).rev() {
-                    rest += bound / scale(quantity);
+                    rest += bound / scale;
                     *most = most.max(rest);
                 }
             }
         }
         let until = |most: f64| {
             let count = rests.iter().position(|rest| *rest <= most).unwrap_or(in_time);
-            count.max(1).next_multiple_of(SIDE_BY_SIDE)
+            count.max(1).div_ceil(SIDE_BY_SIDE)
         };
         let added = 0.5 * SHARE_OF_ERROR * error;
         let doubles = until(added / SINGLE);
@@ -161,29 +165,26 @@ impl Packed {
     /// For so many particles, whose series follow by [`set`](Self::set).
     pub(super) fn new(packing: Packing, particles: usize) -> Self {
         let series = 2 * packing.pieces * particles * packing.quantities;
-        let doubles = vec![[0.0; SIDE_BY_SIDE]; series * packing.doubles / SIDE_BY_SIDE];
-        let singles = vec![[0.0; SIDE_BY_SIDE]; series * packing.singles / SIDE_BY_SIDE];
+        let doubles = vec![[0.0; SIDE_BY_SIDE]; series * packing.doubles];
+        let singles = vec![[0.0; SIDE_BY_SIDE]; series * packing.singles];
         Self { packing, particles, doubles, singles }
     }
 
     /// Sets the series of a particle.
     pub(super) fn set(&mut self, n: usize, series: &AtPoint) {
-        let Packing { in_time, quantities, doubles, .. } = self.packing;
+        let Packing { in_time, quantities, doubles, singles, .. } = self.packing;
         for quantity in 0..quantities {
             for (piece, own) in series.coefficients(quantity).chunks_exact(in_time).enumerate() {
                 for half in 0..2 {
-                    let [of_doubles, of_singles] = self.ranges(2 * piece + half, n);
+                    let places = self.ranges(2 * piece + half, n);
+                    let [of_doubles, of_singles] = places.map(|range| range.start + quantity);
                     for (i, c) in self.packing.halves.coefficients(half, own).enumerate() {
-                        let place =
-                            |i: usize| (i / SIDE_BY_SIDE * quantities + quantity, i % SIDE_BY_SIDE);
-                        if i < doubles {
-                            let (group, m) = place(i);
-                            self.doubles[of_doubles.clone()][group][m] = c;
-                        } else {
-                            let (group, m) = place(i - doubles);
-                            if let Some(own) = self.singles[of_singles.clone()].get_mut(group) {
-                                own[m] = c as f32;
-                            }
+                        let (group, m) = (i / SIDE_BY_SIDE, i % SIDE_BY_SIDE);
+                        if group < doubles {
+                            self.doubles[of_doubles + group * quantities][m] = c;
+                        } else if group < doubles + singles {
+                            let place = of_singles + (group - doubles) * quantities;
+                            self.singles[place][m] = c as f32;
                         }
                     }
                 }
@@ -195,8 +196,8 @@ impl Packed {
     #[inline(always)]
     fn ranges(&self, half: usize, n: usize) -> [Range<usize>; 2] {
         let Packing { quantities, doubles, singles, .. } = self.packing;
-        [doubles, singles].map(|count| {
-            let groups = quantities * (count / SIDE_BY_SIDE);
+        [doubles, singles].map(|groups| {
+            let groups = quantities * groups;
             let first = (half * self.particles + n) * groups;
             first..first + groups
         })
@@ -206,53 +207,53 @@ impl Packed {
     #[inline(always)]
     pub(super) fn values<const N: usize>(&self, n: usize, time: &PackedTime) -> [f64; N] {
         let [doubles, singles] = self.ranges(time.half, n);
-        let (first, rest) = time.polynomials.split_at(self.packing.doubles);
+        let (first, rest) = time.groups().split_at(self.packing.doubles);
         let mut sums = [[0.0; SIDE_BY_SIDE]; N];
-        let all = self.doubles[doubles].as_chunks::<N>().0;
-        for (own, p) in all.iter().zip(first.as_chunks::<SIDE_BY_SIDE>().0) {
-            for k in 0..N {
-                for m in 0..SIDE_BY_SIDE {
-                    sums[k][m] += own[k][m] * p[m];
-                }
-            }
+        for (own, p) in self.doubles[doubles].as_chunks::<N>().0.iter().zip(first) {
+            sums.iter_mut().zip(own).for_each(|(sums, own)| add(sums, *own, p));
         }
-        let all = self.singles[singles].as_chunks::<N>().0;
-        for (own, p) in all.iter().zip(rest.as_chunks::<SIDE_BY_SIDE>().0) {
-            for k in 0..N {
-                for m in 0..SIDE_BY_SIDE {
-                    sums[k][m] += f64::from(own[k][m]) * p[m];
-                }
-            }
+        for (own, p) in self.singles[singles].as_chunks::<N>().0.iter().zip(rest) {
+            sums.iter_mut().zip(own).for_each(|(sums, own)| add(sums, own.map(f64::from), p));
         }
-        sums.map(|[a, b, c, d]| (a + b) + (c + d))
+        sums.map(total)
     }
 
     /// The value of a quantity of a particle.
     pub(super) fn value(&self, n: usize, quantity: usize, time: &PackedTime) -> f64 {
         let [doubles, singles] = self.ranges(time.half, n);
-        let of_doubles =
-            self.doubles[doubles].iter().skip(quantity).step_by(self.packing.quantities);
-        let of_singles =
-            self.singles[singles].iter().skip(quantity).step_by(self.packing.quantities);
+        let quantities = self.packing.quantities;
+        let of_doubles = self.doubles[doubles].iter().skip(quantity).step_by(quantities);
+        let of_singles = self.singles[singles].iter().skip(quantity).step_by(quantities);
         let all = of_doubles.copied().chain(of_singles.map(|own| own.map(f64::from)));
         let mut sums = [0.0; SIDE_BY_SIDE];
-        for (own, p) in all.zip(time.polynomials.as_chunks::<SIDE_BY_SIDE>().0) {
-            for m in 0..SIDE_BY_SIDE {
-                sums[m] += own[m] * p[m];
-            }
-        }
-        (sums[0] + sums[1]) + (sums[2] + sums[3])
+        all.zip(time.groups()).for_each(|(own, p)| add(&mut sums, own, p));
+        total(sums)
     }
 
     /// How many polynomials each series has.
     pub(super) fn terms(&self) -> usize {
-        self.packing.doubles + self.packing.singles
+        SIDE_BY_SIDE * (self.packing.doubles + self.packing.singles)
     }
 
     pub(super) fn bytes_per_particle(&self) -> usize {
         let Packing { pieces, quantities, doubles, singles, .. } = self.packing;
-        2 * pieces * quantities * (size_of::<f64>() * doubles + size_of::<f32>() * singles)
+        let of_series =
+            size_of::<[f64; SIDE_BY_SIDE]>() * doubles + size_of::<[f32; SIDE_BY_SIDE]>() * singles;
+        2 * pieces * quantities * of_series
     }
+}
+
+/// Adds terms to sums that are formed side by side.
+#[inline(always)]
+fn add(sums: &mut [f64; SIDE_BY_SIDE], own: [f64; SIDE_BY_SIDE], p: &[f64; SIDE_BY_SIDE]) {
+    for m in 0..SIDE_BY_SIDE {
+        sums[m] += own[m] * p[m];
+    }
+}
+
+#[inline(always)]
+fn total([a, b, c, d]: [f64; SIDE_BY_SIDE]) -> f64 {
+    (a + b) + (c + d)
 }
 
 #[cfg(test)]
@@ -278,7 +279,7 @@ mod tests {
             panic!("fields have values everywhere")
         };
         let packing = Packing::new(&table, error, &kinds, &QUANTITIES);
-        let padded = table.grid().in_time.next_multiple_of(SIDE_BY_SIDE);
+        let padded = table.grid().in_time.div_ceil(SIDE_BY_SIDE);
         assert!(2 * packing.doubles + packing.singles <= 3 * padded / 2);
         let places: Vec<[f64; 2]> = (0..50).map(|number| place(&range, number)).collect();
         let mut packed = Packed::new(packing, places.len());
@@ -287,7 +288,7 @@ mod tests {
         let most = (SHARE_OF_ERROR * error + 4.0 * f64::EPSILON) * table.largest(1);
         // The first and the last time, and where pieces and halves meet, as well.
         for t in (0..=160).map(|k| 2.0 * f64::from(k) / 160.0) {
-            let time = PackedTime::of(&table.grid().at_time(t));
+            let time = PackedTime::of(table.grid().at_time(t));
             for (n, series) in all.iter().enumerate() {
                 for quantity in 0..QUANTITIES.len() {
                     let differ = packed.value(n, quantity, &time) - series.value(quantity, t);

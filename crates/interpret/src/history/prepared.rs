@@ -171,7 +171,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
             SeriesOfAll::OfTables(packed) => packed.terms(),
             SeriesOfAll::Own(_) => 0,
         };
-        Moment { t, packed: PackedTime::of(&self.tables.at_time(t)), terms }
+        Moment { t, packed: PackedTime::of(self.tables.at_time(t)), terms }
     }
 
     /// Field `k` of particle `n` in its frame.
