@@ -34,15 +34,15 @@ const MOST_NODES: usize = 4;
 ///
 /// Layout: `S[axis][place][k]` is the factor of particle `k` along an axis at its node `place`.
 pub(crate) struct ProductWeights<T, const D: usize> {
-    shape: ProductShape<T, D>,
+    pub(super) shape: ProductShape<T, D>,
     /// Nodes along each axis: 2, 3 or 4.
-    width: usize,
+    pub(super) width: usize,
     /// Whether there are affine velocities (APIC).
-    is_affine: bool,
+    pub(super) is_affine: bool,
     /// Index of the first node of every particle.
     first_node: [usize; BLOCK],
     /// As in [`Constants`].
-    nodes_before: usize,
+    pub(super) nodes_before: usize,
     /// Weights `S[axis][place][k]`, except for the [middle node](is_middle).
     S: AtNodes<T, D>,
     /// Gradients per cell, in the same layout.
@@ -58,6 +58,32 @@ pub(crate) struct ProductWeights<T, const D: usize> {
     /// Half-sizes in cells, `l[axis][k]`; valid where positions are.
     l: [PerParticle<T>; D],
 }
+
+/// Dispatches a pass over a block with constants for the width of its weights and for whether they are affine.
+macro_rules! dispatch_by_width {
+    ($width:expr, true, $pass:ident<$($of:tt),*>, $block:expr) => {
+        match $width {
+            2 => dispatch($pass::<$($of,)* 2, true>($block)),
+            3 => dispatch($pass::<$($of,)* 3, true>($block)),
+            _ => dispatch($pass::<$($of,)* 4, true>($block)),
+        }
+    };
+    ($width:expr, false, $pass:ident<$($of:tt),*>, $block:expr) => {
+        match $width {
+            2 => dispatch($pass::<$($of,)* 2, false>($block)),
+            3 => dispatch($pass::<$($of,)* 3, false>($block)),
+            _ => dispatch($pass::<$($of,)* 4, false>($block)),
+        }
+    };
+    ($width:expr, $is_affine:expr, $pass:ident<$($of:tt),*>, $block:expr) => {
+        match $is_affine {
+            true => dispatch_by_width!($width, true, $pass<$($of),*>, $block),
+            false => dispatch_by_width!($width, false, $pass<$($of),*>, $block),
+        }
+    };
+}
+
+pub(super) use dispatch_by_width;
 
 impl<T: Lanes, const D: usize> ProductWeights<T, D> {
     pub(crate) fn new(shape: &ProductShape<T, D>, is_affine: bool) -> Self {
@@ -108,11 +134,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         receiver: impl Receive<T, D>,
     ) {
         let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
-        match self.width {
-            2 => dispatch(G2p::<_, _, D, 2, false>(of_block)),
-            3 => dispatch(G2p::<_, _, D, 3, false>(of_block)),
-            _ => dispatch(G2p::<_, _, D, 4, false>(of_block)),
-        }
+        dispatch_by_width!(self.width, false, G2p<_, _, D>, of_block);
     }
 
     /// Shape, position and half-sizes of a particle whose box has extended support.
@@ -157,14 +179,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
         count: usize,
     ) {
         let of_block = P2gOfBlock { weights: self, strides, band, first, contributions, count };
-        match (self.width, self.is_affine) {
-            (2, false) => dispatch(P2g::<_, D, 2, false>(of_block)),
-            (3, false) => dispatch(P2g::<_, D, 3, false>(of_block)),
-            (_, false) => dispatch(P2g::<_, D, 4, false>(of_block)),
-            (2, true) => dispatch(P2g::<_, D, 2, true>(of_block)),
-            (3, true) => dispatch(P2g::<_, D, 3, true>(of_block)),
-            (_, true) => dispatch(P2g::<_, D, 4, true>(of_block)),
-        }
+        dispatch_by_width!(self.width, self.is_affine, P2g<_, D>, of_block);
     }
 
     fn g2p(
@@ -179,11 +194,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
             return;
         }
         let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
-        match self.width {
-            2 => dispatch(G2p::<_, _, D, 2, true>(of_block)),
-            3 => dispatch(G2p::<_, _, D, 3, true>(of_block)),
-            _ => dispatch(G2p::<_, _, D, 4, true>(of_block)),
-        }
+        dispatch_by_width!(self.width, true, G2p<_, _, D>, of_block);
     }
 
     fn g2p_and_advance(

@@ -24,7 +24,7 @@ use crate::grid::node::{Components, LANES, Node};
 use crate::kernel::any::{Contributions, Interpolated, InterpolationSums, add_values};
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::kernel::product::{ParticleWeights, ProductWeights};
+use crate::kernel::product::{ParticleWeights, ProductWeights, dispatch_by_width};
 use crate::shape::one_axis::{EXTENDED, ProductShape};
 use crate::shape::weights::Weights;
 
@@ -59,11 +59,7 @@ pub(crate) fn in_half_plane<T: RealField + Copy>(F: &Matrix3<T>) -> Matrix2<T> {
 /// The weights of up to `BLOCK` particles.
 pub(crate) struct RevolvingWeights<T> {
     product: ProductWeights<T, 2>,
-    shape: ProductShape<T, 2>,
-    is_affine: bool,
     frames: [Frame<T>; BLOCK],
-    /// As in [`Constants`].
-    nodes_before: usize,
     planted: Planted,
 }
 
@@ -185,10 +181,7 @@ impl<T: Lanes> RevolvingWeights<T> {
     pub(crate) fn new(shape: &ProductShape<T, 2>, is_affine: bool) -> Self {
         Self {
             product: ProductWeights::new(shape, is_affine),
-            shape: *shape,
-            is_affine,
             frames: [Frame::zero(); BLOCK],
-            nodes_before: 0,
             planted: Planted::here(),
         }
     }
@@ -241,8 +234,14 @@ impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
         let plane = c.half_plane();
         let (mut x, mut F) = ([Vector2::zeros(); BLOCK], [Matrix2::zeros(); BLOCK]);
         let (frames, in_plane) = (&mut self.frames, (&mut x, &mut F));
-        dispatch(Frames { c, plane: &plane, shape: &self.shape, kinematics, frames, in_plane });
-        self.nodes_before = c.nodes_before as usize;
+        dispatch(Frames {
+            c,
+            plane: &plane,
+            shape: &self.product.shape,
+            kinematics,
+            frames,
+            in_plane,
+        });
         self.product.compute(&plane, ids, Kinematics { x: &x, F: &F });
     }
 
@@ -256,14 +255,7 @@ impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
     ) {
         let (weights, strides) = (&*self, in_plane(strides));
         let of_block = P2gOfBlock { weights, strides, band, first, contributions, count };
-        match (self.shape.width(), self.is_affine) {
-            (2, false) => dispatch(P2g::<_, 2, false>(of_block)),
-            (3, false) => dispatch(P2g::<_, 3, false>(of_block)),
-            (_, false) => dispatch(P2g::<_, 4, false>(of_block)),
-            (2, true) => dispatch(P2g::<_, 2, true>(of_block)),
-            (3, true) => dispatch(P2g::<_, 3, true>(of_block)),
-            (_, true) => dispatch(P2g::<_, 4, true>(of_block)),
-        }
+        dispatch_by_width!(self.product.width, self.product.is_affine, P2g<_>, of_block);
     }
 
     fn g2p(
@@ -273,14 +265,7 @@ impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
         receiver: &mut [Interpolated<T, 3>],
     ) {
         let of_block = G2pOfBlock { weights: self, strides: in_plane(strides), nodes, receiver };
-        match (self.shape.width(), self.is_affine) {
-            (2, false) => dispatch(G2p::<_, 2, false>(of_block)),
-            (3, false) => dispatch(G2p::<_, 3, false>(of_block)),
-            (_, false) => dispatch(G2p::<_, 4, false>(of_block)),
-            (2, true) => dispatch(G2p::<_, 2, true>(of_block)),
-            (3, true) => dispatch(G2p::<_, 3, true>(of_block)),
-            (_, true) => dispatch(G2p::<_, 4, true>(of_block)),
-        }
+        dispatch_by_width!(self.product.width, self.product.is_affine, G2p<_>, of_block);
     }
 }
 
@@ -299,14 +284,14 @@ impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for P2g<'_, T, W, AFFINE
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
-        let RevolvingWeights { product, planted, nodes_before, .. } = weights;
+        let RevolvingWeights { product, planted, .. } = weights;
         for k in 0..count.min(BLOCK) {
             let frame = &weights.frames[k];
             let given = frame.given(contributions, k, (AFFINE, *planted));
-            let nodes = (&mut *band, first, *nodes_before);
+            let nodes = (&mut *band, first, product.nodes_before);
             match product.extended(k) {
                 Some(extended) => {
-                    let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
+                    let weights = extended.weights::<AFFINE>((&strides, product.nodes_before));
                     add::<_, _, EXTENDED>(frame, &weights, &strides, nodes, &given);
                 }
                 None => {
@@ -361,11 +346,11 @@ impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for G2p<'_, T, W, AFFINE
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self(G2pOfBlock { weights, strides, nodes, receiver }) = self;
-        let RevolvingWeights { product, nodes_before, frames, .. } = weights;
+        let RevolvingWeights { product, frames, .. } = weights;
         for (k, (receiver, frame)) in receiver.iter_mut().zip(frames).enumerate() {
             *receiver = match product.extended(k) {
                 Some(extended) => {
-                    let weights = extended.weights::<AFFINE>((&strides, *nodes_before));
+                    let weights = extended.weights::<AFFINE>((&strides, product.nodes_before));
                     frame.interpolated::<EXTENDED, _>(
                         &weights,
                         &InterpolationSums::of(&weights, &strides, nodes),
