@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use bytemuck::Pod;
 use nalgebra::RealField;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(target_arch = "x86_64")]
 use pulp::Arch;
 use pulp::{Scalar, Simd, WithSimd};
 
@@ -526,11 +526,9 @@ pub fn dispatch<L: Loop>(work: L) {
             None => Scalar::new().vectorize(Instance(work, Scalar::new())),
         }
     }
-    // Whoever compiles a module of WebAssembly chooses its instructions.
-    #[cfg(target_family = "wasm")]
+    // Elsewhere there are no registers to choose: those that the target has are compiled in.
+    #[cfg(not(target_arch = "x86_64"))]
     Scalar::new().vectorize(Instance(work, Scalar::new()));
-    #[cfg(not(any(target_arch = "x86_64", target_family = "wasm")))]
-    Arch::new().dispatch(Instance(work, Scalar::new()));
 }
 
 #[cfg(test)]
