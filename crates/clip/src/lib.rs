@@ -14,7 +14,7 @@ mod space;
 use std::collections::BTreeMap;
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_mpm::{Body, Grid, Mesh, Particles, SetupError};
+use mmsmith_particles::{Body, Grid, Mesh, Particles, SetupError};
 use mmsmith_rare_states::{RareState, met};
 use nalgebra::{RealField, SMatrix, SVector};
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_mpm::{Body, Grid, Interpolation, Mesh};
+use mmsmith_particles::{Body, Grid, Interpolation, Mesh};
 use nalgebra::{Matrix2, RealField, SVector, Vector2, vector};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};

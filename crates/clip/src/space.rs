@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_mpm::{Body, Grid, Interpolation, Mesh};
+use mmsmith_particles::{Body, Grid, Interpolation, Mesh};
 use nalgebra::{RealField, SVector, Vector3};
 
 use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};

@@ -5,7 +5,7 @@
 
 use std::mem;
 
-use mmsmith_mpm::SetupError;
+use mmsmith_particles::SetupError;
 use mmsmith_threads::{each, each_chunk};
 
 use super::basis::{Basis, ValueOrSlope};

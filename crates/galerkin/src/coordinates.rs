@@ -19,7 +19,7 @@
 
 use std::f64::consts::PI;
 
-use mmsmith_mpm::SetupError;
+use mmsmith_particles::SetupError;
 use nalgebra::{SMatrix, SVector};
 
 /// The coordinate system of a grid.

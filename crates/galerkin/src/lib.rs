@@ -9,7 +9,7 @@
 //! ```
 //!
 //! integrated by symmetric compositions of leapfrog. For bodies without contact, cracks or separation: a body that
-//! would need another reference configuration stays with the updated-Lagrangian [`Simulation`](mmsmith_mpm::Simulation).
+//! would need another reference configuration stays with the updated-Lagrangian `mmsmith-mpm`.
 //!
 //! # Example
 //!
@@ -17,7 +17,8 @@
 //!
 //! ```
 //! use mmsmith_galerkin::*;
-//! use mmsmith_mpm::{Material, NoBodyForce};
+//! use mmsmith_laws::Material;
+//! use mmsmith_particles::NoBodyForce;
 //! use nalgebra::vector;
 //!
 //! let grid = Grid {

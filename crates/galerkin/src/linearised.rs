@@ -18,7 +18,7 @@
 use std::array;
 
 use mmsmith_laws::{BLOCK, Law, Stressed};
-use mmsmith_mpm::SetupError;
+use mmsmith_particles::SetupError;
 use nalgebra::{SMatrix, SVector};
 
 use super::boundary::Face;

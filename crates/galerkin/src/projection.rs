@@ -4,7 +4,7 @@
 use std::array;
 
 use mmsmith_laws::fault::{Fault, Planted};
-use mmsmith_mpm::SetupError;
+use mmsmith_particles::SetupError;
 
 use super::axis::{Axis, End};
 use super::basis::{Basis, ValueOrSlope};

@@ -2,7 +2,7 @@
 
 use std::array;
 
-use mmsmith_mpm::{Particles, SetupError};
+use mmsmith_particles::{Particles, SetupError};
 use mmsmith_vocabulary::ComponentCondition;
 use nalgebra::{SMatrix, SVector};
 

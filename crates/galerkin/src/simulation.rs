@@ -10,10 +10,9 @@ use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{
     AnyLaw, InternalVariable, Law, LawWithMemory, Material, NeoHookean, NeoHookeanNoLog,
 };
-use mmsmith_mpm::BodyForce;
-use mmsmith_mpm::Particles;
-use mmsmith_mpm::{SavedState, SavedStateError, replace_whole};
-use mmsmith_mpm::{SetupError, StepError};
+use mmsmith_particles::{
+    BodyForce, Particles, SavedState, SavedStateError, SetupError, StepError, replace_whole,
+};
 use mmsmith_threads::{each, each_chunk};
 use nalgebra::{SMatrix, SVector};
 

@@ -1,7 +1,7 @@
 //! The solver behind the door that all solvers share.
 
 use mmsmith_laws::Law;
-use mmsmith_mpm::{
+use mmsmith_particles::{
     Arrangement, BodyForce, Particles, SavedState, SavedStateError, SetupError, Solver, StepError,
 };
 use nalgebra::SVector;

@@ -29,7 +29,7 @@ use std::{array, mem};
 
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{Differentiated, Law, Stressed, Tangent};
-use mmsmith_mpm::{Particles, SetupError};
+use mmsmith_particles::{Particles, SetupError};
 use mmsmith_sparse::{Factors as SparseFactors, Pattern};
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;

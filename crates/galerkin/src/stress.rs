@@ -8,7 +8,7 @@ use mmsmith_laws::{
     BLOCK, BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory,
     LibraryLaw, projected_stress,
 };
-use mmsmith_mpm::{BodyForce, Particles};
+use mmsmith_particles::{BodyForce, Particles};
 use nalgebra::{SMatrix, SVector};
 
 use super::coordinates::{Coordinates, RowGeometry};

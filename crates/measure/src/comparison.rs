@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use mmsmith_laws::BlockWithMemory;
-use mmsmith_mpm::{Law, Particles, Stressed};
+use mmsmith_laws::{Law, Stressed};
+use mmsmith_particles::Particles;
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -551,7 +552,7 @@ mod tests {
     #[test]
     fn every_particle_is_compared_once() {
         let exact = AxisAligned::<f64>::new(AxisAlignedParameters::default()).unwrap();
-        let law = Law::from(mmsmith_mpm::Material::NeoHookean { lambda: 3.0, mu: 2.0 });
+        let law = Law::from(mmsmith_laws::Material::NeoHookean { lambda: 3.0, mu: 2.0 });
         for count in [1, BLOCK, CHUNK + 5, GROUP, 2 * GROUP + CHUNK + BLOCK + 3] {
             let X: Vec<_> = (0..count).map(|n| [0.3, n as f64 / count as f64].into()).collect();
             let mut particles = Particles {

@@ -148,11 +148,9 @@
 //! - `processes`: several processes, and the state to resume from.
 
 mod domain;
-mod error;
 mod grid;
 mod kernel;
 mod named;
-mod particles;
 mod processes;
 mod scheme;
 mod set_up;
@@ -162,9 +160,7 @@ mod solver;
 mod step;
 
 pub use domain::Shape;
-pub use error::{SetupError, StepError};
-pub use grid::Grid;
-pub use grid::division::Division;
+pub use grid::division::division_of_lattice;
 pub use mmsmith_lanes::simd::Registers;
 #[doc(hidden)]
 pub use mmsmith_laws::fault;
@@ -172,15 +168,13 @@ pub use mmsmith_laws::{
     BLOCK, ConstitutiveLaw, Increment, InternalVariable, Law, LawCheck, LawWithMemory, Material,
     SIDE_BY_SIDE, Stressed, Volumetric,
 };
+pub use mmsmith_particles::{
+    Annulus, Arrangement, AtTime, Body, BodyForce, Division, Faces, Grid, Interpolation, Load,
+    Mesh, NoBodyForce, Numbers, Particles, Pass, PassTime, Profile, SavedState, SavedStateError,
+    SetupError, Solver, StepError, replace_whole,
+};
 pub use named::UnknownName;
-#[doc(hidden)]
-pub use particles::Particles;
-pub use particles::body::{Annulus, Body};
-pub use particles::mesh::{Faces, Interpolation, Load, Mesh, Numbers};
-pub use processes::decomposition::{Arrangement, Share};
-pub use processes::saved_state::{SavedState, SavedStateError, replace_whole};
+pub use processes::decomposition::Share;
 pub use scheme::{Integrator, Settings, Transfer};
 pub use simulation::{Simulated, Simulation};
-pub use solver::{Scalar, Solver};
-pub use step::body_force::{AtTime, BodyForce, NoBodyForce};
-pub use step::passes::{Pass, PassTime, Profile};
+pub use solver::Scalar;

@@ -6,26 +6,23 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::{determinant, real};
 use mmsmith_laws::fault::Fault;
 use mmsmith_laws::{Law, Stressed};
+use mmsmith_particles::mesh::Mesh;
+use mmsmith_particles::{
+    Arrangement, Body, BodyForce, Grid, Particles, Profile, SetupError, StepError,
+};
 use mmsmith_rare_states::{RareState, met_if};
 use nalgebra::RealField;
 
 use crate::domain::corner_exchange::invalidity_of_corner;
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::axis_too_large;
-use crate::error::{SetupError, StepError};
-use crate::grid::Grid;
 use crate::grid::state::GridState;
-use crate::particles::Particles;
-use crate::particles::body::Body;
-use crate::particles::mesh::Mesh;
-use crate::processes::decomposition::{Arrangement, LocalBody, Share};
+use crate::processes::decomposition::{LocalBody, Share};
 use crate::scheme::Settings;
 use crate::set_up::{allocate, check, figure, of_blocks};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 use crate::step::StepTimes;
-use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome};
-use crate::step::passes::Profile;
 use crate::step::state::State;
 
 /// A running simulation.

@@ -1,7 +1,7 @@
 //! A case on its grid, in its dimension and the precision of its solver.
 
 use mmsmith_measure::norms::PerField;
-use mmsmith_mpm::Division;
+use mmsmith_mpm::{Division, division_of_lattice};
 use mmsmith_runtime::Solution;
 
 use crate::case::{Case, CflSpeed, Extent, law_of_body};
@@ -101,7 +101,7 @@ where
     pub(crate) fn division(&self) -> Option<Division> {
         let Self { scene, case, .. } = self;
         case.scheme.updated().filter(|_| !scene.revolves)?;
-        Division::of_lattice(&scene.grid::<f64>(), case.per_cell)
+        division_of_lattice(&scene.grid::<f64>(), case.per_cell)
     }
 
     /// The rounding error of a position, a length: half a unit in the last place.

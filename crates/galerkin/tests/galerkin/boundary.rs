@@ -7,7 +7,7 @@ use mmsmith_galerkin::{
     Axis, BoundaryData, ComponentCondition, Composition, Coordinates, End, Grid, Layout,
     MassMatrix, Quantity, Scheme, Side, TotalLagrangian,
 };
-use mmsmith_mpm::Material;
+use mmsmith_laws::Material;
 use nalgebra::{SMatrix, SVector};
 
 const DENSITY: f64 = 2.0;
@@ -175,7 +175,7 @@ fn moved_sides_are_where_they_are_given_after_each_step() {
         let (u, v) = (at(Quantity::Displacement), at(Quantity::Velocity));
         body.start_with_boundary(&u, &v, &motion).unwrap();
         for _ in 0..10 {
-            body.step_with_boundary(&mmsmith_mpm::NoBodyForce, &motion).unwrap();
+            body.step_with_boundary(&mmsmith_particles::NoBodyForce, &motion).unwrap();
             let t = body.time();
             let state = body.state();
             for (of, part) in [Quantity::Displacement, Quantity::Velocity].into_iter().zip(state) {

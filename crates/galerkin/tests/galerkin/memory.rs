@@ -8,11 +8,12 @@ use std::f64::consts::PI;
 use mmsmith_galerkin::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Scheme, TotalLagrangian,
 };
+use mmsmith_laws::Material;
 use mmsmith_laws::{
     BLOCK, Element, Flow, Increment, InternalVariable, Law, LawWithMemory, Memory, ReturnMap,
     WithMemory, with_memory,
 };
-use mmsmith_mpm::{Material, NoBodyForce};
+use mmsmith_particles::NoBodyForce;
 use nalgebra::{SVector, Vector1};
 
 const STIFF: f64 = 1.0;
@@ -130,7 +131,7 @@ fn laws() -> [Law<f64, 2>; 2] {
             mu: 40.0,
             Jm: 20.0,
             kappa: 80.0,
-            volumetric: mmsmith_mpm::Volumetric::Logarithmic,
+            volumetric: mmsmith_laws::Volumetric::Logarithmic,
         },
         memory: Memory::Maxwell(elements),
     };

@@ -7,7 +7,8 @@ use mmsmith_galerkin::{
     Axis, Composition, Coordinates, End, Grid, Layout, MassMatrix, Quantity, Scheme, Side,
     TotalLagrangian,
 };
-use mmsmith_mpm::{Material, NoBodyForce, SetupError, StepError};
+use mmsmith_laws::Material;
+use mmsmith_particles::{NoBodyForce, SetupError, StepError};
 use nalgebra::{SMatrix, SVector, Vector1, Vector2, vector};
 
 const LAMBDA: f64 = 60.0;

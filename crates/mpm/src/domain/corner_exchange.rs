@@ -10,6 +10,7 @@
 
 use mmsmith_lanes::simd::{Lane4, Lanes, dispatch};
 use mmsmith_lanes::tensor::real;
+use mmsmith_particles::BodyForce;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_values::{AlongAxes, CornerValues};
@@ -24,7 +25,6 @@ use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::points::{FromGrid, ToGrid, affine_at};
 use crate::shape::one_axis::OnAxis;
-use crate::step::body_force::BodyForce;
 use crate::step::health::{Invalid, Outcome, SharedOutcome};
 use mmsmith_threads::each;
 

@@ -17,6 +17,7 @@ pub(crate) mod shared_corners;
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
+use mmsmith_particles::mesh::{Interpolation, Mesh};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::cpdi::Parallelograms;
@@ -24,7 +25,6 @@ use crate::domain::of_particles::Domain;
 use crate::domain::revolving::Revolving;
 use crate::kernel::block::in_same_dimension;
 use crate::named::named;
-use crate::particles::mesh::{Interpolation, Mesh};
 use crate::shape::one_axis::{OnAxis, ProductShape};
 
 named! {

@@ -6,12 +6,12 @@ use std::ops::Range;
 use mmsmith_lanes::simd::{Lanes, One};
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::mesh::{CornerShare, Interpolation, Mesh};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::of_particles::Domain;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::particles::mesh::{CornerShare, Interpolation, Mesh};
 use crate::processes::corner_halo::CornerHalo;
 use crate::shape::cells::{PAIRS, volume_of_cell};
 use crate::shape::one_axis::ProductShape;

@@ -15,10 +15,11 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use mmsmith_particles::Division;
 use mmsmith_ranks::Ranks;
 use rayon::prelude::*;
 
-use crate::grid::division::Division;
+use crate::grid::division::division;
 use crate::grid::tiles::Tiles;
 use crate::grid::{Layout, NODES_AT_ONCE};
 use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared};
@@ -172,7 +173,7 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
         let tiles = self.tiles.layers() * self.tiles.in_a_layer();
         let of_tile = |tile| self.order.part(tile).map_or(0, <[u32]>::len);
         let particles: Vec<usize> = (0..tiles).map(of_tile).collect();
-        self.ranks.is_none().then(|| Division::new(&self.tiles, layout, &particles))
+        self.ranks.is_none().then(|| division(&self.tiles, layout, &particles))
     }
 
     /// The number of the first tile here.
@@ -412,7 +413,8 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::{Grid, PAD_BELOW};
+    use crate::grid::PAD_BELOW;
+    use mmsmith_particles::Grid;
     use nalgebra::SVector;
 
     fn bins<const D: usize>(cells: [usize; D], particles: usize) -> (Layout<D>, Bins<i64, D>) {

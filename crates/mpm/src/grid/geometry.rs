@@ -4,12 +4,13 @@ use std::array;
 
 use mmsmith_lanes::tensor::{product, real};
 use mmsmith_laws::fault::{Fault, Planted};
+use mmsmith_particles::Grid;
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::grid::Layout;
 use crate::grid::bins::Band;
 use crate::grid::node::{Components, Node};
 use crate::grid::tiles::Tiles;
-use crate::grid::{Grid, Layout};
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
 
 /// Constants of a run: the grid's geometry, its tiles, the time step.

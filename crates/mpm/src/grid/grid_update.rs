@@ -446,8 +446,8 @@ pub(crate) fn receive_nodes<T: RealField + Pod, const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
     use crate::grid::tiles::Tiles;
+    use mmsmith_particles::Grid;
     use nalgebra::SVector;
 
     /// Nodes with distinct values, some without mass.

@@ -11,33 +11,10 @@ pub(crate) mod tiles;
 
 use std::ops::Range;
 
-use mmsmith_lanes::tensor::real;
+use mmsmith_particles::{Grid, SetupError};
 use mmsmith_threads::each;
-use nalgebra::{RealField, SVector};
 
-use crate::error::SetupError;
 use crate::grid::node::Components;
-
-/// Background grid: a box of cubic cells.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Grid<T, const D: usize> {
-    /// The corner with the smallest coordinates, a length.
-    pub lower: SVector<T, D>,
-    /// Edge of a cell, a length.
-    pub spacing: T,
-    /// Number of cells along each axis.
-    pub cells: [usize; D],
-    /// `walls[axis][0]` for the lower and `walls[axis][1]` for the upper face across an axis: whether it is a frictionless sliding
-    /// wall, which is also a plane of symmetry. All other faces are open: no particle's centre may pass them.
-    pub walls: [[bool; 2]; D],
-}
-
-impl<T: RealField + Copy, const D: usize> Grid<T, D> {
-    /// The corner with the largest coordinates, a length.
-    pub fn upper(&self) -> SVector<T, D> {
-        SVector::from_fn(|a, _| self.lower[a] + self.spacing * real(self.cells[a] as f64))
-    }
-}
 
 /// Node layers below cell 0: a box of half-size 2 reaches two, and rounding may need one more.
 pub(crate) const PAD_BELOW: usize = 3;
@@ -356,6 +333,7 @@ impl<const D: usize> Layout<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::SVector;
 
     fn grid(cells: [usize; 2], walls: [[bool; 2]; 2]) -> Grid<f64, 2> {
         Grid { lower: SVector::zeros(), spacing: 1.0, cells, walls }

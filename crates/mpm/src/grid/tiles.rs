@@ -195,8 +195,8 @@ impl<const D: usize> Tiles<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
     use crate::shape::one_axis::EXTENDED;
+    use mmsmith_particles::Grid;
     use nalgebra::SVector;
     use proptest::prelude::*;
 

@@ -4,6 +4,7 @@
 //! read them from memory. Those of polygons, of which there are few, are stored.
 
 use mmsmith_lanes::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
+use mmsmith_particles::mesh::{CornerShare, Mesh};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_values::{AlongAxes, CornerValues};
@@ -13,7 +14,6 @@ use crate::grid::node::Node;
 use crate::kernel::any::{Contributions, Interpolated};
 use crate::kernel::copies::BLOCK;
 use crate::kernel::cpdi::parallelograms::GROUP;
-use crate::particles::mesh::{CornerShare, Mesh};
 use crate::shape::cells::{MOST_CORNERS, PAIRS, Shares, inverse, shares_of_cell, volume_of_cell};
 
 /// The corners of cells in vector registers: `x[corner][axis]` has those of eight successive cells.

@@ -6,15 +6,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytemuck::Pod;
-use mmsmith_ranks::{Move, Ranks, add_to_first, share};
+use mmsmith_particles::{Arrangement, SetupError, StepError};
+use mmsmith_ranks::{Ranks, add_to_first, share};
 use mmsmith_rare_states::{RareState, met};
 use nalgebra::RealField;
 
-use crate::error::{SetupError, StepError};
 use crate::grid::Layout;
 use crate::grid::tiles::Tiles;
-use crate::particles::columns::EachColumn;
 use crate::step::health::{Invalid, Outcome};
 
 /// The part of a body that one process begins with: any part, as long as each particle is in one.
@@ -23,15 +21,6 @@ pub struct Share {
     pub ranks: Arc<dyn Ranks>,
     /// The numbers of this process's particles in the whole body, ascending.
     pub ids: Vec<u64>,
-}
-
-/// Which particles a process holds, each of which no other one does.
-#[derive(Clone, Copy, Debug)]
-pub struct Arrangement<'a> {
-    /// Their numbers in the whole body, ascending.
-    pub ids: &'a Arc<Vec<u64>>,
-    /// Incremented whenever the set of particles of this process changes.
-    pub version: u64,
 }
 
 /// The part of the body that one process holds.
@@ -176,12 +165,6 @@ pub(crate) fn unevenness(particles: &[u64], cuts: &[usize]) -> f64 {
     let most = cuts.windows(2).map(of).max().unwrap_or(0);
     let total: u64 = particles.iter().sum();
     most as f64 * (cuts.len() - 1) as f64 / total.max(1) as f64
-}
-
-impl EachColumn for &Move {
-    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>) {
-        *column = self.all_shares(share, column);
-    }
 }
 
 /// Whether a grid of these rows can be shared out among so many processes.

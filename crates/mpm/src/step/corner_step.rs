@@ -19,14 +19,14 @@ use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::{FromCorners, ToCorners};
-use crate::particles::columns::{Fixed, Moving};
 use crate::scheme::Transfer;
 use crate::step::StepTimes;
-use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::g2p::{Follow, check_all};
 use crate::step::health::Outcome;
 use crate::step::state::State;
+use mmsmith_particles::BodyForce;
+use mmsmith_particles::columns::{Fixed, Moving};
 use mmsmith_threads::each;
 
 impl<T: Lanes, const D: usize> State<T, D> {

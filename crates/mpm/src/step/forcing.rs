@@ -1,11 +1,11 @@
 //! The body force on all particles at one time.
 
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::{AtTime, BodyForce};
 use nalgebra::{RealField, SVector};
 
 use crate::grid::geometry::Constants;
 use crate::kernel::copies::BLOCK;
-use crate::step::body_force::{AtTime, BodyForce};
 
 /// The body force on all particles at one time.
 pub(crate) struct Forcing<'a, T, const D: usize> {

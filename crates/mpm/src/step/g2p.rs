@@ -10,6 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::Particles;
+use mmsmith_particles::columns::Moving;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_exchange;
@@ -25,8 +27,6 @@ use crate::kernel::block::{BlockIncrement, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::have_volume_next;
-use crate::particles::Particles;
-use crate::particles::columns::Moving;
 use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::{EarlyState, State, invalidity};

@@ -8,6 +8,10 @@
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::BodyForce;
+use mmsmith_particles::columns::{
+    DisjointMoving, Fixed, Moving, MovingColumns, PartMoving, Shares,
+};
 
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::grid::bins::Band;
@@ -19,9 +23,7 @@ use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::particles::columns::{DisjointMoving, Fixed, Moving, MovingColumns, PartMoving, Shares};
 use crate::scheme::Transfer;
-use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::g2p::Follow;
 use crate::step::health::{Outcome, SharedOutcome};

@@ -74,11 +74,12 @@ impl SharedOutcome {
 mod tests {
     use super::*;
     use crate::domain::of_particles::{Domain, OfBlock};
+    use crate::grid::Layout;
     use crate::grid::geometry::Constants;
     use crate::grid::tiles::Tiles;
-    use crate::grid::{Grid, Layout};
     use crate::kernel::copies::{BLOCK, Copies};
     use crate::shape::one_axis::{OnAxis, ProductShape};
+    use mmsmith_particles::Grid;
     use nalgebra::{Matrix2, Vector2, vector};
 
     fn shape(on_axis: OnAxis, half_size: f64) -> ProductShape<f64, 2> {

@@ -3,7 +3,6 @@
 //! Integrators differ in the time at which F follows the grid: before forces are computed, after it, or both. To add one, say so
 //! in [`Integrator`](crate::Integrator).
 
-pub(crate) mod body_force;
 pub(crate) mod corner_step;
 pub(crate) mod forcing;
 pub(crate) mod g2p;
@@ -17,11 +16,10 @@ pub(crate) mod xpic;
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
+use mmsmith_particles::{BodyForce, Pass};
 
 use crate::scheme::{Integrator, Transfer, VelocityUpdate};
-use crate::step::body_force::BodyForce;
 use crate::step::health::Outcome;
-use crate::step::passes::Pass;
 use crate::step::state::State;
 
 /// Times of a step, and the factor on its accelerations.

@@ -8,6 +8,7 @@
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::{BodyForce, Particles};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
@@ -25,9 +26,7 @@ use crate::grid::state::GridState;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::ToCorners;
-use crate::particles::Particles;
 use crate::step::StepTimes;
-use crate::step::body_force::BodyForce;
 use crate::step::forcing::Forcing;
 use crate::step::state::{EarlyState, State};
 use mmsmith_threads::each;

@@ -1,6 +1,8 @@
 //! The state of a running simulation: particles, grid, and buffers of passes.
 
 use mmsmith_lanes::simd::Lanes;
+use mmsmith_particles::columns::Shares;
+use mmsmith_particles::{Particles, Pass};
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corners::Corners;
@@ -9,12 +11,10 @@ use crate::grid::geometry::Constants;
 use crate::grid::state::GridState;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::BufferPool;
-use crate::particles::Particles;
-use crate::particles::columns::Shares;
 use crate::processes::decomposition::LocalBody;
 use crate::scheme::Transfer;
 use crate::step::health::{Invalid, Outcome};
-use crate::step::passes::{Pass, Passes};
+use crate::step::passes::Passes;
 
 /// Everything that a step reads and changes.
 pub(crate) struct State<T, const D: usize> {

@@ -12,6 +12,7 @@
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::determinant;
 use mmsmith_laws::fault::Fault;
+use mmsmith_particles::Particles;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corners::{Corners, grid_values};
@@ -20,7 +21,6 @@ use crate::grid::node::Node;
 use crate::grid::state::GridState;
 use crate::kernel::buffers::Buffers;
 use crate::kernel::copies::{BLOCK, Copies};
-use crate::particles::Particles;
 use crate::step::g2p::{CHUNK, FromGrid};
 use crate::step::p2g::{P2g, two_stages};
 use crate::step::state::State;

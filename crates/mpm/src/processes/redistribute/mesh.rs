@@ -8,11 +8,11 @@ use std::sync::Arc;
 use mmsmith_lanes::simd::Lanes;
 
 use crate::domain::shared_corners::SharedCorners;
-use crate::particles::mesh::Mesh;
-use crate::particles::mesh::part::{LoadRecords, Records};
 use crate::processes::corner_halo::CornerHalo;
 use crate::processes::decomposition::Owned;
 use crate::step::state::State;
+use mmsmith_particles::mesh::Mesh;
+use mmsmith_particles::mesh::part::{LoadRecords, Records};
 use mmsmith_ranks::{Lists, Move};
 
 impl<T: Lanes, const D: usize> State<T, D> {

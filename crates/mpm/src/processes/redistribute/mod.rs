@@ -6,10 +6,10 @@ use std::slice;
 use std::sync::Arc;
 
 use mmsmith_lanes::simd::Lanes;
+use mmsmith_particles::Particles;
 use nalgebra::SMatrix;
 
 use crate::kernel::buffers::BufferPool;
-use crate::particles::Particles;
 use crate::step::state::State;
 use mmsmith_ranks::Move;
 

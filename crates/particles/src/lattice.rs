@@ -1,14 +1,9 @@
-//! The particles' state.
-
-pub(crate) mod body;
-pub(crate) mod columns;
-pub(crate) mod mesh;
+//! Particles on the lattice of a grid.
 
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
-pub use columns::Particles;
-
+use crate::columns::Particles;
 use crate::grid::Grid;
 
 impl<T: RealField + Copy, const D: usize> Particles<T, D> {
@@ -66,7 +61,7 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
     }
 
     /// Mass and volume of every particle, where they are uniform.
-    pub(crate) fn uniform(&self) -> Option<(T, T)> {
+    pub fn uniform(&self) -> Option<(T, T)> {
         let (&m, &V) = self.mass.first().zip(self.volume.first())?;
         let is_uniform = self.mass.iter().all(|mass| *mass == m)
             && self.volume.iter().all(|volume| *volume == V);
@@ -80,7 +75,7 @@ impl<T: RealField + Copy, const D: usize> Particles<T, D> {
 }
 
 /// Counts through all multi-indices below `limits`, axis 0 fastest.
-pub(crate) fn count<const D: usize>(limits: [usize; D], mut visit: impl FnMut(&[usize; D])) {
+pub fn count<const D: usize>(limits: [usize; D], mut visit: impl FnMut(&[usize; D])) {
     if limits.contains(&0) {
         return;
     }

@@ -80,10 +80,10 @@ pub enum StepError {
 
 impl StepError {
     /// Numbers that say all of an error.
-    pub(crate) const NUMBERS: usize = 10;
+    pub const NUMBERS: usize = 10;
 
     /// This error of another particle.
-    pub(crate) fn about(mut self, id: usize) -> Self {
+    pub fn about(mut self, id: usize) -> Self {
         let (Self::Inverted { particle, .. }
         | Self::NotFinite { particle, .. }
         | Self::LeftGrid { particle, .. }
@@ -93,7 +93,7 @@ impl StepError {
     }
 
     /// The error as numbers, for another process.
-    pub(crate) fn to_numbers(&self) -> [f64; Self::NUMBERS] {
+    pub fn to_numbers(&self) -> [f64; Self::NUMBERS] {
         let mut numbers = [0.0; Self::NUMBERS];
         let mut set = |kind: f64, (step, time, particle): (usize, f64, usize), rest: &[f64]| {
             numbers[..4].copy_from_slice(&[kind, step as f64, time, particle as f64]);
@@ -125,7 +125,7 @@ impl StepError {
     }
 
     /// The error that these numbers say.
-    pub(crate) fn from_numbers(numbers: &[f64; Self::NUMBERS]) -> Self {
+    pub fn from_numbers(numbers: &[f64; Self::NUMBERS]) -> Self {
         let [kind, step, time, particle, a, b, c, x, y, z] = *numbers;
         let (step, particle) = (step as usize, particle as usize);
         match kind as u8 {

@@ -9,7 +9,7 @@ use super::{Interpolation, Load, Mesh, Numbers, start};
 use mmsmith_ranks::{Lists, Move};
 
 /// The polygons of some particles, which can be told apart from the others.
-pub(crate) struct Records<T, const D: usize> {
+pub struct Records<T, const D: usize> {
     /// For each particle the number of its polygons, and for each polygon: how many corners it has, their numbers in the whole body, how
     /// many faces, and of each face how many corners, and their places in the polyhedron.
     topology: Lists<u64>,
@@ -20,7 +20,7 @@ pub(crate) struct Records<T, const D: usize> {
 }
 
 /// Loads, each with its number in the whole body and those of its corners.
-pub(crate) struct LoadRecords<T, const D: usize> {
+pub struct LoadRecords<T, const D: usize> {
     numbers: Vec<u64>,
     corners: Vec<SVector<u64, D>>,
     shares: Vec<SVector<T, D>>,
@@ -29,7 +29,7 @@ pub(crate) struct LoadRecords<T, const D: usize> {
 
 impl<T: RealField + Copy, const D: usize> Records<T, D> {
     /// The records of some particles.
-    pub(crate) fn new(own: &Mesh<T, D>, particles: impl Iterator<Item = usize> + Clone) -> Self {
+    pub fn new(own: &Mesh<T, D>, particles: impl Iterator<Item = usize> + Clone) -> Self {
         let at = |positions: &'_ [SVector<T, D>], p: usize| -> Vec<SVector<T, D>> {
             let corners = &own.corners[own.places(p)];
             corners.iter().map(|&corner| positions[corner as usize]).collect()
@@ -42,7 +42,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
     }
 
     /// The records of the particles that are here after a move.
-    pub(crate) fn follow(&self, moved: &Move) -> Self
+    pub fn follow(&self, moved: &Move) -> Self
     where
         T: Pod,
     {
@@ -52,7 +52,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
 
     /// The polygons of these particles with such loads, whose corners come in the order of their numbers, those that `is_behind` says,
     /// by particle and place, behind all others; and for each corner a particle and a place in it where it is.
-    pub(crate) fn assemble(
+    pub fn assemble(
         &self,
         particles: usize,
         loads: &LoadRecords<T, D>,
@@ -93,7 +93,7 @@ impl<T: RealField + Copy, const D: usize> Records<T, D> {
 
 impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
     /// The records of some loads.
-    pub(crate) fn new(own: &Mesh<T, D>, loads: &[usize]) -> Self {
+    pub fn new(own: &Mesh<T, D>, loads: &[usize]) -> Self {
         let number = |load: &usize| match &own.numbers {
             Some(numbers) => numbers.loads[*load],
             None => *load as u64,
@@ -110,12 +110,12 @@ impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
     }
 
     /// The numbers in the whole body.
-    pub(crate) fn numbers(&self) -> &[u64] {
+    pub fn numbers(&self) -> &[u64] {
         &self.numbers
     }
 
     /// The records that are here after a move, with these numbers.
-    pub(crate) fn follow(&self, moved: &Move, numbers: Vec<u64>) -> Self
+    pub fn follow(&self, moved: &Move, numbers: Vec<u64>) -> Self
     where
         T: Pod,
     {
@@ -157,7 +157,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// The number of a corner in the whole body.
-    pub(crate) fn number(&self, corner: usize) -> u64 {
+    pub fn number(&self, corner: usize) -> u64 {
         self.numbers.as_ref().map_or(corner as u64, |numbers| numbers.corners[corner])
     }
 }

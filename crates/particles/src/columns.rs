@@ -5,14 +5,21 @@
 
 use bytemuck::{Pod, cast_slice};
 use mmsmith_lanes::simd::Lanes;
+use mmsmith_ranks::Move;
+use mmsmith_threads::disjoint::{DisjointColumn, PartColumn, Partition, Run};
 use nalgebra::{SMatrix, SVector};
 
-use mmsmith_threads::disjoint::{DisjointColumn, PartColumn, Partition, Run};
-
 /// Work on a column, whatever its elements are.
-pub(crate) trait EachColumn {
+pub trait EachColumn {
     /// `share` is how many elements a particle has.
     fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>);
+}
+
+/// Replaces the elements by those of the particles that are here after the move.
+impl EachColumn for &Move {
+    fn column<E: Pod>(&mut self, share: usize, column: &mut Vec<E>) {
+        *column = self.all_shares(share, column);
+    }
 }
 
 macro_rules! columns {
@@ -42,18 +49,18 @@ macro_rules! columns {
 
         /// The shares of the columns that steps change.
         #[derive(Clone, Copy, Debug)]
-        pub(crate) struct Shares {
-            $(pub(crate) $moving: usize,)*
+        pub struct Shares {
+            $(#[doc = concat!("Elements of `", stringify!($moving), "` that a particle has.")] pub $moving: usize,)*
         }
 
         impl Shares {
             /// One element in each column.
-            pub(crate) const ONE: Self = Self { $($moving: 1,)* };
+            pub const ONE: Self = Self { $($moving: 1,)* };
         }
 
         impl<T: Copy, const D: usize> Particles<T, D> {
             /// The particles at some places, in that order.
-            pub(crate) fn some(&self, places: &[u32]) -> Self {
+            pub fn some(&self, places: &[u32]) -> Self {
                 let count = self.X.len();
                 Self {
                     $($fixed: some(&self.$fixed, count, places),)*
@@ -65,7 +72,7 @@ macro_rules! columns {
 
         impl<T: Lanes, const D: usize> Particles<T, D> {
             /// The columns that stay, and those that steps change.
-            pub(crate) fn split(&mut self) -> (Fixed<'_, T, D>, Moving<'_, T, D>) {
+            pub fn split(&mut self) -> (Fixed<'_, T, D>, Moving<'_, T, D>) {
                 let count = self.X.len();
                 (
                     Fixed { $($fixed: &self.$fixed,)* },
@@ -74,18 +81,18 @@ macro_rules! columns {
             }
 
             /// The columns that steps change, as bytes.
-            pub(crate) fn moving_bytes(&self) -> Vec<&[u8]> {
+            pub fn moving_bytes(&self) -> Vec<&[u8]> {
                 vec![$(cast_slice(&self.$moving),)*]
             }
 
             /// Works on every column.
-            pub(crate) fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
+            pub fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
                 $(work.column(1, &mut self.$fixed);)*
                 $(work.column(shares.$moving, &mut self.$moving);)*
             }
 
             /// Gives columns without elements their share, every element zero.
-            pub(crate) fn fill(&mut self, shares: &Shares) {
+            pub fn fill(&mut self, shares: &Shares) {
                 let zero = MovingColumns::<T, D>::zero(self.X.len(), shares);
                 $(if self.$moving.is_empty() {
                     self.$moving = zero.$moving;
@@ -93,26 +100,26 @@ macro_rules! columns {
             }
 
             /// Takes the columns that steps change from others.
-            pub(crate) fn replace_moving(&mut self, columns: MovingColumns<T, D>) {
+            pub fn replace_moving(&mut self, columns: MovingColumns<T, D>) {
                 $(self.$moving = columns.$moving;)*
             }
         }
 
         /// The columns that stay.
         #[derive(Clone, Copy)]
-        pub(crate) struct Fixed<'a, T, const D: usize> {
-            $($(#[$fixed_doc])* pub(crate) $fixed: &'a [$Fixed],)*
+        pub struct Fixed<'a, T, const D: usize> {
+            $($(#[$fixed_doc])* pub $fixed: &'a [$Fixed],)*
         }
 
         /// The columns that steps change, of some successive particles.
-        pub(crate) struct Moving<'a, T, const D: usize> {
+        pub struct Moving<'a, T, const D: usize> {
             count: usize,
-            $($(#[$moving_doc])* pub(crate) $moving: &'a mut [$Moving],)*
+            $($(#[$moving_doc])* pub $moving: &'a mut [$Moving],)*
         }
 
         impl<'a, T, const D: usize> Moving<'a, T, D> {
             /// The first particles, as many as there are and no more than `count`.
-            pub(crate) fn first(&mut self, count: usize) -> Moving<'_, T, D> {
+            pub fn first(&mut self, count: usize) -> Moving<'_, T, D> {
                 let (all, count) = (self.count.max(1), count.min(self.count));
                 Moving {
                     count,
@@ -124,7 +131,7 @@ macro_rules! columns {
             }
 
             /// Takes the first particles away, as many as there are and no more than `count`.
-            pub(crate) fn split_off(&mut self, count: usize) -> Moving<'a, T, D> {
+            pub fn split_off(&mut self, count: usize) -> Moving<'a, T, D> {
                 let (all, count) = (self.count.max(1), count.min(self.count));
                 self.count -= count;
                 Moving {
@@ -138,16 +145,16 @@ macro_rules! columns {
         }
 
         /// The columns that steps change, apart from particles.
-        pub(crate) struct MovingColumns<T, const D: usize> {
-            $(pub(crate) $moving: Vec<$Moving>,)*
+        pub struct MovingColumns<T, const D: usize> {
+            $($(#[$moving_doc])* pub $moving: Vec<$Moving>,)*
         }
 
         impl<T: Lanes, const D: usize> MovingColumns<T, D> {
             /// How many columns there are.
-            pub(crate) const COUNT: usize = [$(stringify!($moving)),*].len();
+            pub const COUNT: usize = [$(stringify!($moving)),*].len();
 
             /// Columns without particles.
-            pub(crate) fn none() -> Self {
+            pub fn none() -> Self {
                 Self { $($moving: Vec::new(),)* }
             }
 
@@ -157,25 +164,25 @@ macro_rules! columns {
             }
 
             /// Works on every column.
-            pub(crate) fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
+            pub fn each(&mut self, shares: &Shares, work: &mut impl EachColumn) {
                 $(work.column(shares.$moving, &mut self.$moving);)*
             }
 
             /// The first particles of those whose shares these are.
-            pub(crate) fn first(&mut self, count: usize, shares: &Shares) -> Moving<'_, T, D> {
+            pub fn first(&mut self, count: usize, shares: &Shares) -> Moving<'_, T, D> {
                 Moving { count, $($moving: &mut self.$moving[..count * shares.$moving],)* }
             }
         }
 
         /// The columns that steps change, whose elements belong to the parts of a partition.
-        pub(crate) struct DisjointMoving<'a, T, const D: usize> {
+        pub struct DisjointMoving<'a, T, const D: usize> {
             $($moving: DisjointColumn<'a, $Moving>,)*
             partition: &'a Partition,
         }
 
         impl<'a, T: Lanes, const D: usize> DisjointMoving<'a, T, D> {
             /// `None` where the partition does not have each particle once.
-            pub(crate) fn new(partition: &'a mut Partition, moving: Moving<'a, T, D>) -> Option<Self> {
+            pub fn new(partition: &'a mut Partition, moving: Moving<'a, T, D>) -> Option<Self> {
                 let whole = partition.whole()?;
                 Some(Self {
                     $($moving: whole.column(moving.$moving)?,)*
@@ -184,7 +191,7 @@ macro_rules! columns {
             }
 
             /// The elements of a part: once, then `None`, as for a part that does not exist.
-            pub(crate) fn take(&self, part: usize) -> Option<PartMoving<'_, T, D>> {
+            pub fn take(&self, part: usize) -> Option<PartMoving<'_, T, D>> {
                 Some(PartMoving {
                     indices: self.partition.part(part)?,
                     $($moving: self.$moving.take(part)?,)*
@@ -193,33 +200,33 @@ macro_rules! columns {
         }
 
         /// The columns that steps change, of the particles of a part.
-        pub(crate) struct PartMoving<'a, T, const D: usize> {
+        pub struct PartMoving<'a, T, const D: usize> {
             indices: &'a [u32],
             $($moving: PartColumn<'a, $Moving>,)*
         }
 
         impl<'a, T: Lanes, const D: usize> PartMoving<'a, T, D> {
             /// The numbers of the particles.
-            pub(crate) fn indices(&self) -> &'a [u32] {
+            pub fn indices(&self) -> &'a [u32] {
                 self.indices
             }
 
             /// The particles from a place on in memory, if they lie side by side there.
             #[inline(always)]
-            pub(crate) fn contiguous(&mut self, place: usize, count: usize) -> Option<Moving<'_, T, D>> {
+            pub fn contiguous(&mut self, place: usize, count: usize) -> Option<Moving<'_, T, D>> {
                 let run = Run::find(self.indices, place, count)?;
                 Some(Moving { count, $($moving: self.$moving.run(run),)* })
             }
 
             /// Copies so many particles from a place on.
             #[inline(always)]
-            pub(crate) fn gather(&mut self, place: usize, count: usize, copies: &mut MovingColumns<T, D>) {
+            pub fn gather(&mut self, place: usize, count: usize, copies: &mut MovingColumns<T, D>) {
                 $(self.$moving.gather(place, count, &mut copies.$moving);)*
             }
 
             /// Copies them back.
             #[inline(always)]
-            pub(crate) fn scatter(&mut self, place: usize, count: usize, copies: &MovingColumns<T, D>) {
+            pub fn scatter(&mut self, place: usize, count: usize, copies: &MovingColumns<T, D>) {
                 $(self.$moving.scatter(place, count, &copies.$moving);)*
             }
         }
@@ -251,7 +258,7 @@ columns! {
 
 impl<T: Lanes, const D: usize> MovingColumns<T, D> {
     /// Columns of `count` particles that are not deformed, every other element zero.
-    pub(crate) fn at_rest(count: usize, shares: &Shares) -> Self {
+    pub fn at_rest(count: usize, shares: &Shares) -> Self {
         Self { F: vec![SMatrix::identity(); count], ..Self::zero(count, shares) }
     }
 }
@@ -265,12 +272,12 @@ fn some<E: Copy>(all: &[E], count: usize, places: &[u32]) -> Vec<E> {
 
 impl<'a, T, const D: usize> Moving<'a, T, D> {
     /// Number of particles.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.count
     }
 
     /// Pieces of `size` particles, each with the place of its first one here.
-    pub(crate) fn pieces(mut self, size: usize) -> impl Iterator<Item = (usize, Self)> {
+    pub fn pieces(mut self, size: usize) -> impl Iterator<Item = (usize, Self)> {
         let mut first = 0;
         std::iter::from_fn(move || {
             let piece = self.split_off(size);

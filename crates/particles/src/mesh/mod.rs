@@ -16,7 +16,7 @@
 //! normals in both: in `sum_p V_p grad N` it cancels, and the integral of `N n` over the boundary remains. That is the condition under
 //! which a constant stress gives no force inside (Chen, Wu, Yoon & You, IJNME 50 (2001) 435-466).
 
-pub(crate) mod part;
+pub mod part;
 mod polyhedra;
 
 use mmsmith_lanes::tensor::real;
@@ -99,7 +99,7 @@ pub struct Load<T, const D: usize> {
 
 impl<T: RealField + Copy, const D: usize> Load<T, D> {
     /// The normal of its edge or triangle, as long as that is long or large, between corners at `x`.
-    pub(crate) fn normal(&self, x: &[SVector<T, D>]) -> SVector<T, D> {
+    pub fn normal(&self, x: &[SVector<T, D>]) -> SVector<T, D> {
         let at = self.corners.map(|corner| x[corner as usize]);
         let mut normal = SVector::zeros();
         match at[..] {
@@ -116,9 +116,11 @@ impl<T: RealField + Copy, const D: usize> Load<T, D> {
 
 /// The shares `w` of a mean and `g` of a mean gradient, per length, that a corner of one of a particle's polygons has.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct CornerShare<T, const D: usize> {
-    pub(crate) w: T,
-    pub(crate) g: [T; D],
+pub struct CornerShare<T, const D: usize> {
+    /// Share of a mean.
+    pub w: T,
+    /// Share of a mean gradient, per length.
+    pub g: [T; D],
 }
 
 impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
@@ -153,7 +155,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// Whether indices are in range, and every corner belongs to a particle.
-    pub(crate) fn check(&self, particles: usize) -> Result<(), SetupError> {
+    pub fn check(&self, particles: usize) -> Result<(), SetupError> {
         let Self { X, x, corners, ends, of_particles, faces, loads, numbers, .. } = self;
         let of_cells = self.is_of_cells();
         if D == 1 && !of_cells {
@@ -214,7 +216,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// Whether each particle is one cell.
-    pub(crate) fn is_of_cells(&self) -> bool {
+    pub fn is_of_cells(&self) -> bool {
         self.interpolation == Interpolation::Cell
     }
 
@@ -225,7 +227,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
 
     /// The places in `corners` of a particle.
     #[inline]
-    pub(crate) fn places(&self, p: usize) -> std::ops::Range<usize> {
+    pub fn places(&self, p: usize) -> std::ops::Range<usize> {
         if self.is_of_cells() {
             return p << D..(p + 1) << D;
         }
@@ -240,7 +242,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
 
     /// Writes the shares of means over a particle's polygons in the reference configuration, as many as it has
     /// [places](Self::places).
-    pub(crate) fn means(&self, p: usize, shares: &mut [CornerShare<T, D>]) {
+    pub fn means(&self, p: usize, shares: &mut [CornerShare<T, D>]) {
         if D == 3 {
             return polyhedra::means(self, p, shares);
         }
@@ -277,12 +279,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 
     /// Writes the shares of mean gradients over a particle's polygons between corners at `x`, and returns their area or volume.
-    pub(crate) fn slopes(
-        &self,
-        x: &[SVector<T, D>],
-        p: usize,
-        shares: &mut [CornerShare<T, D>],
-    ) -> T {
+    pub fn slopes(&self, x: &[SVector<T, D>], p: usize, shares: &mut [CornerShare<T, D>]) -> T {
         if D == 3 {
             return polyhedra::slopes(self, x, p, shares);
         }
@@ -329,9 +326,6 @@ fn start(ends: &[u32], index: usize) -> usize {
 }
 
 /// `a x b` in the plane.
-pub(crate) fn cross<T: RealField + Copy, const D: usize>(
-    a: &SVector<T, D>,
-    b: &SVector<T, D>,
-) -> T {
+pub fn cross<T: RealField + Copy, const D: usize>(a: &SVector<T, D>, b: &SVector<T, D>) -> T {
     a[0] * b[D - 1] - a[D - 1] * b[0]
 }

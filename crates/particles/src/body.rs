@@ -5,10 +5,10 @@ use std::ops::Range;
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
+use crate::columns::Particles;
 use crate::error::SetupError;
 use crate::grid::Grid;
-use crate::particles::Particles;
-use crate::particles::mesh::{Mesh, Numbers};
+use crate::mesh::{Mesh, Numbers};
 
 /// Particles, and the region of the body that each represents.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,102 +66,111 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         let mesh = Some(cells_of_boxes(grid, &particles));
         Self { half_edges, mesh, ..particles.into() }
     }
-}
 
-/// See [`Body::part`].
-pub(crate) fn part<T: RealField + Copy, const D: usize>(
-    body: &Body<T, D>,
-    own: &Range<usize>,
-) -> Body<T, D> {
-    let Body { particles, half_edges, mesh, revolves, sticks } = body;
-    let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
-    let particles = particles.some(&places);
-    let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
-    let own: Vec<usize> = own.clone().collect();
-    let mesh = mesh.as_ref().map(|mesh| mesh.part(&own));
-    Body { particles, half_edges, mesh, revolves: *revolves, sticks: *sticks }
-}
-
-/// See [`Body::annulus`].
-pub(crate) fn annulus<T: RealField + Copy, const D: usize>(
-    ring: &Annulus<T>,
-    spacing: T,
-    per_cell: usize,
-    density: T,
-) -> Result<Body<T, D>, SetupError> {
-    if D != 2 {
-        return Err(SetupError::PolarDimension { dimension: D });
+    /// Some successive particles alone, with their corners.
+    #[must_use]
+    pub fn part(&self, own: &Range<usize>) -> Self {
+        let Self { particles, half_edges, mesh, revolves, sticks } = self;
+        let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
+        let particles = particles.some(&places);
+        let half_edges = half_edges.get(own.clone()).unwrap_or_default().to_vec();
+        let own: Vec<usize> = own.clone().collect();
+        let mesh = mesh.as_ref().map(|mesh| mesh.part(&own));
+        Self { particles, half_edges, mesh, revolves: *revolves, sticks: *sticks }
     }
-    let Annulus { inner, outer, quarter } = *ring;
-    for (quantity, value) in [
-        ("the inner radius", inner),
-        ("the width of the ring", outer - inner),
-        ("the spacing", spacing),
-        ("the density", density),
-    ] {
-        if !(value > T::zero() && value.is_finite()) {
-            let value = nalgebra::try_convert(value).unwrap_or(f64::NAN);
-            return Err(SetupError::NotPositive { quantity: quantity.into(), value });
+
+    /// A ring at rest, fitted by polar cells of equal width and angle. Particles lie at the exact centroids of the cells
+    /// and have their exact areas; their quadrilaterals share corners, which lie on the rims and on the planes of
+    /// symmetry.
+    ///
+    /// With `per_cell` particles in a length `spacing` there are `round(per_cell (outer - inner) / spacing)` cells across
+    /// (1 at least), and around as many in each quarter as make them square at the mean radius.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::PolarDimension`] in other dimensions than two, and [`SetupError::NotPositive`] for radii or a density
+    /// that are none.
+    pub fn annulus(
+        ring: &Annulus<T>,
+        spacing: T,
+        per_cell: usize,
+        density: T,
+    ) -> Result<Self, SetupError> {
+        if D != 2 {
+            return Err(SetupError::PolarDimension { dimension: D });
         }
-    }
-    let number = |count: usize| real::<T>(count as f64);
-    let rounded =
-        |value: T| nalgebra::try_convert::<T, f64>(value).unwrap_or(0.0).round().max(1.0) as usize;
-    let half = real::<T>(0.5);
-    let across = rounded(number(per_cell) * (outer - inner) / spacing);
-    let width = (outer - inner) / number(across);
-    let mean = half * (inner + outer);
-    let around = rounded(T::frac_pi_2() * mean / width);
-    let angle = T::frac_pi_2() / number(around);
-    let quarters = if quarter { 1 } else { 4 };
-    let cells = around * quarters;
-    // All quarters of a full ring: the last corners are the first.
-    let rays = if quarter { cells + 1 } else { cells };
-
-    let vector = |cos: T, sin: T| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
-    let radius = |i: usize| inner + width * number(i);
-    let (mut of_corners, mut corners) = (Vec::new(), Vec::new());
-    for j in 0..rays {
-        let (cos, sin) = direction(j, around);
-        of_corners.extend((0..=across).map(|i| vector(cos, sin) * radius(i)));
-    }
-    let count = across * cells;
-    let (mut X, mut volume) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let mut half_edges = Vec::with_capacity(count);
-    for j in 0..cells {
-        let (cos, sin) = direction(2 * j + 1, 2 * around);
-        // A chord's centroid lies inside its arc.
-        let chord = (half * angle).sin() / (half * angle);
-        for i in 0..across {
-            let (low, high) = (radius(i), radius(i + 1));
-            let middle = half * (low + high);
-            // 2/3 (high^3 - low^3) / (high^2 - low^2)
-            let centre = middle + width * width / (real::<T>(12.0) * middle);
-            X.push(vector(cos, sin) * (centre * chord));
-            volume.push(middle * width * angle);
-            let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
-            half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
-            let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u32;
-            corners.extend([
-                corner(i, j),
-                corner(i + 1, j),
-                corner(i + 1, j + 1),
-                corner(i, j + 1),
-            ]);
+        let Annulus { inner, outer, quarter } = *ring;
+        for (quantity, value) in [
+            ("the inner radius", inner),
+            ("the width of the ring", outer - inner),
+            ("the spacing", spacing),
+            ("the density", density),
+        ] {
+            if !(value > T::zero() && value.is_finite()) {
+                let value = nalgebra::try_convert(value).unwrap_or(f64::NAN);
+                return Err(SetupError::NotPositive { quantity: quantity.into(), value });
+            }
         }
+        let number = |count: usize| real::<T>(count as f64);
+        let rounded = |value: T| {
+            nalgebra::try_convert::<T, f64>(value).unwrap_or(0.0).round().max(1.0) as usize
+        };
+        let half = real::<T>(0.5);
+        let across = rounded(number(per_cell) * (outer - inner) / spacing);
+        let width = (outer - inner) / number(across);
+        let mean = half * (inner + outer);
+        let around = rounded(T::frac_pi_2() * mean / width);
+        let angle = T::frac_pi_2() / number(around);
+        let quarters = if quarter { 1 } else { 4 };
+        let cells = around * quarters;
+        // All quarters of a full ring: the last corners are the first.
+        let rays = if quarter { cells + 1 } else { cells };
+
+        let vector = |cos: T, sin: T| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
+        let radius = |i: usize| inner + width * number(i);
+        let (mut of_corners, mut corners) = (Vec::new(), Vec::new());
+        for j in 0..rays {
+            let (cos, sin) = direction(j, around);
+            of_corners.extend((0..=across).map(|i| vector(cos, sin) * radius(i)));
+        }
+        let count = across * cells;
+        let (mut X, mut volume) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut half_edges = Vec::with_capacity(count);
+        for j in 0..cells {
+            let (cos, sin) = direction(2 * j + 1, 2 * around);
+            // A chord's centroid lies inside its arc.
+            let chord = (half * angle).sin() / (half * angle);
+            for i in 0..across {
+                let (low, high) = (radius(i), radius(i + 1));
+                let middle = half * (low + high);
+                // 2/3 (high^3 - low^3) / (high^2 - low^2)
+                let centre = middle + width * width / (real::<T>(12.0) * middle);
+                X.push(vector(cos, sin) * (centre * chord));
+                volume.push(middle * width * angle);
+                let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
+                half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
+                let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u32;
+                corners.extend([
+                    corner(i, j),
+                    corner(i + 1, j),
+                    corner(i + 1, j + 1),
+                    corner(i, j + 1),
+                ]);
+            }
+        }
+        let particles = Particles {
+            x: X.clone(),
+            X,
+            v: vec![SVector::zeros(); count],
+            F: vec![SMatrix::identity(); count],
+            mass: volume.iter().map(|&area| area * density).collect(),
+            volume,
+            half_size: SVector::repeat(half * width),
+            ..Particles::default()
+        };
+        let mesh = Some(Mesh::cells(of_corners, corners));
+        Ok(Self { half_edges, mesh, ..particles.into() })
     }
-    let particles = Particles {
-        x: X.clone(),
-        X,
-        v: vec![SVector::zeros(); count],
-        F: vec![SMatrix::identity(); count],
-        mass: volume.iter().map(|&area| area * density).collect(),
-        volume,
-        half_size: SVector::repeat(half * width),
-        ..Particles::default()
-    };
-    let mesh = Some(Mesh::cells(of_corners, corners));
-    Ok(Body { half_edges, mesh, ..particles.into() })
 }
 
 /// Cosine and sine of `index` parts of a quarter turn, each of which has `per_quarter`; exact on the axes.
