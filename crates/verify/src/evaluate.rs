@@ -7,6 +7,10 @@ use crate::tangent::{TangentError, WrongLength, exact_tangent};
 use mmsmith_runtime::{AnySolution, Solution};
 use nalgebra::SVector;
 
+/// Why formulas have numbers where the law has no energy.
+const BEYOND_LAW: &str = "the deformation lies beyond the limit of the law, as where I1bar - 3 reaches Jm of Gent's, and numbers that \
+     formulas of P and b have there mean nothing; smaller amplitudes keep away from it";
+
 /// [`evaluate`] with the tangent of the solver's law at the exact deformation.
 ///
 /// # Errors
@@ -43,5 +47,13 @@ fn evaluate_at<const D: usize>(
     let position: [f64; D] =
         X.try_into().map_err(|_| WrongLength { given: X.len(), dimension: D })?;
     let X = SVector::from(position);
-    Ok(beside_axis(solution, &X, t, evaluate_in(solution, &X, t)))
+    let row = evaluate_in(solution, &X, t);
+    let is_beyond_law =
+        row.not_finite.is_empty() && solution.strain_energy(&X, t).is_some_and(|W| !W.is_finite());
+    let mut row = beside_axis(solution, &X, t, row);
+    if is_beyond_law {
+        row.not_finite.push("W".to_owned());
+        row.why = Some(BEYOND_LAW.to_owned());
+    }
+    Ok(row)
 }

@@ -39,11 +39,12 @@ pub struct FieldRow {
     /// Whether `X` lies outside the body, where the fields are those of the same formulas. Written where it is true.
     #[serde(skip_serializing_if = "is_false")]
     pub outside: bool,
-    /// The fields that have entries which are no finite numbers, and are written as null. Written where there are any.
+    /// The fields that have entries which are no finite numbers, and are written as null; `W` where the strain energy has no value, while
+    /// formulas have numbers. Written where there are any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_finite: Vec<String>,
-    /// Why they have: the history of the internal variables could not be followed, or fields have no limit on an axis of coordinates. Written
-    /// where that is the reason.
+    /// Why they have: the history of the internal variables could not be followed, or fields have no limit on an axis of coordinates,
+    /// or the deformation lies beyond the limit of the law. Written where that is the reason.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
 }

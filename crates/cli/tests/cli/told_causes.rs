@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::command::{mms, read_json, refuses};
+use crate::command::{mms, mms_with, read_json, refuses};
 use std::path::{Path, PathBuf};
 
 fn data(file: &str) -> PathBuf {
@@ -32,6 +32,21 @@ fn checks_and_advice_fit_the_specification() {
         assert_eq!(called.status, status, "{file}: {}{}", called.stdout, called.stderr);
         assert!(called.stdout.contains(told), "{file}: {}", called.stdout);
         assert!(!called.stdout.contains(untold), "{file}: {}", called.stdout);
+    }
+}
+
+#[test]
+fn eval_tells_of_points_beyond_the_limit_of_a_law() {
+    let place = tempfile::tempdir().unwrap();
+    let spec = data("tests/data/specs/told/stretched-out.toml");
+    let points = r#"[ { "X": [0, 0], "t": 0 } ]"#;
+    for (amplitude, status) in [(0.1, 1), (0.01, 0)] {
+        let call = format!("eval {} --points - --set A={amplitude}", spec.display());
+        let called = mms_with(place.path(), &call, &[], points);
+        assert_eq!(called.status, status, "{amplitude}: {}", called.stderr);
+        let is_told =
+            called.stderr.contains("entry 0: W is not finite there: the deformation lies");
+        assert_eq!(is_told, status == 1, "{amplitude}: {}", called.stderr);
     }
 }
 
