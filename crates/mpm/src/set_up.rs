@@ -184,6 +184,69 @@ fn check_mesh<T: Lanes, const D: usize>(
     mesh.check(body.particles.X.len())
 }
 
+/// The grids that a scheme needs beside that of its nodes.
+#[derive(Clone, Copy)]
+struct OtherGrids {
+    /// For velocities that are projected again.
+    reprojected: bool,
+    /// For the sums of the next step.
+    ahead: bool,
+    /// For means of the change of volume.
+    means: bool,
+    /// For filtered velocities.
+    filtered: bool,
+}
+
+impl OtherGrids {
+    fn of<T>(settings: &Settings<T>, projects: bool, has_corners: bool) -> Self {
+        let &Settings { integrator, transfer, .. } = settings;
+        let fused = is_fused(integrator, transfer) && !projects;
+        let filtered = transfer.is_filtered();
+        Self {
+            reprojected: integrator.reprojects() || filtered,
+            // Sums for the next step are on a grid of their own, unless they are at corners.
+            ahead: filtered || (fused && !has_corners),
+            means: projects,
+            filtered,
+        }
+    }
+
+    fn bytes_per_node<T, const D: usize>(self) -> usize {
+        let grids =
+            1 + [self.reprojected, self.ahead, self.means].map(usize::from).iter().sum::<usize>();
+        let of_filter = if self.filtered { size_of::<SVector<T, D>>() } else { 0 };
+        grids * size_of::<Node<T, D>>() + of_filter
+    }
+
+    /// Reserves all grids.
+    fn allocate<T: Lanes, const D: usize>(
+        self,
+        grid: &Grid<T, D>,
+        constants: Constants<T, D>,
+        (layout, bins): (Layout<D>, Bins<Node<T, D>, D>),
+    ) -> Result<GridState<T, D>, SetupError> {
+        let nodes = |is_needed: bool| {
+            reserve(if is_needed { layout.nodes } else { 0 }).ok_or_else(|| {
+                SetupError::GridTooLarge {
+                    cells: grid.cells.to_vec(),
+                    bytes: layout.nodes as u128 * self.bytes_per_node::<T, D>() as u128,
+                }
+            })
+        };
+        Ok(GridState {
+            constants,
+            nodes: nodes(true)?,
+            reprojected: nodes(self.reprojected)?,
+            next: nodes(self.ahead)?,
+            means: nodes(self.means)?,
+            is_ahead: false,
+            filtered: if self.filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
+            layout,
+            bins,
+        })
+    }
+}
+
 /// Reserves all memory of a run.
 pub(crate) fn allocate<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
@@ -209,16 +272,9 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     if revolves && projects {
         return Err(SetupError::ProjectedHalfPlane);
     }
-    let fused = is_fused(integrator, transfer) && !projects;
-    let filtered = transfer.is_filtered();
-    let reprojects = integrator.reprojects() || filtered;
-    // Sums for the next step are on a grid of their own, unless they are at corners.
-    let ahead = filtered || (fused && corners.is_none());
-    let grids = 1 + usize::from(reprojects) + usize::from(ahead) + usize::from(projects);
-    let of_filter = if filtered { size_of::<SVector<T, D>>() } else { 0 };
-    let bytes_per_node = grids * size_of::<Node<T, D>>() + of_filter;
+    let others = OtherGrids::of(settings, projects, corners.is_some());
     let sides = Sides { around: revolves.then_some(1), sticks };
-    let mut layout = Layout::with_sides(grid, &sides, bytes_per_node)?;
+    let mut layout = Layout::with_sides(grid, &sides, others.bytes_per_node::<T, D>())?;
     let points = corners.as_ref().map_or(count, SharedCorners::count);
     let most_nodes = match &corners {
         Some(corners) => Domain::<T, D>::most_nodes(&corners.at_corner),
@@ -231,14 +287,6 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         // The first sort tells which rows this process holds.
         layout.hold(0..1);
     }
-    let nodes = |is_needed: bool| {
-        reserve(if is_needed { layout.nodes } else { 0 }).ok_or_else(|| SetupError::GridTooLarge {
-            cells: grid.cells.to_vec(),
-            bytes: layout.nodes as u128 * bytes_per_node as u128,
-        })
-    };
-    let (now, reprojected, next) = (nodes(true)?, nodes(reprojects)?, nodes(ahead)?);
-    let means = nodes(projects)?;
     let mut bins = Bins::new(tiles, points);
     if let Some(part) = &part {
         bins.share_out(part.ranks.clone());
@@ -260,17 +308,8 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         let of_body = (mass_of_cell, law.follows_position());
         Box::new(Corners::new(corners, of_body, is_affine, reprojects))
     });
-    let grid = GridState {
-        constants: Constants::new(grid, &layout, &tiles, settings.time_step, least_mass),
-        nodes: now,
-        reprojected,
-        next,
-        means,
-        is_ahead: false,
-        filtered: if filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
-        layout,
-        bins,
-    };
+    let constants = Constants::new(grid, &layout, &tiles, settings.time_step, least_mass);
+    let grid = others.allocate(grid, constants, (layout, bins))?;
     let is_kept = integrator.early() > 0.0;
     let early = EarlyState {
         F: if is_kept { vec![SMatrix::identity(); count] } else { Vec::new() },

@@ -276,6 +276,11 @@ impl<'a, T, const D: usize> Moving<'a, T, D> {
         self.count
     }
 
+    /// Whether there are no particles.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// Pieces of `size` particles, each with the place of its first one here.
     pub fn pieces(mut self, size: usize) -> impl Iterator<Item = (usize, Self)> {
         let mut first = 0;
@@ -283,7 +288,7 @@ impl<'a, T, const D: usize> Moving<'a, T, D> {
             let piece = self.split_off(size);
             let start = first;
             first += piece.len();
-            (piece.len() > 0).then_some((start, piece))
+            (!piece.is_empty()).then_some((start, piece))
         })
     }
 }
