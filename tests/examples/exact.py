@@ -16,13 +16,14 @@ HERE = Path(__file__).parent
 
 
 class Exact:
-    """The generated header of a plane neo-Hookean solution with an amplitude A, compiled."""
+    """The generated header of a plane neo-Hookean solution with an amplitude A, compiled; of the library, or a specification."""
 
-    def __init__(self, name, amplitude):
+    def __init__(self, name, amplitude, source=None):
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "exact.so"
             # The command on the path, or the one that the variable MMS names.
-            gen = [os.environ.get("MMS", "mms"), "gen", name, "--target", "c", "--out", str(Path(folder) / "mmsmith")]
+            gen = [os.environ.get("MMS", "mms"), "gen", str(source or name), "--target", "c"]
+            gen += ["--out", str(Path(folder) / "mmsmith")]
             subprocess.run(gen, check=True, stdout=subprocess.DEVNULL)
             flags = ["-O2", "-shared", "-fPIC", "-ffp-contract=off", f"-I{folder}"]
             c_name = name.replace("-", "_")
