@@ -218,12 +218,12 @@ impl OtherGrids {
         grids * size_of::<Node<T, D>>() + of_filter
     }
 
-    /// Reserves all grids.
+    /// Reserves all grids, then makes the bins: a grid that memory has no room for is told before these ask for their part.
     fn allocate<T: Lanes, const D: usize>(
         self,
         grid: &Grid<T, D>,
         constants: Constants<T, D>,
-        (layout, bins): (Layout<D>, Bins<Node<T, D>, D>),
+        (layout, bins): (Layout<D>, impl FnOnce() -> Bins<Node<T, D>, D>),
     ) -> Result<GridState<T, D>, SetupError> {
         let nodes = |is_needed: bool| {
             reserve(if is_needed { layout.nodes } else { 0 }).ok_or_else(|| {
@@ -242,7 +242,7 @@ impl OtherGrids {
             is_ahead: false,
             filtered: if self.filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
             layout,
-            bins,
+            bins: bins(),
         })
     }
 }
@@ -287,10 +287,6 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         // The first sort tells which rows this process holds.
         layout.hold(0..1);
     }
-    let mut bins = Bins::new(tiles, points);
-    if let Some(part) = &part {
-        bins.share_out(part.ranks.clone());
-    }
     let Particles { mass, volume, .. } = &particles;
     let least = |numbers: &mut dyn Iterator<Item = T>| {
         let least = numbers.reduce(|least, number| least.min(number));
@@ -309,6 +305,13 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         Box::new(Corners::new(corners, of_body, is_affine, reprojects))
     });
     let constants = Constants::new(grid, &layout, &tiles, settings.time_step, least_mass);
+    let bins = || {
+        let mut bins = Bins::new(tiles, points);
+        if let Some(part) = &part {
+            bins.share_out(part.ranks.clone());
+        }
+        bins
+    };
     let grid = others.allocate(grid, constants, (layout, bins))?;
     let is_kept = integrator.early() > 0.0;
     let early = EarlyState {

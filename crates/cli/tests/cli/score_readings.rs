@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::command::{mms, read_json, refuses};
-use mmsmith_solutions::nalgebra::{SVector, Vector2};
+use mmsmith_solutions::nalgebra::{Matrix2, SVector, Vector2};
 use mmsmith_solutions::{AnySolution, Solution, build};
 use serde_json::Value;
 use std::fmt::Write;
@@ -243,6 +243,31 @@ fn a_displacement_gradient_is_read_where_there_is_no_deformation_gradient() {
     assert!(finding(&right, "law-agrees").unwrap().starts_with("P agrees with the law"));
     assert!(finding(&right, "of-displacement-gradient").unwrap().contains("array `H`"));
     assert_eq!(of_law(1.7)["rows"][0]["law"][0]["verdict"], "unexplained");
+}
+
+/// Errors of shear fall faster than those of volume, which the stress has more of: F converges, and the stress of the law at that F does not.
+#[test]
+fn a_stress_that_has_the_error_of_the_recorded_deformation_is_not_said_to_be_written_wrongly() {
+    let (place, exact) = (tempfile::tempdir().unwrap(), exact());
+    let header = "t,X,Y,ux,uy,F11,F12,F21,F22,P11,P12,P21,P22";
+    let (lambda, mu) = (0.3 * 1e4 / (1.3 * 0.4), 0.5 * 1e4 / 1.3);
+    let scored = score(place.path(), "", |cells| {
+        let h = (cells as f64).recip();
+        let (shear, volume) = (0.03 * h.powf(0.9), 0.01 * h.powf(0.3));
+        let error = Matrix2::new(volume, shear, shear, volume);
+        table(header, &particles(&exact, cells, 2), |p| {
+            let F = exact.deformation_gradient(&p.X, p.t) + error;
+            let across = F.try_inverse().unwrap().transpose();
+            let P = (F - across) * mu + across * (lambda * F.determinant().ln());
+            let mut line = vec![p.t, p.X.x, p.X.y, p.u.x, p.u.y];
+            line.extend(F.transpose().iter().chain(P.transpose().iter()));
+            line
+        })
+    });
+    assert!(finding(&scored, "law-agrees").unwrap().starts_with("P agrees with the law"));
+    let verdict = verdict(&scored);
+    assert!(verdict.contains("not all fields do: P has order 0."), "{verdict}");
+    assert!(verdict.contains("at the recorded F, whose error it has"), "{verdict}");
 }
 
 #[test]

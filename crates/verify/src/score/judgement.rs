@@ -6,6 +6,7 @@ use mmsmith_measure::norms::{Norm, PerNorm};
 use serde::Serialize;
 
 use super::integrated::Integrated;
+use super::law::{LawRow, LawVerdict};
 use super::options::ScoreOptions;
 use super::quantity::Quantity;
 use super::row::ScoreRow;
@@ -268,6 +269,14 @@ fn told(
             Convergence::Converges,
             format!("converges with order {order:.2} (u, L2, finest pair)"),
         ),
+        Shown::Order(order) if flat.iter().all(|flat| follows_law(rows, flat)) => (
+            Convergence::DoesNotConverge,
+            format!(
+                "u converges with order {order:.2}, but not all fields do: {} (L2, finest pair); it agrees with the law at the \
+                 recorded F, whose error it has",
+                list(flat)
+            ),
+        ),
         Shown::Order(order) if flat.iter().all(|flat| is_stress(flat.field)) => (
             Convergence::DoesNotConverge,
             format!(
@@ -301,6 +310,12 @@ fn told(
             ),
         ),
     }
+}
+
+/// Whether all of a field is that of the law at the recorded deformation, so that its error comes from there.
+fn follows_law(rows: &[ScoreRow], flat: &Flat) -> bool {
+    let agrees = |law: &LawRow| law.quantity == flat.field && law.verdict == LawVerdict::Agrees;
+    is_stress(flat.field) && rows.iter().all(|row| row.law.iter().any(agrees))
 }
 
 /// Whether a field is one that a solver may write wrongly while its motion is right.
