@@ -16,7 +16,7 @@ pub trait Solver<T, const D: usize> {
     ///
     /// # Errors
     ///
-    /// See [`Simulation::step`].
+    /// Where a particle is turned inside out, leaves the grid, grows too large or is no longer finite; no step can follow.
     fn step(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError>;
 
     /// The particles that this process holds as they are now, and their law.
@@ -39,10 +39,10 @@ pub trait Solver<T, const D: usize> {
         Profile::default()
     }
 
-    /// The state between two steps, see [`Simulation::state`].
+    /// The state between two steps of the particles here: arrays as bytes in this machine's order.
     fn state(&self) -> Vec<&[u8]>;
 
-    /// Goes on from such a state, see [`Simulation::take_up`].
+    /// Goes on from the states that all processes of such a run had, each of which reads some; a call of all.
     ///
     /// # Errors
     ///
