@@ -14,6 +14,7 @@ mod formulas;
 mod generate;
 mod page;
 mod publish;
+mod release;
 
 /// Tasks of the repository itself.
 #[derive(Parser)]
@@ -63,6 +64,15 @@ enum Task {
         /// Package the crates without compiling each package by itself, which takes most of the time.
         #[arg(long)]
         no_build: bool,
+    },
+    /// Build the command for any Linux on x86-64, and pack it with manual pages and completions into one archive.
+    Release {
+        /// The folder of the archive and its checksum.
+        #[arg(long, value_name = "DIR", default_value = "target/archive")]
+        out: PathBuf,
+        /// Pack sources that differ from the commit, too.
+        #[arg(long)]
+        allow_dirty: bool,
     },
     /// Run the examples of README and book, follow their links, and write the measurements of their pages.
     #[command(group = clap::ArgGroup::new("what").required(true))]
@@ -118,6 +128,9 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
         }
         Task::Page { out, no_solver } => (page::run(&repository(), &out, !no_solver)?, false),
         Task::Publish { no_build, .. } => publish::check(&repository(), no_build)?,
+        Task::Release { out, allow_dirty } => {
+            (release::run(&repository(), &out, allow_dirty)?, false)
+        }
         Task::Docs { write: true, mms, pages, .. } => {
             docs::write(&repository(), &mms, &pages, say)?;
             (Vec::new(), false)
