@@ -1,4 +1,4 @@
-//! The columns of particles, stated once: sort, split, gather, move between processes, save and resume follow from the rows of [`columns!`].
+//! The columns of particles, stated once: sort, split, gather, move between processes, save and resume follow from the rows of `columns!`.
 //!
 //! A column has the same number of successive elements for each particle, its share: one, none where a run does without the column, or
 //! as many as a law has internal variables.

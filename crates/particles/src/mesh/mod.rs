@@ -1,5 +1,5 @@
 //! Domains of particles between corners that they share and that the grid moves: the cells of CPDI2, and polygons that fill a body of any
-//! shape. In space these are polyhedra, with faces in place of edges: see [`polyhedra`].
+//! shape. In space these are polyhedra, with faces in place of edges: see `polyhedra`.
 //!
 //! The means over a cell are in the solver's shape functions. Any other particle is a list of polygons. Each is divided into the triangles
 //! between its edges and the mean of its corners. Where a function is replaced by its interpolation between the corners, with the mean of their values at the mean of the corners, its mean over a
