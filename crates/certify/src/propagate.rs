@@ -18,7 +18,7 @@
 //! # Factors
 //!
 //! Both sides vanish where a sine, a coordinate or the amplitude does. Inputs, sines and cosines are therefore factors of
-//! their own (see [`monomial`](crate::monomial)): both sides become sums of absolute monomials with coefficients, which are
+//! their own (see `monomial`): both sides become sums of absolute monomials with coefficients, which are
 //! compared one by one ([`Sides::covered`]). An input is the same number on both sides. A sine is not: the error side has it
 //! at a perturbed argument. Since `|sin(x + e)| <= |sin(x)| + |e|`, each such factor leaves a term without it, `|e|` times
 //! smaller.

@@ -1,4 +1,4 @@
-//! Bodies of any shape: the boxes of a lattice, clipped with the body's boundary, in the plane by [`plane`], in space by [`space`].
+//! Bodies of any shape: the boxes of a lattice, clipped with the body's boundary, in the plane by `plane`, in space by `space`.
 //!
 //! 1. Each box is clipped with one side of the body after another. A curved side becomes the chords, or the flat parts, between the places
 //!    where it crosses the lines of the lattice. A crossing is computed once, from the line and the side alone, so that the boxes at the

@@ -167,7 +167,7 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     /// The body force per unit mass, from the values of one time and of one point; equal to
     /// [`Solution::body_force`] but for rounding.
     ///
-    /// If `NEAR`, logarithms of ratios take [the form near one](Real::ln_near_one): the result is the same to the last bit, or NaN.
+    /// If `NEAR`, logarithms of ratios take the form near one (`Real::ln_near_one`): the result is the same to the last bit, or NaN.
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; TIME],

@@ -60,7 +60,7 @@ pub enum CflSpeed {
     Bar,
     /// P-waves in the undeformed solid, `sqrt((lambda + 2 mu)/rho0)`.
     PWave,
-    /// P-waves with the viscosity of the law on the cells of a grid, see [`on_grid`](Self::on_grid).
+    /// P-waves with the viscosity of the law on the cells of a grid, see `on_grid`.
     Viscous,
 }
 

@@ -15,7 +15,7 @@ const BEYOND_LAW: &str = "the deformation lies beyond the limit of the law, as w
 ///
 /// # Errors
 ///
-/// [`TangentError`] where the law has none, or the position does not fit.
+/// `TangentError` where the law has none, or the position does not fit.
 pub fn evaluate_with_tangent(
     solution: &AnySolution<f64>,
     X: &[f64],
@@ -33,7 +33,7 @@ pub fn evaluate_with_tangent(
 ///
 /// # Errors
 ///
-/// [`WrongLength`] when `X` does not have one coordinate for each dimension.
+/// `WrongLength` when `X` does not have one coordinate for each dimension.
 pub fn evaluate(solution: &AnySolution<f64>, X: &[f64], t: f64) -> Result<FieldRow, WrongLength> {
     let unknown = || Err(WrongLength { given: X.len(), dimension: 0 });
     in_dimension!(solution, |s| evaluate_at(s, X, t), else unknown())

@@ -51,7 +51,7 @@ pub struct Outputs<'a> {
     /// last state included; what is there before the run is removed. A run that goes on from a checkpoint has those before it, if it was written with
     /// a history.
     pub history: Option<&'a mut Vec<Moment>>,
-    /// The processes that simulate it together, where there are several. All of them call [`run`] alike; files other than
+    /// The processes that simulate it together, where there are several. All of them call `run` alike; files other than
     /// particle files and checkpoints are those of rank 0.
     pub ranks: Option<Arc<dyn Ranks>>,
     /// Where it is said what this process sent to the others, if that is wanted.

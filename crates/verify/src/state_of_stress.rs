@@ -27,7 +27,7 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Whether no disturbance is driven on: the pressure is [small](HARMLESS_PRESSURE), and all plane waves are stiff.
+    /// Whether no disturbance is driven on: the pressure is small, and all plane waves are stiff.
     #[must_use]
     pub fn are_harmless(&self) -> bool {
         self.pressure_over_mu <= HARMLESS_PRESSURE && self.wave_stiffness > 0.0

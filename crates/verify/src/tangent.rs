@@ -254,7 +254,7 @@ pub struct JudgedTangent {
 ///
 /// # Errors
 ///
-/// [`TangentError`] where the law has no tangent, or a sample does not fit.
+/// `TangentError` where the law has no tangent, or a sample does not fit.
 pub fn judge_tangent(
     solution: &AnySolution<f64>,
     samples: &[TangentSample],
