@@ -9,6 +9,32 @@ pub(crate) fn one_line(text: &str) -> String {
     words.join(" ").chars().filter(|c| !c.is_control()).collect()
 }
 
+/// A string of Fortran in pieces that fit into lines.
+pub(crate) fn fortran_string(text: &str) -> String {
+    let safe = |c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' };
+    let safe: Vec<char> = one_line(text).chars().take(500).map(safe).collect();
+    if safe.is_empty() {
+        return "\"\"".into();
+    }
+    let pieces = safe
+        .chunks(50)
+        .map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
+    pieces.collect::<Vec<_>>().join(" // &\n            ")
+}
+
+/// A string of Julia literal; a dollar sign would interpolate.
+pub(crate) fn julia_string(text: &str) -> String {
+    let mut literal = String::from("\"");
+    for c in one_line(text).chars() {
+        match c {
+            '"' | '\\' | '$' => literal.extend(['\\', c]),
+            ' '..='~' => literal.push(c),
+            _ => literal += &format!("\\U{:08x}", u32::from(c)),
+        }
+    }
+    literal + "\""
+}
+
 /// Meaning and values of a parameter: the description or the name, the unit, the range.
 pub(crate) fn meaning(name: &str, description: &str, unit: &str, range: &str) -> String {
     let mut text = one_line(if description.is_empty() { name } else { description });

@@ -6,7 +6,7 @@ use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
-use crate::text::{digits, one_line};
+use crate::text::{digits, fortran_string};
 use mmsmith_spec::Parameter;
 use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
@@ -87,26 +87,13 @@ fn members(parameters: &[Parameter]) -> Vec<String> {
     taken
 }
 
-/// A string in pieces that fit into lines.
-pub(super) fn string(text: &str) -> String {
-    let safe = |c| if (' '..='~').contains(&c) && c != '\\' { c } else { '_' };
-    let safe: Vec<char> = one_line(text).chars().take(500).map(safe).collect();
-    if safe.is_empty() {
-        return "\"\"".into();
-    }
-    let pieces = safe
-        .chunks(50)
-        .map(|piece| format!("\"{}\"", String::from_iter(piece).replace('"', "\"\"")));
-    pieces.collect::<Vec<_>>().join(" // &\n            ")
-}
-
 const REFUSAL: Refusal = Refusal {
     // A bound that holds for finite numbers, and neither for infinite numbers nor for NaN.
     finite: "abs(#) <= huge(1.0_dp)",
     and: ".and.",
     side: "#",
     lines: "    if (.not. (#)) then\n      message = #\n      return\n    end if\n",
-    string,
+    string: fortran_string,
 };
 
 pub(super) fn module_name(code: &Code<'_>) -> String {
@@ -395,7 +382,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
-            for line in string(&text).split('\n') {
+            for line in fortran_string(&text).split('\n') {
                 let piece = line.trim_start().trim_end_matches(" // &");
                 let inner = piece.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
                 let marks = inner.map(|inner| inner.replace("\"\"", ""));

@@ -6,7 +6,7 @@ use crate::listing::{Given, Item, Refusal, commented};
 use crate::names::Names;
 use crate::runtime::{Primitive, Routine, WithRuntime};
 use crate::target::{Called, Target, Unwritable, Written};
-use crate::text::{digits, one_line};
+use crate::text::{digits, julia_string};
 use mmsmith_expr::Function;
 use mmsmith_stage::{Operand, Shape};
 use std::borrow::Cow;
@@ -77,25 +77,12 @@ impl WithRuntime for Julia {
     }
 }
 
-/// A string literal; a dollar sign would interpolate.
-pub(super) fn string(text: &str) -> String {
-    let mut literal = String::from("\"");
-    for c in one_line(text).chars() {
-        match c {
-            '"' | '\\' | '$' => literal.extend(['\\', c]),
-            ' '..='~' => literal.push(c),
-            _ => literal += &format!("\\U{:08x}", u32::from(c)),
-        }
-    }
-    literal + "\""
-}
-
 const REFUSAL: Refusal = Refusal {
     finite: "isfinite(#)",
     and: "&&",
     side: "#",
     lines: "    (#) || throw(ArgumentError(#))\n",
-    string,
+    string: julia_string,
 };
 
 pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
@@ -124,7 +111,7 @@ pub(crate) fn source(code: &Code<'_>) -> Result<String, Unwritable> {
     let named: Vec<String> = spec
         .parameters
         .iter()
-        .map(|p| format!("{} => {}", string(&p.name), Julia.literal(p.default)))
+        .map(|p| format!("{} => {}", julia_string(&p.name), Julia.literal(p.default)))
         .collect();
     text += &format!(
         "
@@ -225,7 +212,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_text_ends_a_string(text in r#"(["\\\n\r $%'&]|\PC){0,200}"#) {
-            let literal = string(&text);
+            let literal = julia_string(&text);
             let inner = &literal[1..literal.len() - 1];
             prop_assert!(inner.is_ascii() && !inner.contains('\n'));
             let mut characters = inner.chars();

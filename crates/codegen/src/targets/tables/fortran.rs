@@ -3,7 +3,7 @@
 use crate::code::Code;
 use crate::listing::Item;
 use crate::table::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
-use crate::targets::fortran::string;
+use crate::text::fortran_string;
 
 const TABLE: &str = include_str!("table.f90");
 
@@ -60,7 +60,7 @@ fn of_series(code: &Code<'_>) -> Vec<(&'static str, &'static str, usize, usize)>
 /// The reader, and the fields of a series.
 pub(in crate::targets) fn procedures(code: &Code<'_>) -> String {
     let Some(table) = &code.table else { return String::new() };
-    let [missing, another, broken] = code.table_messages().map(|message| string(&message));
+    let [missing, another, broken] = code.table_messages().map(|message| fortran_string(&message));
     let d = code.spec.dimension;
     let mut text = TABLE
         .replace("DIMENSION", &d.to_string())
@@ -168,6 +168,6 @@ pub(in crate::targets) fn reading(code: &Code<'_>) -> String {
       error stop 2
     end if
 ",
-        string(&code.table_file())
+        fortran_string(&code.table_file())
     )
 }

@@ -3,16 +3,16 @@
 use crate::code::Code;
 use crate::listing::Item;
 use crate::table::{BODY_FORCE, FIRST_INTERNAL, Normal, OfTable, STRESS};
-use crate::targets::julia::string;
+use crate::text::julia_string;
 
 const TABLE: &str = include_str!("table.jl");
 
 /// The reader, and functions of series.
 pub(in crate::targets) fn reader(code: &Code<'_>) -> String {
     let Some(table) = &code.table else { return String::new() };
-    let [missing, another, broken] = code.table_messages().map(|message| string(&message));
+    let [missing, another, broken] = code.table_messages().map(|message| julia_string(&message));
     let d = code.spec.dimension;
-    let names: Vec<String> = table.variables.iter().map(|name| string(name)).collect();
+    let names: Vec<String> = table.variables.iter().map(|name| julia_string(name)).collect();
     let mut text = format!(
         "
 # The place of the table, which can be set: TABLE[] = \"...\".
@@ -24,8 +24,8 @@ const BROKEN = {broken}
 # The internal variables, in the order of internal(s, X, t).
 const INTERNAL = String[{}]
 ",
-        string(&code.table_file()),
-        string(&table.digest),
+        julia_string(&code.table_file()),
+        julia_string(&table.digest),
         names.join(", ")
     );
     text += TABLE;
