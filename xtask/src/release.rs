@@ -111,7 +111,7 @@ fn pack(out: &Path, name: &str, archive: &Path, time: &str) -> anyhow::Result<()
     Ok(())
 }
 
-/// What a command prints, which has to succeed.
+/// The output of a command, which has to succeed.
 fn answer(command: &mut Command) -> anyhow::Result<String> {
     let shown = command.get_program().display().to_string();
     let done = command.output().with_context(|| format!("cannot start {shown}"))?;
