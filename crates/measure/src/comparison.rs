@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use mmsmith_laws::BlockWithMemory;
-use mmsmith_laws::{Law, Stressed};
+use mmsmith_laws::{BlockWithMemory, Law, Stressed};
 use mmsmith_particles::Particles;
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use nalgebra::SVector;

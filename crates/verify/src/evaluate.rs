@@ -7,8 +7,8 @@ use crate::tangent::{TangentError, WrongLength, exact_tangent};
 use mmsmith_runtime::{AnySolution, Solution};
 use nalgebra::SVector;
 
-/// Why formulas have numbers where the law has no energy.
-const BEYOND_LAW: &str = "the deformation lies beyond the limit of the law, as where I1bar - 3 reaches Jm of Gent's, and numbers that \
+/// The cause where formulas have numbers and the law has no energy.
+pub const BEYOND_LAW: &str = "the deformation lies beyond the limit of the law, as where I1bar - 3 reaches Jm of Gent's, and numbers that \
      formulas of P and b have there mean nothing; smaller amplitudes keep away from it";
 
 /// [`evaluate`] with the tangent of the solver's law at the exact deformation.

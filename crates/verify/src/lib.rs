@@ -91,7 +91,7 @@ pub use coverage::{Part, Share, coverage, smallest_set};
 pub use discretized::{Discretized, run};
 pub use distortion::{Distortion, distortion};
 pub use error::{CaseError, SceneError, StudyError};
-pub use evaluate::{evaluate, evaluate_with_tangent};
+pub use evaluate::{BEYOND_LAW, evaluate, evaluate_with_tangent};
 pub use field_row::FieldRow;
 pub use flow::{flows_smoothly, has_flow, has_memory, history_of};
 pub use frames::{FrameOutput, Snapshot};

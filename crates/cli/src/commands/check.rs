@@ -7,7 +7,7 @@ use mmsmith_claims::{
 use mmsmith_expr::nearest_f64;
 use mmsmith_spec::{ClaimKind, Spec};
 use mmsmith_verify::{
-    BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, OnAxis, TOLERANCE, Verdict,
+    BEYOND_LAW, BLUNT, Change, CheckReport, OWN_ERROR_FACTOR, OnAxis, TOLERANCE, Verdict,
     check as check_fields, history_of,
 };
 use rayon::prelude::*;
@@ -372,8 +372,7 @@ fn places(report: &CheckReport, parameters: &[BTreeMap<String, f64>]) -> String 
                        ranges of the parameters keep away from it\n";
         }
         if finding.what == "W" && finding.difference.is_nan() {
-            places += "    the strain energy has no value here: the deformation lies beyond the limit of the law, as where I1bar - 3 reaches Jm of Gent's, \
-                       and numbers that formulas of P and b have there mean nothing; smaller amplitudes keep away from it\n";
+            places += &format!("    the strain energy has no value here: {BEYOND_LAW}\n");
         }
     }
     places
