@@ -53,7 +53,8 @@ fn finished(place: &Path) -> (usize, usize) {
     (ledger, shards)
 }
 
-/// The shards of `call` in an odd order, then its table, which must be that of one process and compute nothing.
+/// The shards of `call` in an odd order, each started twice, then its table, which must be that of one process; neither the second start nor
+/// the table computes anything.
 fn agrees(call: &str, count: usize, cases: usize) {
     let place = tempfile::tempdir().expect("a folder");
     let place = place.path();
@@ -68,6 +69,10 @@ fn agrees(call: &str, count: usize, cases: usize) {
         let words: Vec<&str> = said.split_whitespace().collect();
         own += words[3].parse::<usize>().expect("a number");
         assert_eq!(words[5].parse::<usize>().expect("a number"), cases);
+        let (known, again) =
+            (finished(place), mms(place, &format!("{call} --out study --shard {index}/{count}")));
+        assert_eq!((again.status, again.stdout), (0, said), "a finished shard says the same");
+        assert_eq!(finished(place), known, "a finished shard computes nothing");
     }
     assert_eq!((own, finished(place)), (cases, (0, cases)));
     let table = mms(place, &format!("{call} --out study --json table.json"));
