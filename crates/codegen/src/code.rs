@@ -115,8 +115,15 @@ impl<'a> Code<'a> {
         operations.any(|operation| match operation {
             Operation::Call(function, _) => such(*function),
             Operation::LnOfBoth(..) => such(Function::LnOfBoth),
+            Operation::Atan2(..) => such(Function::Atan2),
             _ => false,
         })
+    }
+
+    /// Whether an operation is a power with an exponent that neither products nor roots form.
+    pub(crate) fn has_powers(&self) -> bool {
+        let mut operations = self.staged.program().operations().iter();
+        operations.any(|operation| matches!(operation, Operation::Power(..)))
     }
 
     /// The displacement and the law, a line each.

@@ -445,7 +445,7 @@ fn factor(rest: &mut Peekable<Chars<'_>>) -> Term {
     if let Some((_, primitive)) = Primitive::NAMED.iter().find(|(name, _)| *name == word) {
         return Term::Primitive(*primitive, parts);
     }
-    match ["sqrt", "exp", "log", "log1p"].into_iter().find(|name| *name == word) {
+    match ["sqrt", "sin", "cos", "exp", "log", "log1p"].into_iter().find(|name| *name == word) {
         Some(name) => Term::Library(name, parts),
         None => Term::Support(String::leak(word), parts),
     }
@@ -485,6 +485,8 @@ mod tests {
             (Term::Quotient(_), [a, b]) => a / b,
             (Term::Support(name, _), parts) => value(name, parts),
             (Term::Library("sqrt", _), [a]) => a.sqrt(),
+            (Term::Library("sin", _), [a]) => a.sin(),
+            (Term::Library("cos", _), [a]) => a.cos(),
             (Term::Library("exp", _), [a]) => a.exp(),
             (Term::Library("log", _), [a]) => a.ln(),
             (Term::Library("log1p", _), [a]) => a.ln_1p(),
@@ -515,7 +517,11 @@ mod tests {
             .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
             .collect();
         type Case = (&'static str, fn(f64) -> f64, bool);
-        let cases: [Case; 13] = [
+        let cases: [Case; 17] = [
+            ("sine", S::sine, true),
+            ("cosine", S::cosine, true),
+            ("exponential", S::exponential, true),
+            ("logarithm", S::logarithm, false),
             ("sin_pi", S::sin_pi, true),
             ("cos_pi", S::cos_pi, true),
             ("log_1p", S::log_1p, false),

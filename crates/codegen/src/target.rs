@@ -128,12 +128,33 @@ impl Called {
         }
     }
 
+    /// The host's own sine, cosine, exponential and logarithm in place of the project's: for hosts that do not promise the bits of Rust, and
+    /// whose functions are faster or have derivatives.
+    pub(crate) fn or_library(self) -> Self {
+        match self {
+            Called::Support("sine") => Called::Library("sin"),
+            Called::Support("cosine") => Called::Library("cos"),
+            Called::Support("exponential") => Called::Library("exp"),
+            Called::Support("logarithm") => Called::Library("log"),
+            other => other,
+        }
+    }
+
     /// Whether it has two arguments.
     pub(crate) fn takes_two(self) -> bool {
         matches!(
             self,
             Called::Library("atan2" | "pow")
-                | Called::Support("ln_of_both" | "sum_error" | "product_error" | "far_logarithm")
+                | Called::Support(
+                    "ln_of_both"
+                        | "sum_error"
+                        | "product_error"
+                        | "far_logarithm"
+                        | "angle_rest"
+                        | "angle_tail"
+                        | "rest_sine"
+                        | "rest_cosine"
+                )
         )
     }
 }

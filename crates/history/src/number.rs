@@ -3,6 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use mmsmith_expr::{Function, Scalar};
+use mmsmith_scalar_functions::ScalarFunctions;
 
 /// A number with the operations that rates and stresses of laws need.
 pub trait Number:
@@ -51,17 +52,17 @@ impl Number for f64 {
 
     #[inline]
     fn ln(self) -> Self {
-        self.ln()
+        self.logarithm()
     }
 
     #[inline]
     fn exp(self) -> Self {
-        self.exp()
+        self.exponential()
     }
 
     #[inline]
     fn powf(self, exponent: f64) -> Self {
-        self.powf(exponent)
+        self.power(exponent)
     }
 
     #[inline]

@@ -5,7 +5,7 @@ use mmsmith_history::{
     AnyLaw, AtPoint, AtTime, Dual, ENTRIES, HistoryError, Kinematics, LawWithHistory, Motion,
     Number, Table, Tensor, Trajectory, UnsupportedLaw, divergence, kinds_of, place,
 };
-use mmsmith_runtime::{Around, Domain, HistoryReport, Law, Real, Smoothness};
+use mmsmith_runtime::{Around, Domain, HistoryReport, Law, Real, ScalarFunctions, Smoothness};
 use mmsmith_stage::History;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -100,14 +100,14 @@ impl<const D: usize> Chart<D> {
         match self {
             Self::Box { .. } => q,
             Self::Tube { .. } => {
-                std::array::from_fn(|i| [q[0] * q[1].cos(), q[0] * q[1].sin(), q[2]][i])
+                std::array::from_fn(|i| [q[0] * q[1].cosine(), q[0] * q[1].sine(), q[2]][i])
             }
             Self::Annulus { .. } => match D {
                 1 => q,
-                2 => std::array::from_fn(|i| q[0] * [q[1].cos(), q[1].sin()][i]),
+                2 => std::array::from_fn(|i| q[0] * [q[1].cosine(), q[1].sine()][i]),
                 _ => std::array::from_fn(|i| {
-                    let (sine, cosine) = q[1].sin_cos();
-                    q[0] * [sine * q[2].cos(), sine * q[2].sin(), cosine][i]
+                    let (sine, cosine) = (q[1].sine(), q[1].cosine());
+                    q[0] * [sine * q[2].cosine(), sine * q[2].sine(), cosine][i]
                 }),
             },
         }
@@ -115,8 +115,9 @@ impl<const D: usize> Chart<D> {
 
     /// The coordinates of a place.
     fn coordinates(&self, X: &[f64; D]) -> [f64; D] {
-        let norm = |of: &[f64]| of.iter().fold(0.0, |norm: f64, x| norm.hypot(*x));
-        let angle = || X[1].atan2(X[0]);
+        let norm =
+            |of: &[f64]| of.iter().fold(0.0, |norm: f64, x| mmsmith_runtime::libm::hypot(norm, *x));
+        let angle = || X[1].polar_angle(X[0]);
         match self {
             Self::Box { .. } => *X,
             Self::Tube { angles: [first, last], .. } => {
@@ -130,7 +131,7 @@ impl<const D: usize> Chart<D> {
                     1 => *X,
                     2 => std::array::from_fn(|i| [norm(X), around][i]),
                     _ => {
-                        let down = norm(&X[..2]).atan2(X[2]);
+                        let down = norm(&X[..2]).polar_angle(X[2]);
                         std::array::from_fn(|i| [norm(X), down, around][i])
                     }
                 }

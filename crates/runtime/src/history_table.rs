@@ -1,6 +1,7 @@
 //! Fields that follow from the history of each particle, from the tables that `mms gen` writes beside a source.
 
 use crate::{BodyForceAtPoints, Real};
+use mmsmith_scalar_functions::ScalarFunctions;
 use nalgebra::{SMatrix, SVector};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -284,13 +285,13 @@ impl<const D: usize> HistoryTable<D> {
     fn along(&self, X: &[f64; D]) -> Vec<f64> {
         let mut q = *X;
         if self.chart == Chart::Tube {
-            [q[0], q[1 % D]] = [X[0].hypot(X[1 % D]), X[1 % D].atan2(X[0])];
+            [q[0], q[1 % D]] = [libm::hypot(X[0], X[1 % D]), X[1 % D].polar_angle(X[0])];
         }
         if self.chart == Chart::Annulus && D > 1 {
-            let angle = X[1].atan2(X[0]).rem_euclid(std::f64::consts::TAU);
-            let from_axis = X[0].hypot(X[1]);
-            q[0] = if D == 2 { from_axis } else { from_axis.hypot(X[D - 1]) };
-            q[1] = from_axis.atan2(X[D - 1]);
+            let angle = X[1].polar_angle(X[0]).rem_euclid(std::f64::consts::TAU);
+            let from_axis = libm::hypot(X[0], X[1]);
+            q[0] = if D == 2 { from_axis } else { libm::hypot(from_axis, X[D - 1]) };
+            q[1] = from_axis.polar_angle(X[D - 1]);
             q[D - 1] = angle;
         }
         let mut products = vec![1.0];

@@ -4,6 +4,7 @@
 //! Generated code calls them, and so does the evaluation of programs without it: both give the same bits.
 
 mod cosh_sqrt;
+mod elementary;
 mod log_ratio;
 pub mod logarithm;
 
@@ -21,6 +22,32 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
     /// `cos(pi x)`, as [`sin_pi`](Self::sin_pi).
     #[must_use]
     fn cos_pi(self) -> Self;
+
+    /// `sin(x)` of an angle in radians, within one unit in the last place.
+    ///
+    /// Unlike `sin` it is no call into the system's library, and all systems give the same bits.
+    #[must_use]
+    fn sine(self) -> Self;
+
+    /// `cos(x)`, as [`sine`](Self::sine).
+    #[must_use]
+    fn cosine(self) -> Self;
+
+    /// `exp(x)`, within one unit in the last place, and without a call, as [`sine`](Self::sine).
+    #[must_use]
+    fn exponential(self) -> Self;
+
+    /// `ln(x)`, within one unit in the last place, and without a call, as [`log_1p`](Self::log_1p).
+    #[must_use]
+    fn logarithm(self) -> Self;
+
+    /// `x^exponent`, by the crate `libm`, so that all systems give the same bits.
+    #[must_use]
+    fn power(self, exponent: Self) -> Self;
+
+    /// The polar angle of the point `(x, self)`, which `atan2` is elsewhere, by the crate `libm`.
+    #[must_use]
+    fn polar_angle(self, x: Self) -> Self;
 
     /// `ln(1 + x)`, within one unit in the last place.
     ///
@@ -114,6 +141,36 @@ impl ScalarFunctions for f64 {
         sin_pi_shifted(self, 1)
     }
 
+    #[inline]
+    fn sine(self) -> Self {
+        elementary::sine(self)
+    }
+
+    #[inline]
+    fn cosine(self) -> Self {
+        elementary::cosine(self)
+    }
+
+    #[inline]
+    fn exponential(self) -> Self {
+        elementary::exponential(self)
+    }
+
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        logarithm::ln(self)
+    }
+
+    #[inline]
+    fn power(self, exponent: Self) -> Self {
+        libm::pow(self, exponent)
+    }
+
+    #[inline]
+    fn polar_angle(self, x: Self) -> Self {
+        libm::atan2(self, x)
+    }
+
     #[inline(always)]
     fn log_1p(self) -> Self {
         logarithm::ln_1p(self)
@@ -194,6 +251,36 @@ impl ScalarFunctions for f32 {
     #[inline]
     fn cos_pi(self) -> Self {
         sin_pi_shifted(f64::from(self), 1) as f32
+    }
+
+    #[inline]
+    fn sine(self) -> Self {
+        f64::from(self).sine() as f32
+    }
+
+    #[inline]
+    fn cosine(self) -> Self {
+        f64::from(self).cosine() as f32
+    }
+
+    #[inline]
+    fn exponential(self) -> Self {
+        f64::from(self).exponential() as f32
+    }
+
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        f64::from(self).logarithm() as f32
+    }
+
+    #[inline]
+    fn power(self, exponent: Self) -> Self {
+        libm::powf(self, exponent)
+    }
+
+    #[inline]
+    fn polar_angle(self, x: Self) -> Self {
+        libm::atan2f(self, x)
     }
 
     #[inline(always)]

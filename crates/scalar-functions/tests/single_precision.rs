@@ -133,6 +133,18 @@ fn sines_of_multiples_of_pi_are_the_nearest_numbers() {
     }));
 }
 
+#[test]
+#[ignore = "a minute and more in release mode"]
+fn sines_and_exponentials_are_the_nearest_numbers() {
+    assert_none(&at_every_number(|x, found| {
+        let wide = f64::from(x);
+        found("sine", x.sine(), wide.sin(), ROUNDED);
+        found("cosine", x.cosine(), wide.cos(), ROUNDED);
+        found("exponential", x.exponential(), f64::from(wide.exp() as f32), 1e-6);
+        found("logarithm", x.logarithm(), wide.ln(), ROUNDED);
+    }));
+}
+
 /// Numbers from zero on: others are no `z = (a - b)^2/(2 a b)`.
 #[test]
 #[ignore = "a minute and more in release mode"]

@@ -87,7 +87,11 @@ impl Target for Translator<'_> {
 
     fn function(&self, function: Called) -> Cow<'static, str> {
         let (Called::Library(name) | Called::Support(name)) = function;
-        let name = if function == Called::Library("pow") { "powf" } else { name };
+        let name = match function {
+            Called::Library("pow") => "power",
+            Called::Library("atan2") => "polar_angle",
+            _ => name,
+        };
         let other = if function.takes_two() { "#" } else { "" };
         format!("#.{name}({other})").into()
     }

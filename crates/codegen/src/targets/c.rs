@@ -9,7 +9,7 @@ use crate::runtime::{Line, Primitive, Routine, WithRuntime};
 use crate::table::OfTable;
 use crate::target::{Called, Target, Written};
 use crate::text::{c_number, c_string, filled, push_index};
-use mmsmith_expr::{Function, RustCall};
+use mmsmith_expr::Function;
 use mmsmith_stage::{Block, Operand, Shape, Stage};
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ message = NAME_prepare(&s, &p); is a null pointer, or says what is wrong with th
 NAME_u, _v, _a, _H, _F, _J, _P, _b compute one field, NAME_fields all of them; the traction on a surface, at points X of it, has a function of its own.
 The body force at points that stay: NAME_point_array once a run, NAME_b_array once a step, or for single points NAME_at_point once a run, \
 NAME_at_time once a step, NAME_b_staged. All ways give the same bits.
-Results equal those of the Rust functions bit for bit where the compiler keeps every rounding: -ffp-contract=off where the processor fuses \
+Results equal those of the Rust functions bit for bit, but for functions that are named below, where the compiler keeps every rounding: -ffp-contract=off where the processor fuses \
 products and sums (nvcc: -fmad=false), and no -ffast-math. A graphics processor has last bits of its own in functions of <math.h>.";
 
 const REFUSAL: Refusal = Refusal {
@@ -130,10 +130,10 @@ impl Code<'_> {
 
     fn c_head(&self, name: &str) -> String {
         let mut lines = self.head_for_host(&REMARKS.replace("NAME", name));
-        let foreign = Function::ALL.iter().filter(|function| {
-            matches!(function.rust(), RustCall::Library(_)) && self.calls(|f| f == **function)
-        });
-        lines.extend(foreign.filter_map(|function| function.math_h()).map(|name| {
+        let called =
+            |function: &&Function| function.own().is_none() && self.calls(|f| f == **function);
+        let foreign = Function::ALL.iter().filter(called).filter_map(|function| function.math_h());
+        lines.extend(foreign.chain(self.has_powers().then_some("pow")).map(|name| {
             format!("Of {name} the Rust functions have the last bits of another library.")
         }));
         commented(&lines, " *", 115)

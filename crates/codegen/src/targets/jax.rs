@@ -53,7 +53,7 @@ def _matrix(x, t, rows):
 };
 
 fn function(called: Called) -> Cow<'static, str> {
-    let name = match called {
+    let name = match called.or_library() {
         // The reduction by powers of two has no derivative in JAX; its own logarithm has.
         Called::Support("far_logarithm") => return "jnp.log(#)".into(),
         Called::Support(name) => return own_call(called, name),

@@ -37,7 +37,7 @@ impl Target for Julia {
     }
 
     fn function(&self, function: Called) -> Cow<'static, str> {
-        match function {
+        match function.or_library() {
             // Julia's logarithm throws for negative numbers, where other languages return NaN.
             Called::Support("far_logarithm") | Called::Library("log") => "mmsmith_log(#)".into(),
             Called::Library("pow") => "#^#".into(),

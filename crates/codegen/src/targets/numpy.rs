@@ -56,7 +56,7 @@ def _matrix(x, t, rows):
 };
 
 fn function(called: Called) -> Cow<'static, str> {
-    let name = match called {
+    let name = match called.or_library() {
         Called::Support(name) => return own_call(called, name),
         Called::Library("pow") => return "np.power(#, #)".into(),
         Called::Library("atan2") => return "np.arctan2(#, #)".into(),

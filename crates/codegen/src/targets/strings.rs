@@ -244,7 +244,7 @@ impl Strings {
                 format!("(2.0*sinh(0.5*{0})*exp(0.5*{0}))", one())
             }
             Operation::Call(function, _) => {
-                self.call(code, Called::of(*function), *function, operands)?
+                self.call(code, Called::of(*function).or_library(), *function, operands)?
             }
             other_operation => {
                 let mut operands = [one(), other()].into_iter();

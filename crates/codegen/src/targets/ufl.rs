@@ -47,7 +47,7 @@ def _matrix(x, t, rows):
 };
 
 fn function(called: Called) -> Cow<'static, str> {
-    let name = match called {
+    let name = match called.or_library() {
         Called::Support("sin_pi") => return "ufl.sin(ufl.pi * (#))".into(),
         Called::Support("cos_pi") => return "ufl.cos(ufl.pi * (#))".into(),
         Called::Support("far_logarithm") => return "ufl.ln(#)".into(),

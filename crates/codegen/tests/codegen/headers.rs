@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use mmsmith_codegen::Code;
-use mmsmith_expr::{Function, RustCall};
+use mmsmith_expr::Function;
 use mmsmith_spec::Spec;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -112,7 +112,7 @@ fn functions_of_another_library_are_named() {
         };
         assert!(header.contains(&format!("{called}(X[0])")), "{}", function.name());
         let note = format!("Of {called} the Rust functions");
-        let foreign = matches!(function.rust(), RustCall::Library(_));
+        let foreign = function.own().is_none();
         assert_eq!(header.contains(&note), foreign, "{}", function.name());
     }
 }

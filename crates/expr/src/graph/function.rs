@@ -96,11 +96,12 @@ functions! {
         difference: "2*cos(a + b/2)*sin(b/2)",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::sin,
-        single: f32::sin,
+        double: ScalarFunctions::sine,
+        single: ScalarFunctions::sine,
         steepness: Some(|_| 1.0),
-        rust: RustCall::Method("sin"),
+        rust: RustCall::Method("sine"),
         math_h: Some("sin"),
+        own: Some("sine"),
     }
     /// Cosine.
     Cos {
@@ -109,11 +110,12 @@ functions! {
         difference: "-2*sin(a + b/2)*sin(b/2)",
         parity: Parity::Even,
         at_zero: "1",
-        double: f64::cos,
-        single: f32::cos,
+        double: ScalarFunctions::cosine,
+        single: ScalarFunctions::cosine,
         steepness: Some(|_| 1.0),
-        rust: RustCall::Method("cos"),
+        rust: RustCall::Method("cosine"),
         math_h: Some("cos"),
+        own: Some("cosine"),
     }
     /// Tangent.
     Tan {
@@ -121,9 +123,9 @@ functions! {
         differential: "(1 + tan(x)^2)*dx",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::tan,
-        single: f32::tan,
-        rust: RustCall::Method("tan"),
+        double: libm::tan,
+        single: libm::tanf,
+        rust: RustCall::Library("tan"),
         math_h: Some("tan"),
     }
     /// Inverse sine.
@@ -133,18 +135,18 @@ functions! {
         differential: "(1 - x)^(-1/2)*(1 + x)^(-1/2)*dx",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::asin,
-        single: f32::asin,
-        rust: RustCall::Method("asin"),
+        double: libm::asin,
+        single: libm::asinf,
+        rust: RustCall::Library("asin"),
         math_h: Some("asin"),
     }
     /// Inverse cosine.
     Acos {
         names: &["arccos", "acos"],
         differential: "-(1 - x)^(-1/2)*(1 + x)^(-1/2)*dx",
-        double: f64::acos,
-        single: f32::acos,
-        rust: RustCall::Method("acos"),
+        double: libm::acos,
+        single: libm::acosf,
+        rust: RustCall::Library("acos"),
         math_h: Some("acos"),
     }
     /// Inverse tangent.
@@ -153,9 +155,9 @@ functions! {
         differential: "dx/(1 + x^2)",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::atan,
-        single: f32::atan,
-        rust: RustCall::Method("atan"),
+        double: libm::atan,
+        single: libm::atanf,
+        rust: RustCall::Library("atan"),
         math_h: Some("atan"),
     }
     /// Hyperbolic sine.
@@ -165,9 +167,9 @@ functions! {
         difference: "2*cosh(a + b/2)*sinh(b/2)",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::sinh,
-        single: f32::sinh,
-        rust: RustCall::Method("sinh"),
+        double: libm::sinh,
+        single: libm::sinhf,
+        rust: RustCall::Library("sinh"),
         math_h: Some("sinh"),
     }
     /// Hyperbolic cosine.
@@ -177,9 +179,9 @@ functions! {
         difference: "2*sinh(a + b/2)*sinh(b/2)",
         parity: Parity::Even,
         at_zero: "1",
-        double: f64::cosh,
-        single: f32::cosh,
-        rust: RustCall::Method("cosh"),
+        double: libm::cosh,
+        single: libm::coshf,
+        rust: RustCall::Library("cosh"),
         math_h: Some("cosh"),
     }
     /// Hyperbolic tangent.
@@ -189,9 +191,9 @@ functions! {
         differential: "cosh(x)^(-2)*dx",
         parity: Parity::Odd,
         at_zero: "0",
-        double: f64::tanh,
-        single: f32::tanh,
-        rust: RustCall::Method("tanh"),
+        double: libm::tanh,
+        single: libm::tanhf,
+        rust: RustCall::Library("tanh"),
         math_h: Some("tanh"),
     }
     /// Exponential.
@@ -200,22 +202,24 @@ functions! {
         differential: "exp(x)*dx",
         difference: "exp(a)*expm1(b)",
         at_zero: "1",
-        double: f64::exp,
-        single: f32::exp,
+        double: ScalarFunctions::exponential,
+        single: ScalarFunctions::exponential,
         steepness: Some(f64::exp),
-        rust: RustCall::Method("exp"),
+        rust: RustCall::Method("exponential"),
         math_h: Some("exp"),
+        own: Some("exponential"),
     }
     /// Natural logarithm.
     Ln {
         names: &["ln", "log"],
         differential: "dx/x",
         difference: "log1p(b/a)",
-        double: f64::ln,
-        single: f32::ln,
+        double: ScalarFunctions::logarithm,
+        single: ScalarFunctions::logarithm,
         steepness: Some(|x| 1.0 / x.abs()),
-        rust: RustCall::Method("ln"),
+        rust: RustCall::Method("logarithm"),
         math_h: Some("log"),
+        own: Some("logarithm"),
     }
     /// `ln(1 + x)`, accurate for small `x`.
     Ln1p {
@@ -261,9 +265,9 @@ functions! {
         differential: "exp(x)*dx",
         difference: "exp(a)*expm1(b)",
         at_zero: "0",
-        double: f64::exp_m1,
-        single: f32::exp_m1,
-        rust: RustCall::Method("exp_m1"),
+        double: libm::expm1,
+        single: libm::expm1f,
+        rust: RustCall::Library("expm1"),
         math_h: Some("expm1"),
     }
     /// Error function: `2/sqrt(Pi)` times the integral of `exp(-s^2)` from zero to `x`.
@@ -282,7 +286,7 @@ functions! {
         names: &["atan2"],
         arguments: &["y", "x"],
         differential: "(x*dy - y*dx)/(x^2 + y^2)",
-        rust: RustCall::Method("atan2"),
+        rust: RustCall::Method("polar_angle"),
         math_h: Some("atan2"),
     }
     /// `arcosh(1 + z)^2`: the squared logarithm of `a/b` for `z = (a - b)^2/(2 a b)`, smooth at zero.

@@ -108,12 +108,12 @@ impl Operation {
             Operation::Sqrt(a) => of(a).map(T::sqrt),
             Operation::Power(a, ref exponent) => {
                 let exponent = T::rounded(nearest_f64(exponent));
-                of(a).map(|a| a.powf(exponent))
+                of(a).map(|a| a.power(exponent))
             }
             Operation::SinPi(a) => of(a).map(T::sin_pi),
             Operation::CosPi(a) => of(a).map(T::cos_pi),
             Operation::Call(function, a) => of(a).map(|a| T::call(function, a)),
-            Operation::Atan2(y, x) => each(y, x, T::atan2),
+            Operation::Atan2(y, x) => each(y, x, T::polar_angle),
             Operation::LnOfBoth(x, y) => each(x, y, T::ln_of_both),
             Operation::SumError(a, b) => each(a, b, T::sum_error),
             Operation::ProductError(a, b) => each(a, b, T::product_error),

@@ -2,6 +2,7 @@
 
 use super::{Dependence, Operation, OperationCount, Program, Slot};
 use crate::{Ast, Function, Graph, RangeOfInputs, Rational};
+use mmsmith_scalar_functions::ScalarFunctions;
 
 /// Each operation on the two inputs, what it is, and what it counts as: sums, products, quotients, roots and calls.
 type Case = (Operation, Value, [usize; 5]);
@@ -21,26 +22,26 @@ fn cases() -> Vec<Case> {
         (Operation::Div(x, y), |x, y| x / y, [0, 0, 1, 0, 0]),
         (Operation::Neg(y), |_, y| -y, [1, 0, 0, 0, 0]),
         (Operation::Sqrt(x), |x, _| x.sqrt(), [0, 0, 0, 1, 0]),
-        (Operation::Power(x, third), |x, _| x.powf(1.0 / 3.0), [0, 0, 0, 0, 1]),
-        (Operation::Atan2(x, y), |x, y| x.atan2(y), [0, 0, 0, 0, 1]),
+        (Operation::Power(x, third), |x, _| x.power(1.0 / 3.0), [0, 0, 0, 0, 1]),
+        (Operation::Atan2(x, y), |x, y| x.polar_angle(y), [0, 0, 0, 0, 1]),
         // What one operation takes, and what is left of it (T. J. Dekker, 1971).
         (Operation::SumError(x, y), |x, y| two_sum(x, y), [5, 0, 0, 0, 0]),
         (Operation::ProductError(x, y), |x, y| x.mul_add(y, -(x * y)), [7, 5, 0, 0, 0]),
     ];
     let functions: [(Function, Value); 13] = [
-        (Function::Sin, |x, _| x.sin()),
-        (Function::Cos, |x, _| x.cos()),
-        (Function::Tan, |x, _| x.tan()),
-        (Function::Asin, |x, _| x.asin()),
-        (Function::Acos, |x, _| x.acos()),
-        (Function::Atan, |x, _| x.atan()),
-        (Function::Sinh, |x, _| x.sinh()),
-        (Function::Cosh, |x, _| x.cosh()),
-        (Function::Tanh, |x, _| x.tanh()),
-        (Function::Exp, |x, _| x.exp()),
-        (Function::Ln, |x, _| x.ln()),
-        (Function::Ln1p, |x, _| x.ln_1p()),
-        (Function::Expm1, |x, _| x.exp_m1()),
+        (Function::Sin, |x, _| x.sine()),
+        (Function::Cos, |x, _| x.cosine()),
+        (Function::Tan, |x, _| libm::tan(x)),
+        (Function::Asin, |x, _| libm::asin(x)),
+        (Function::Acos, |x, _| libm::acos(x)),
+        (Function::Atan, |x, _| libm::atan(x)),
+        (Function::Sinh, |x, _| libm::sinh(x)),
+        (Function::Cosh, |x, _| libm::cosh(x)),
+        (Function::Tanh, |x, _| libm::tanh(x)),
+        (Function::Exp, |x, _| x.exponential()),
+        (Function::Ln, |x, _| x.logarithm()),
+        (Function::Ln1p, |x, _| x.log_1p()),
+        (Function::Expm1, |x, _| libm::expm1(x)),
     ];
     let call = |(function, value)| (Operation::Call(function, x), value, [0, 0, 0, 0, 1]);
     cases.extend(functions.map(call));

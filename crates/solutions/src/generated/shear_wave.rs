@@ -201,7 +201,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
         let t5 = self.fixed[0] * X[1];
         let t6 = t5.sin_pi();
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t24 = self.parameters.A * t23;
         let t25 = t24 * t6;
         crate::nalgebra::SVector::<T, 2>::new(t25, T::zero())
@@ -215,7 +215,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
         let t5 = self.fixed[0] * X[1];
         let t6 = t5.sin_pi();
         let t22 = self.fixed[1] * t;
-        let t27 = t22.cos();
+        let t27 = t22.cosine();
         let t29 = self.fixed[2] * t27;
         let t30 = t29 * t6;
         crate::nalgebra::SVector::<T, 2>::new(t30, T::zero())
@@ -229,7 +229,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
         let t5 = self.fixed[0] * X[1];
         let t6 = t5.sin_pi();
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t35 = self.fixed[3] * t23;
         let t36 = t35 * t6;
         let t37 = -t36;
@@ -243,7 +243,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t5 = self.fixed[0] * X[1];
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t38 = t5.cos_pi();
         let t41 = self.fixed[4] * t23;
         let t42 = t41 * t38;
@@ -257,7 +257,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t5 = self.fixed[0] * X[1];
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t38 = t5.cos_pi();
         let t41 = self.fixed[4] * t23;
         let t42 = t41 * t38;
@@ -275,7 +275,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t5 = self.fixed[0] * X[1];
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t38 = t5.cos_pi();
         let t41 = self.fixed[4] * t23;
         let t42 = t41 * t38;
@@ -294,10 +294,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
         let t5 = self.fixed[0] * X[1];
         let t6 = t5.sin_pi();
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t24 = self.parameters.A * t23;
         let t25 = t24 * t6;
-        let t27 = t22.cos();
+        let t27 = t22.cosine();
         let t29 = self.fixed[2] * t27;
         let t30 = t29 * t6;
         let t35 = self.fixed[3] * t23;
@@ -336,7 +336,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
             crate::Surface::Lower(0) => {
                 let t5 = self.fixed[0] * X[1];
                 let t22 = self.fixed[1] * t;
-                let t23 = t22.sin();
+                let t23 = t22.sine();
                 let t38 = t5.cos_pi();
                 let t41 = self.fixed[4] * t23;
                 let t42 = t41 * t38;
@@ -347,7 +347,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
             crate::Surface::Upper(0) => {
                 let t5 = self.fixed[0] * X[1];
                 let t22 = self.fixed[1] * t;
-                let t23 = t22.sin();
+                let t23 = t22.sine();
                 let t38 = t5.cos_pi();
                 let t41 = self.fixed[4] * t23;
                 let t42 = t41 * t38;
@@ -356,7 +356,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
             }
             crate::Surface::Lower(1) => {
                 let t22 = self.fixed[1] * t;
-                let t23 = t22.sin();
+                let t23 = t22.sine();
                 let t41 = self.fixed[4] * t23;
                 let t57 = self.fixed[5] * t41;
                 let t58 = -t57;
@@ -364,7 +364,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for ShearWave<T> {
             }
             crate::Surface::Upper(1) => {
                 let t22 = self.fixed[1] * t;
-                let t23 = t22.sin();
+                let t23 = t22.sine();
                 let t41 = self.fixed[4] * t23;
                 let t57 = self.fixed[5] * t41;
                 Some(crate::nalgebra::SVector::<T, 2>::new(t57, T::zero()))
@@ -454,7 +454,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 2> for ShearWave<T> {
     #[inline]
     fn state_time(&self, t: T) -> [T; 2] {
         let t22 = self.fixed[1] * t;
-        let t23 = t22.sin();
+        let t23 = t22.sine();
         let t24 = self.parameters.A * t23;
         let t41 = self.fixed[4] * t23;
         [t24, t41]
@@ -462,7 +462,7 @@ impl<T: crate::Real> crate::StateStages<T, 2, 2, 1, 2> for ShearWave<T> {
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 1] {
         let t22 = self.fixed[1] * t;
-        let t27 = t22.cos();
+        let t27 = t22.cosine();
         let t29 = self.fixed[2] * t27;
         [t29]
     }

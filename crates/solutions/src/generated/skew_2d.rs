@@ -142,9 +142,9 @@ impl<T: crate::Real> Skew2d<T> {
         let t196 = T::one() / parameters.rho0;
         let t210 = T::nearest(2.0) / t11;
         let t215 = t33 * T::pi();
-        let t250 = T::nearest(2.0).cos();
+        let t250 = T::nearest(2.0).cosine();
         let t252 = T::pi() * t250;
-        let t257 = T::nearest(2.0).sin();
+        let t257 = T::nearest(2.0).sine();
         let t258 = T::nearest(4.0) * t257;
         let t287 = parameters.A * t93;
         let t339 = t287 * t196;
@@ -219,13 +219,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> crate::nalgebra::SVector<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t15 = t14 * t6;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -249,11 +249,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> crate::nalgebra::SVector<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -280,11 +280,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> crate::nalgebra::SVector<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -316,7 +316,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t24 = X[1] * X[1];
@@ -325,11 +325,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t30 = T::nearest(4.0) * t27;
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -355,7 +355,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t24 = X[1] * X[1];
@@ -364,11 +364,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t30 = T::nearest(4.0) * t27;
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -394,7 +394,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t24 = X[1] * X[1];
@@ -403,11 +403,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t30 = T::nearest(4.0) * t27;
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -438,7 +438,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t24 = X[1] * X[1];
@@ -447,11 +447,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t30 = T::nearest(4.0) * t27;
         let t31 = t28 + t30;
         let t34 = self.fixed[1] * t31;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -515,13 +515,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     ) -> crate::nalgebra::SVector<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t15 = t14 * t6;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -538,11 +538,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t54 = t53 * t6;
         let t59 = self.fixed[6] * t31;
         let t60 = t59 * t26;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -631,13 +631,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t12 = self.fixed[0] * t;
         let t13 = t12.cos_pi();
         let t14 = self.parameters.A * t13;
         let t15 = t14 * t6;
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -665,11 +665,11 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
         let t59 = self.fixed[6] * t31;
         let t60 = t59 * t26;
         let t61 = -t60;
-        let t62 = t5.cos();
+        let t62 = t5.cosine();
         let t64 = self.fixed[7] * t13;
         let t65 = t64 * t62;
         let t66 = t14 * t62;
-        let t67 = t17.sin();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -821,7 +821,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t64 = self.fixed[7] * t13;
                 let t72 = t20.cos_pi();
                 let t124 = self.fixed[10] * t13;
-                let t212 = X[1].cos();
+                let t212 = X[1].cosine();
                 let t213 = t64 * t212;
                 let t214 = t213 + T::one();
                 let t216 = self.fixed[18] * t31;
@@ -872,7 +872,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t72 = t20.cos_pi();
                 let t124 = self.fixed[10] * t13;
                 let t246 = X[1] + T::nearest(3.0);
-                let t247 = t246.cos();
+                let t247 = t246.cosine();
                 let t248 = t64 * t247;
                 let t249 = t248 + T::one();
                 let t251 = T::nearest(2.0) * X[1];
@@ -914,14 +914,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t12 = self.fixed[0] * t;
                 let t13 = t12.cos_pi();
                 let t17 = T::nearest(2.0) * X[0];
-                let t18 = t17.cos();
+                let t18 = t17.cosine();
                 let t27 = t12.sin_pi();
                 let t28 = T::nearest(3.0) * t13;
                 let t30 = T::nearest(4.0) * t27;
                 let t31 = t28 + t30;
                 let t64 = self.fixed[7] * t13;
                 let t216 = self.fixed[18] * t31;
-                let t286 = t4.cos();
+                let t286 = t4.cosine();
                 let t288 = self.fixed[21] * t13;
                 let t289 = t288 * t286;
                 let t290 = -t289;
@@ -953,10 +953,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2d<T> {
                 let t31 = t28 + t30;
                 let t34 = self.fixed[1] * t31;
                 let t64 = self.fixed[7] * t13;
-                let t67 = t17.sin();
+                let t67 = t17.sine();
                 let t155 = self.fixed[13] * t31;
                 let t305 = t4 + T::one();
-                let t306 = t305.cos();
+                let t306 = t305.cosine();
                 let t307 = T::nearest(4.0) * t67;
                 let t308 = T::one() - t307;
                 let t309 = t34 * t308;
@@ -1080,9 +1080,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 8> for Skew2d<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 8] {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -1090,8 +1090,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 9, 8> for Skew2d<T> {
         let t24 = X[1] * X[1];
         let t25 = X[0] * t24;
         let t26 = t23 + t25;
-        let t62 = t5.cos();
-        let t67 = t17.sin();
+        let t62 = t5.cosine();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;
@@ -1209,9 +1209,9 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 5] {
         let t4 = T::nearest(3.0) * X[0];
         let t5 = t4 + X[1];
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t17 = T::nearest(2.0) * X[0];
-        let t18 = t17.cos();
+        let t18 = t17.cosine();
         let t20 = T::nearest(0.5) * X[1];
         let t21 = t20.sin_pi();
         let t22 = t18 * t21;
@@ -1219,8 +1219,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 5> for Skew2d<T> {
         let t24 = X[1] * X[1];
         let t25 = X[0] * t24;
         let t26 = t23 + t25;
-        let t62 = t5.cos();
-        let t67 = t17.sin();
+        let t62 = t5.cosine();
+        let t67 = t17.sine();
         let t68 = t21 * t67;
         let t69 = T::nearest(4.0) * t68;
         let t70 = t24 - t69;

@@ -162,9 +162,9 @@ impl<T: crate::Real> Skew2dRotating<T> {
         let t314 = t313 / parameters.rho0;
         let t340 = T::nearest(2.0) / t18;
         let t345 = t180 * T::pi();
-        let t386 = T::nearest(2.0).cos();
+        let t386 = T::nearest(2.0).cosine();
         let t388 = T::pi() * t386;
-        let t393 = T::nearest(2.0).sin();
+        let t393 = T::nearest(2.0).sine();
         let t394 = T::nearest(4.0) * t393;
         let t442 = parameters.A * t192;
         let t493 = parameters.Omega * parameters.A;
@@ -256,17 +256,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
         let t5 = self.fixed[0] * t;
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -315,15 +315,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -383,15 +383,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -470,16 +470,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t5 = self.fixed[0] * t;
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t29 = X[1] * X[1];
@@ -496,8 +496,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t56 = t20 * t9;
         let t57 = T::nearest(10.0) * t56;
         let t59 = t36 * t21;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -545,16 +545,16 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t5 = self.fixed[0] * t;
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t29 = X[1] * X[1];
@@ -571,8 +571,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t56 = t20 * t9;
         let t57 = T::nearest(10.0) * t56;
         let t59 = t36 * t21;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -620,7 +620,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t29 = X[1] * X[1];
@@ -629,8 +629,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t35 = T::nearest(4.0) * t32;
         let t36 = t33 + t35;
         let t68 = self.parameters.A * t20;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -660,14 +660,14 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SMatrix<T, 2, 2> {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t29 = X[1] * X[1];
@@ -676,8 +676,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t35 = T::nearest(4.0) * t32;
         let t36 = t33 + t35;
         let t68 = self.parameters.A * t20;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -756,15 +756,15 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         t: T,
     ) -> crate::nalgebra::SVector<T, 2> {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -814,8 +814,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t123 = self.fixed[3] * t87;
         let t124 = t88 + t123;
         let t126 = self.parameters.Omega * t124;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -923,17 +923,17 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
     }
     fn fields(&self, X: &crate::nalgebra::SVector<T, 2>, t: T) -> crate::Fields<T, 2> {
         let t5 = self.fixed[0] * t;
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -1025,8 +1025,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         let t127 = t125 + t126;
         let t128 = T::nearest(0.1) * t127;
         let t129 = -t128;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -1227,10 +1227,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
         match surface {
             crate::Surface::Lower(0) => {
                 let t8 = self.parameters.Omega * t;
-                let t9 = t8.sin();
+                let t9 = t8.sine();
                 let t19 = self.fixed[1] * t;
                 let t20 = t19.cos_pi();
-                let t21 = t8.cos();
+                let t21 = t8.cosine();
                 let t25 = T::nearest(0.5) * X[1];
                 let t29 = X[1] * X[1];
                 let t32 = t19.sin_pi();
@@ -1242,7 +1242,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t176 = self.fixed[6] * t20;
                 let t181 = self.fixed[7] * t36;
                 let t216 = self.fixed[10] * t20;
-                let t342 = X[1].cos();
+                let t342 = X[1].cosine();
                 let t343 = t176 * t342;
                 let t344 = t343 + T::one();
                 let t346 = self.fixed[19] * t36;
@@ -1285,10 +1285,10 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
             }
             crate::Surface::Upper(0) => {
                 let t8 = self.parameters.Omega * t;
-                let t9 = t8.sin();
+                let t9 = t8.sine();
                 let t19 = self.fixed[1] * t;
                 let t20 = t19.cos_pi();
-                let t21 = t8.cos();
+                let t21 = t8.cosine();
                 let t25 = T::nearest(0.5) * X[1];
                 let t26 = t25.sin_pi();
                 let t29 = X[1] * X[1];
@@ -1302,7 +1302,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t181 = self.fixed[7] * t36;
                 let t216 = self.fixed[10] * t20;
                 let t382 = X[1] + T::nearest(3.0);
-                let t383 = t382.cos();
+                let t383 = t382.cosine();
                 let t384 = t176 * t383;
                 let t385 = t384 + T::one();
                 let t387 = T::nearest(2.0) * X[1];
@@ -1347,13 +1347,13 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
             }
             crate::Surface::Lower(1) => {
                 let t8 = self.parameters.Omega * t;
-                let t9 = t8.sin();
+                let t9 = t8.sine();
                 let t12 = T::nearest(3.0) * X[0];
                 let t19 = self.fixed[1] * t;
                 let t20 = t19.cos_pi();
-                let t21 = t8.cos();
+                let t21 = t8.cosine();
                 let t23 = T::nearest(2.0) * X[0];
-                let t24 = t23.cos();
+                let t24 = t23.cosine();
                 let t32 = t19.sin_pi();
                 let t33 = T::nearest(3.0) * t20;
                 let t35 = T::nearest(4.0) * t32;
@@ -1362,7 +1362,7 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
                 let t56 = t20 * t9;
                 let t176 = self.fixed[6] * t20;
                 let t346 = self.fixed[19] * t36;
-                let t428 = t12.cos();
+                let t428 = t12.cosine();
                 let t429 = t346 * t24;
                 let t430 = t429 + T::one();
                 let t431 = T::one() / t430;
@@ -1390,23 +1390,23 @@ impl<T: crate::Real> crate::Solution<T, 2> for Skew2dRotating<T> {
             }
             crate::Surface::Upper(1) => {
                 let t8 = self.parameters.Omega * t;
-                let t9 = t8.sin();
+                let t9 = t8.sine();
                 let t12 = T::nearest(3.0) * X[0];
                 let t19 = self.fixed[1] * t;
                 let t20 = t19.cos_pi();
-                let t21 = t8.cos();
+                let t21 = t8.cosine();
                 let t23 = T::nearest(2.0) * X[0];
                 let t32 = t19.sin_pi();
                 let t33 = T::nearest(3.0) * t20;
                 let t35 = T::nearest(4.0) * t32;
                 let t36 = t33 + t35;
                 let t68 = self.parameters.A * t20;
-                let t131 = t23.sin();
+                let t131 = t23.sine();
                 let t176 = self.fixed[6] * t20;
                 let t181 = self.fixed[7] * t36;
                 let t268 = self.fixed[13] * t36;
                 let t453 = t12 + T::one();
-                let t454 = t453.cos();
+                let t454 = t453.cosine();
                 let t455 = T::nearest(4.0) * t131;
                 let t456 = T::one() - t455;
                 let t457 = t181 * t456;
@@ -1513,10 +1513,10 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 20, 9> for Skew2dRotating<T> {
     #[inline]
     fn body_force_time(&self, t: T) -> [T; 20] {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t32 = t19.sin_pi();
         let t33 = T::nearest(3.0) * t20;
         let t35 = T::nearest(4.0) * t32;
@@ -1583,9 +1583,9 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 20, 9> for Skew2dRotating<T> {
     fn body_force_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 9] {
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -1594,8 +1594,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 20, 9> for Skew2dRotating<T> {
         let t30 = X[0] * t29;
         let t31 = t28 + t30;
         let t71 = T::nearest(10.0) * X[1];
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;
@@ -1709,12 +1709,12 @@ impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
     #[inline]
     fn state_time(&self, t: T) -> [T; 14] {
         let t5 = self.fixed[0] * t;
-        let t6 = t5.sin();
+        let t6 = t5.sine();
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t32 = t19.sin_pi();
         let t33 = T::nearest(3.0) * t20;
         let t35 = T::nearest(4.0) * t32;
@@ -1739,10 +1739,10 @@ impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
     #[inline]
     fn velocity_time(&self, t: T) -> [T; 10] {
         let t8 = self.parameters.Omega * t;
-        let t9 = t8.sin();
+        let t9 = t8.sine();
         let t19 = self.fixed[1] * t;
         let t20 = t19.cos_pi();
-        let t21 = t8.cos();
+        let t21 = t8.cosine();
         let t32 = t19.sin_pi();
         let t33 = T::nearest(3.0) * t20;
         let t35 = T::nearest(4.0) * t32;
@@ -1766,9 +1766,9 @@ impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
     fn state_point(&self, X: &crate::nalgebra::SVector<T, 2>) -> [T; 7] {
         let t12 = T::nearest(3.0) * X[0];
         let t13 = t12 + X[1];
-        let t14 = t13.sin();
+        let t14 = t13.sine();
         let t23 = T::nearest(2.0) * X[0];
-        let t24 = t23.cos();
+        let t24 = t23.cosine();
         let t25 = T::nearest(0.5) * X[1];
         let t26 = t25.sin_pi();
         let t27 = t24 * t26;
@@ -1776,8 +1776,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 14, 10, 7> for Skew2dRotating<T> {
         let t29 = X[1] * X[1];
         let t30 = X[0] * t29;
         let t31 = t28 + t30;
-        let t130 = t13.cos();
-        let t131 = t23.sin();
+        let t130 = t13.cosine();
+        let t131 = t23.sine();
         let t132 = t26 * t131;
         let t133 = T::nearest(4.0) * t132;
         let t134 = t29 - t133;

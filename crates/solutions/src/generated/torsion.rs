@@ -179,8 +179,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -204,8 +204,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -237,8 +237,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -276,8 +276,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -317,8 +317,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -362,8 +362,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -399,8 +399,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -441,8 +441,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
         let t8 = t7.sin_pi();
         let t11 = self.fixed[1] * t8;
         let t12 = t11 * X[2];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = X[0] * t13;
         let t18 = X[1] * t16;
         let t19 = t17 + t18;
@@ -593,8 +593,8 @@ impl<T: crate::Real> crate::Solution<T, 3> for Torsion<T> {
                 let t8 = t7.sin_pi();
                 let t11 = self.fixed[1] * t8;
                 let t79 = self.fixed[5] * t8;
-                let t110 = t11.cos();
-                let t111 = t11.sin();
+                let t110 = t11.cosine();
+                let t111 = t11.sine();
                 let t112 = t110 * X[0];
                 let t113 = t111 * X[1];
                 let t114 = t112 - t113;
@@ -722,8 +722,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         point: &[T; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t12 = time[1] * point[0];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = point[1] * t13;
         let t18 = point[2] * t16;
         let t19 = t17 + t18;
@@ -798,8 +798,8 @@ impl<T: crate::Real> crate::BodyForceOnLattice<T, 3, 7, 1, 4> for Torsion<T> {
             1 => [point[0], T::zero(), T::zero(), T::zero()],
             2 => {
                 let t12 = time[1] * point[0];
-                let t13 = t12.sin();
-                let t16 = t12.cos();
+                let t13 = t12.sine();
+                let t16 = t12.cosine();
                 let t48 = time[2] * point[0];
                 let t60 = t13 * t13;
                 let t88 = self.fixed[6] * point[0];
@@ -883,8 +883,8 @@ impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
         let v = {
             let time = velocity_time;
             let t12 = time[0] * point[0];
-            let t13 = t12.sin();
-            let t16 = t12.cos();
+            let t13 = t12.sine();
+            let t16 = t12.cosine();
             let t17 = point[1] * t13;
             let t18 = point[2] * t16;
             let t19 = t17 + t18;
@@ -905,8 +905,8 @@ impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
             crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero())
         };
         let t12 = time[0] * point[0];
-        let t13 = t12.sin();
-        let t16 = t12.cos();
+        let t13 = t12.sine();
+        let t16 = t12.cosine();
         let t17 = point[1] * t13;
         let t18 = point[2] * t16;
         let t19 = t17 + t18;

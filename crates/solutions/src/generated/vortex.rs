@@ -221,8 +221,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t27 = X[0] * t25;
         let t28 = X[1] * t26;
         let t29 = t27 + t28;
@@ -256,8 +256,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t41 = t6.cos_pi();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
@@ -298,8 +298,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t41 = t6.cos_pi();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
@@ -350,8 +350,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t28 = X[1] * t26;
         let t35 = X[0] * t26;
         let t42 = t25 * t25;
@@ -427,8 +427,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t28 = X[1] * t26;
         let t35 = X[0] * t26;
         let t42 = t25 * t25;
@@ -508,8 +508,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t42 = t25 * t25;
         let t46 = t25 * t26;
         let t109 = X[0] * X[1];
@@ -557,8 +557,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t41 = t6.cos_pi();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
@@ -664,8 +664,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
         let t21 = t19 * t19;
         let t23 = self.fixed[2] * t7;
         let t24 = t23 * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t27 = X[0] * t25;
         let t28 = X[1] * t26;
         let t29 = t27 + t28;
@@ -889,8 +889,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t21 = t19 * t19;
                 let t23 = self.fixed[2] * t7;
                 let t24 = t23 * t21;
-                let t25 = t24.sin();
-                let t26 = t24.cos();
+                let t25 = t24.sine();
+                let t26 = t24.cosine();
                 let t42 = t25 * t25;
                 let t46 = t25 * t26;
                 let t114 = T::one() / t12;
@@ -923,8 +923,8 @@ impl<T: crate::Real> crate::Solution<T, 2> for Vortex<T> {
                 let t21 = t19 * t19;
                 let t23 = self.fixed[2] * t7;
                 let t24 = t23 * t21;
-                let t25 = t24.sin();
-                let t26 = t24.cos();
+                let t25 = t24.sine();
+                let t26 = t24.cosine();
                 let t42 = t25 * t25;
                 let t46 = t25 * t26;
                 let t114 = T::one() / t12;
@@ -1037,8 +1037,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
         let t19 = T::one() - t18;
         let t21 = t19 * t19;
         let t24 = time[0] * t21;
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
         let t44 = t42 - t43;
@@ -1166,8 +1166,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 8> for Vortex<T> {
         let v = {
             let time = velocity_time;
             let t24 = time[0] * point[4];
-            let t25 = t24.sin();
-            let t26 = t24.cos();
+            let t25 = t24.sine();
+            let t26 = t24.cosine();
             let t42 = t25 * t25;
             let t43 = t26 * t26;
             let t44 = t42 - t43;
@@ -1188,8 +1188,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 8> for Vortex<T> {
             crate::nalgebra::SVector::<T, 2>::new(t55, t61)
         };
         let t24 = time[1] * point[4];
-        let t25 = t24.sin();
-        let t26 = t24.cos();
+        let t25 = t24.sine();
+        let t26 = t24.cosine();
         let t27 = point[0] * t25;
         let t28 = point[1] * t26;
         let t29 = t27 + t28;
