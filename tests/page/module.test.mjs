@@ -21,17 +21,20 @@ assert.equal(WebAssembly.Module.imports(module.module).length, 0, 'the module as
 
 // Fields, to the bit: no formula calls a function of the system's own.
 const POINTS = 1000;
+/** At fewer where each takes the history of a particle. */
+const POINTS_OF_HISTORIES = 8;
 const RATIOS = [0.6180339887498949, 0.7548776662466927, 0.8191725133961645, 0.5698402909980532];
 const library = specifications('mms-specs', 'mms-specs/incompressible', 'mms-specs/revolution');
 const flat = (value) => [value].flat(9);
+const withMemory = specifications('mms-specs/with-memory');
 let values = 0;
-for (const specification of library) {
+for (const specification of [...library, ...(isQuick ? [] : withMemory)]) {
   const name = path.basename(specification, '.toml');
   const about = module.open(`${name}.toml`, readFileSync(specification, 'utf8'));
   assert.equal(about.error, undefined, name);
   const isOfRevolution = about.coordinates === 'axisymmetric';
   const dimension = isOfRevolution ? 2 : about.dimension;
-  const points = Array.from({ length: POINTS }, (_, n) => Array.from({ length: dimension + 1 }, (_, i) => (i < dimension ? 0.05 + 0.9 * (((n + 1) * RATIOS[i]) % 1) : 0.04 * (((n + 1) * RATIOS[3]) % 1))));
+  const points = Array.from({ length: withMemory.includes(specification) ? POINTS_OF_HISTORIES : POINTS }, (_, n) => Array.from({ length: dimension + 1 }, (_, i) => (i < dimension ? 0.05 + 0.9 * (((n + 1) * RATIOS[i]) % 1) : 0.04 * (((n + 1) * RATIOS[3]) % 1))));
   writeFileSync(path.join(folder, 'points.json'), JSON.stringify(points.map((point) => ({ X: point.slice(0, -1), t: point.at(-1) }))));
   const out = path.join(folder, 'fields.json');
   // Fails where a place of these lies outside of the motion; fields are written all the same.

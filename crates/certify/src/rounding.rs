@@ -15,7 +15,7 @@ pub struct Roundings {
     pub pi: f64,
     /// Error of `sin(pi x)` and `cos(pi x)` in generated code, which are within one unit in the last place (2).
     pub trigonometric_pi: f64,
-    /// Error of `sin(x)`, `cos(x)` of the system's library, which is held to one unit in the last place.
+    /// Error of `sin(x)`, `cos(x)`, within one unit in the last place.
     pub trigonometric: f64,
     /// Error of `ln(1 + x)` in generated code, which is within one and a half units in the last place.
     pub logarithm: f64,

@@ -1,5 +1,6 @@
 //! Bodies in the plane: polygons.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::HashMap;
 
 use mmsmith_lanes::tensor::real;
@@ -175,13 +176,13 @@ fn segment(side: Side<2>, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
         Side::Outer { radius } => (radius, 1.0),
         Side::Inner { radius } => (radius, -1.0),
     };
-    let half = (0.5 * (b - a).norm() / radius).min(1.0).asin();
+    let half = libm::asin((0.5 * (b - a).norm() / radius).min(1.0));
     // half - sin(half) cos(half), without cancellation where the angle is small.
     let area = if half < 0.1 {
         let s = half * half;
         half * s * (2.0 / 3.0 - s * (2.0 / 15.0 - s * (4.0 / 315.0 - s * 2.0 / 2835.0)))
     } else {
-        half - half.sin() * half.cos()
+        half - half.sine() * half.cosine()
     };
     sign * radius * radius * area
 }

@@ -3,6 +3,7 @@
 //! Each face of a box is clipped as a polygon; what a side cuts open is closed by a face between the cuts. A cut lies on an edge between
 //! two corners that all boxes at the edge share, so that they share the cut. Faces on the boundary become triangles, on which loads act.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use mmsmith_lanes::tensor::real;
@@ -208,7 +209,7 @@ fn segment(side: Side<3>, [a, b, c]: [Vector3<f64>; 3]) -> f64 {
     };
     let [a, b, c] = [a, b, c].map(|X| X / radius);
     let product = a.dot(&b.cross(&c));
-    let angle = 2.0 * product.atan2(1.0 + a.dot(&b) + b.dot(&c) + c.dot(&a));
+    let angle = 2.0 * product.polar_angle(1.0 + a.dot(&b) + b.dot(&c) + c.dot(&a));
     radius.powi(3) * (angle / 3.0 - product / 6.0)
 }
 

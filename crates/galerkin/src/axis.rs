@@ -1,5 +1,6 @@
 //! One axis of a background grid: its cells, its ends, and the particles along it.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::f64::consts::PI;
 
 use mmsmith_vocabulary::ComponentCondition;
@@ -109,7 +110,7 @@ fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
     let n = count as f64;
     let rule = |i: usize| {
         // Tricomi's estimate, from which Newton's iteration takes a few steps.
-        let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();
+        let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cosine();
         let mut slope = 1.0;
         for _ in 0..100 {
             let (value, derivative) = legendre(count, x);

@@ -17,6 +17,7 @@
 //!                | u_ph,R  u_ph,th/R          (u_ph,ph/sin th + u_R + u_th cot th)/R |
 //! ```
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::f64::consts::PI;
 
 use mmsmith_particles::SetupError;
@@ -81,7 +82,7 @@ impl Coordinates {
         match self {
             Self::Cartesian => None,
             Self::Polar | Self::Cylindrical => {
-                let (sin, cos) = coordinates[1].sin_cos();
+                let (sin, cos) = (coordinates[1].sine(), coordinates[1].cosine());
                 Some(SMatrix::from_fn(|i, k| match (i, k) {
                     (0, 1) => -sin,
                     (1, 0) => sin,
@@ -91,8 +92,8 @@ impl Coordinates {
                 }))
             }
             Self::Spherical => {
-                let (sin, cos) = coordinates[1].sin_cos();
-                let (sin_phi, cos_phi) = coordinates[2].sin_cos();
+                let (sin, cos) = (coordinates[1].sine(), coordinates[1].cosine());
+                let (sin_phi, cos_phi) = (coordinates[2].sine(), coordinates[2].cosine());
                 Some(SMatrix::from_fn(|i, k| match (i, k) {
                     (0, 0) => sin * cos_phi,
                     (1, 0) => sin * sin_phi,
@@ -117,7 +118,7 @@ impl Coordinates {
         let [cosecant, cotangent] = match self {
             Self::Cartesian | Self::Polar | Self::Cylindrical => [1.0, 0.0],
             Self::Spherical => {
-                let (sin, cos) = coordinates[1].sin_cos();
+                let (sin, cos) = (coordinates[1].sine(), coordinates[1].cosine());
                 [sin.recip(), cos / sin]
             }
         };
@@ -132,7 +133,7 @@ impl Coordinates {
             Self::Polar | Self::Cylindrical => scales[1] = coordinates[0],
             Self::Spherical => {
                 scales[1] = coordinates[0];
-                scales[2] = coordinates[0] * coordinates[1].sin();
+                scales[2] = coordinates[0] * coordinates[1].sine();
             }
         }
         scales
@@ -143,7 +144,7 @@ impl Coordinates {
         match (self, k) {
             (Self::Polar | Self::Cylindrical, 0) => coordinate,
             (Self::Spherical, 0) => coordinate * coordinate,
-            (Self::Spherical, 1) => coordinate.sin(),
+            (Self::Spherical, 1) => coordinate.sine(),
             _ => 1.0,
         }
     }

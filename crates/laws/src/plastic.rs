@@ -20,6 +20,7 @@ mod plane;
 mod space;
 
 use mmsmith_lanes::simd::{Loop, Vectors, dispatch};
+use mmsmith_scalar_functions::ScalarFunctions;
 use mmsmith_vocabulary::{Flow, Material};
 use nalgebra::{Matrix3, RealField, SMatrix};
 
@@ -68,7 +69,7 @@ impl Plastic {
                 [1.0, -1.0, 0.0].map(|part| part * flow.yield_stress / (2.0 * 3.0_f64.sqrt() * mu))
             }
         };
-        along.map(|e| (2.0 * e).exp())
+        along.map(|e| (2.0 * e).exponential())
     }
 
     /// `G` as stresses take it.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
+use mmsmith_scalar_functions::ScalarFunctions;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::columns::Particles;
@@ -139,7 +140,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         for j in 0..cells {
             let (cos, sin) = direction(2 * j + 1, 2 * around);
             // A chord's centroid lies inside its arc.
-            let chord = (half * angle).sin() / (half * angle);
+            let chord = sine(half * angle) / (half * angle);
             for i in 0..across {
                 let (low, high) = (radius(i), radius(i + 1));
                 let middle = half * (low + high);
@@ -173,11 +174,21 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
     }
 }
 
+/// The sine, the same on all systems.
+fn sine<T: RealField + Copy>(angle: T) -> T {
+    real(nalgebra::convert_unchecked::<T, f64>(angle).sine())
+}
+
+/// The cosine, as [`sine`].
+fn cosine<T: RealField + Copy>(angle: T) -> T {
+    real(nalgebra::convert_unchecked::<T, f64>(angle).cosine())
+}
+
 /// Cosine and sine of `index` parts of a quarter turn, each of which has `per_quarter`; exact on the axes.
 fn direction<T: RealField + Copy>(index: usize, per_quarter: usize) -> (T, T) {
     let rest = index % per_quarter;
     let angle = T::frac_pi_2() * real(rest as f64) / real(per_quarter as f64);
-    let (cos, sin) = if rest == 0 { (T::one(), T::zero()) } else { (angle.cos(), angle.sin()) };
+    let (cos, sin) = if rest == 0 { (T::one(), T::zero()) } else { (cosine(angle), sine(angle)) };
     match index / per_quarter % 4 {
         0 => (cos, sin),
         1 => (-sin, cos),

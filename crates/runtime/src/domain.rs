@@ -121,7 +121,7 @@ fn radial<T: Real, const D: usize>(X: &SVector<T, D>, radius: T) -> SVector<T, D
 
 /// The direction of growing angle at an angle, times a sign.
 fn across<T: Real, const D: usize>(angle: T, sign: T) -> SVector<T, D> {
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = (angle.sine(), angle.cosine());
     SVector::from_fn(|i, _| match i {
         0 => -sin * sign,
         1 => cos * sign,

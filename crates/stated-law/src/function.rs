@@ -42,16 +42,16 @@ pub(crate) struct Parts {
 impl Function {
     pub(crate) fn value(self, x: f64) -> f64 {
         match self {
-            Self::Sin => x.sin(),
-            Self::Cos => x.cos(),
-            Self::Tan => x.tan(),
-            Self::Asin => x.asin(),
-            Self::Acos => x.acos(),
-            Self::Atan => x.atan(),
-            Self::Sinh => x.sinh(),
-            Self::Cosh => x.cosh(),
-            Self::Tanh => x.tanh(),
-            Self::Exp => x.exp(),
+            Self::Sin => x.sine(),
+            Self::Cos => x.cosine(),
+            Self::Tan => libm::tan(x),
+            Self::Asin => libm::asin(x),
+            Self::Acos => libm::acos(x),
+            Self::Atan => libm::atan(x),
+            Self::Sinh => libm::sinh(x),
+            Self::Cosh => libm::cosh(x),
+            Self::Tanh => libm::tanh(x),
+            Self::Exp => x.exponential(),
             Self::Ln => (x - 1.0).ln_of_both(x),
             Self::Sqrt => x.sqrt(),
             Self::Erf => libm::erf(x),
@@ -72,23 +72,23 @@ impl Function {
             return self.value(d) - at_rest;
         }
         match self {
-            Self::Sin => 2.0 * (r + 0.5 * d).cos() * (0.5 * d).sin(),
-            Self::Cos => -2.0 * (r + 0.5 * d).sin() * (0.5 * d).sin(),
-            Self::Tan => d.sin() / (r.cos() * v.cos()),
+            Self::Sin => 2.0 * (r + 0.5 * d).cosine() * (0.5 * d).sine(),
+            Self::Cos => -2.0 * (r + 0.5 * d).sine() * (0.5 * d).sine(),
+            Self::Tan => d.sine() / (r.cosine() * v.cosine()),
             Self::Asin => arcsine(x),
             Self::Acos => -arcsine(x),
-            Self::Atan if 1.0 + v * r > 0.0 => (d / (1.0 + v * r)).atan(),
-            Self::Atan => v.atan() - r.atan(),
-            Self::Sinh => 2.0 * (r + 0.5 * d).cosh() * (0.5 * d).sinh(),
-            Self::Cosh => 2.0 * (r + 0.5 * d).sinh() * (0.5 * d).sinh(),
+            Self::Atan if 1.0 + v * r > 0.0 => libm::atan(d / (1.0 + v * r)),
+            Self::Atan => libm::atan(v) - libm::atan(r),
+            Self::Sinh => 2.0 * libm::cosh(r + 0.5 * d) * libm::sinh(0.5 * d),
+            Self::Cosh => 2.0 * libm::sinh(r + 0.5 * d) * libm::sinh(0.5 * d),
             // Far from rest the quotient may be one of infinite numbers.
-            Self::Tanh if d.abs() < 1.0 => d.sinh() / (r.cosh() * v.cosh()),
-            Self::Tanh => v.tanh() - r.tanh(),
-            Self::Exp => r.exp() * d.exp_m1(),
+            Self::Tanh if d.abs() < 1.0 => libm::sinh(d) / (libm::cosh(r) * libm::cosh(v)),
+            Self::Tanh => libm::tanh(v) - libm::tanh(r),
+            Self::Exp => r.exponential() * libm::expm1(d),
             Self::Ln => (d / r).ln_of_both(v / r),
             Self::Sqrt => d / (v.sqrt() + r.sqrt()),
             Self::Erf => {
-                let slope = |s: f64| std::f64::consts::FRAC_2_SQRT_PI * (-s * s).exp();
+                let slope = |s: f64| std::f64::consts::FRAC_2_SQRT_PI * (-s * s).exponential();
                 self.by_slope(x, 0.5 / (1.0 + r.abs()), slope)
             }
             Self::PositivePart if r > 0.0 && v > 0.0 => d,
@@ -117,34 +117,34 @@ impl Function {
 fn arcsine(x: Parts) -> f64 {
     let Parts { rest: r, deviation: d, value: v } = x;
     if d.abs() > 0.5 * r.abs() {
-        return v.asin() - r.asin();
+        return libm::asin(v) - libm::asin(r);
     }
     // 1 - v^2 from the deviation, which has the digits next to one.
     let root = (((1.0 - r) - d) * ((1.0 + r) + d)).sqrt();
     let root_at_rest = ((1.0 - r) * (1.0 + r)).sqrt();
     let sum = v * root_at_rest + r * root;
     // Both at the end of the range.
-    if sum == 0.0 { 0.0 } else { (d * (v + r) / sum).asin() }
+    if sum == 0.0 { 0.0 } else { libm::asin(d * (v + r) / sum) }
 }
 
 /// `x^exponent` less its value at rest `power`, which is a finite number, and `x^exponent`.
 pub(crate) fn power(x: Parts, exponent: f64, power: f64) -> (f64, f64) {
     let relative = x.deviation / x.rest;
     if power != 0.0 && relative > -0.5 && relative < 1.0 {
-        let deviation = power * (exponent * relative.log_1p()).exp_m1();
+        let deviation = power * libm::expm1(exponent * relative.log_1p());
         if deviation / power > -0.5 {
             return (deviation, power + deviation);
         }
     }
-    let value = x.value.powf(exponent);
+    let value = x.value.power(exponent);
     (value - power, value)
 }
 
 /// `atan2(y, x)` less its value at rest.
 pub(crate) fn angle_deviation(y: Parts, x: Parts) -> f64 {
-    let difference = y.value.atan2(x.value) - y.rest.atan2(x.rest);
+    let difference = y.value.polar_angle(x.value) - y.rest.polar_angle(x.rest);
     let cross = x.rest * y.deviation - y.rest * x.deviation;
-    let turn = cross.atan2(x.rest * x.value + y.rest * y.value);
+    let turn = cross.polar_angle(x.rest * x.value + y.rest * y.value);
     // Where both differ it is by a full turn.
     if (turn - difference).abs() < 1.0 { turn } else { difference }
 }

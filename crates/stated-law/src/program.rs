@@ -499,7 +499,7 @@ fn both<T: RealField + Copy, const N: usize>(
             self::deviation(work, rows, deviation);
             let (v, w) = (&rows[y.value], &rows[x.value]);
             for n in 0..N {
-                value[n] = real(double(v[n]).atan2(double(w[n])));
+                value[n] = real(double(v[n]).polar_angle(double(w[n])));
             }
         }
     }
@@ -597,7 +597,7 @@ fn value<T: RealField + Copy, const N: usize>(work: Work, rows: &[[T; N]], resul
         Work::Power { x, exponent, .. } => {
             let v = &rows[x.value];
             for n in 0..N {
-                result[n] = real(double(v[n]).powf(exponent));
+                result[n] = real(double(v[n]).power(exponent));
             }
         }
         Work::Call { function: Function::Sqrt, x } => {
@@ -622,7 +622,7 @@ fn value<T: RealField + Copy, const N: usize>(work: Work, rows: &[[T; N]], resul
         Work::Angle { y, x } => {
             let (v, w) = (&rows[y.value], &rows[x.value]);
             for n in 0..N {
-                result[n] = real(double(v[n]).atan2(double(w[n])));
+                result[n] = real(double(v[n]).polar_angle(double(w[n])));
             }
         }
     }

@@ -6,6 +6,7 @@
 //! any constant `r`.
 
 use crate::function::Function;
+use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::{BTreeMap, HashMap};
 
 /// Constants that are given may carry a few roundings from where they were computed.
@@ -256,14 +257,16 @@ impl Tape {
             }
             Operation::Product { x, y } => of(x).times(of(y)),
             Operation::Reciprocal { x } => of(x).of(f64::recip),
-            Operation::Power { x, exponent } => of(x).of(|x| x.powf(exponent.get())),
+            Operation::Power { x, exponent } => of(x).of(|x| x.power(exponent.get())),
             Operation::Call { function, x } => of(x).of(|x| function.value(x)),
             Operation::Angle { y, x } if of(x).value == 0.0 && of(y).value == 0.0 => {
                 Rest { value: f64::NAN, error: 0.0 }
             }
             Operation::Angle { y, x } => {
-                let (by_y, by_x) =
-                    (of(y).of(|y| y.atan2(of(x).value)), of(x).of(|x| of(y).value.atan2(x)));
+                let (by_y, by_x) = (
+                    of(y).of(|y| y.polar_angle(of(x).value)),
+                    of(x).of(|x| of(y).value.polar_angle(x)),
+                );
                 Rest::new(by_y.value, by_y.error + by_x.error)
             }
             Operation::OnePlus { x, .. } => Rest::sum(&[Rest::constant(1.0), of(x)]),
@@ -374,7 +377,7 @@ impl Tape {
     pub(crate) fn power(&mut self, x: Value, exponent: Value) -> Value {
         match (x, exponent) {
             (Value::Constant(x), Value::Constant(exponent)) => {
-                Value::Constant(x.of(|x| x.powf(exponent.value)))
+                Value::Constant(x.of(|x| x.power(exponent.value)))
             }
             (x, Value::Constant(exponent)) => self.constant_power(x, exponent.value),
             (x, exponent) => {
@@ -391,7 +394,7 @@ impl Tape {
         let doubled = 2.0 * exponent;
         if doubled.fract() != 0.0 || exponent.abs() > LARGEST {
             return match x {
-                Value::Constant(x) => Value::Constant(x.of(|x| x.powf(exponent))),
+                Value::Constant(x) => Value::Constant(x.of(|x| x.power(exponent))),
                 Value::Varying(x) => {
                     let exponent = Bits::new(exponent);
                     Value::Varying(self.push(Operation::Power { x, exponent }))
@@ -422,7 +425,7 @@ impl Tape {
     /// The polar angle of the point `(x, y)`.
     pub(crate) fn angle(&mut self, y: Value, x: Value) -> Value {
         if let (Some(y), Some(x)) = (y.as_constant(), x.as_constant()) {
-            return Value::Constant(y.of(|y| y.atan2(x.value)));
+            return Value::Constant(y.of(|y| y.polar_angle(x.value)));
         }
         let (y, x) = (self.varying(y), self.varying(x));
         Value::Varying(self.push(Operation::Angle { y, x }))

@@ -1,5 +1,6 @@
 //! How far a step flows: one equation for one number.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use mmsmith_vocabulary::{Flow, Overstress};
 
 use crate::fault::{Fault, Planted};
@@ -24,7 +25,7 @@ impl Yield {
         let sign = if self.planted.is(Fault::HardeningSign) { -1.0 } else { 1.0 };
         let power = match exponent {
             1.0 => alpha,
-            exponent => alpha.max(0.0).powf(exponent),
+            exponent => alpha.max(0.0).power(exponent),
         };
         root * (yield_stress + sign * modulus * power)
     }
@@ -63,7 +64,7 @@ impl Yield {
             return root(residual, over / stiffness, size);
         };
         // In the overstress over the drag, in which the equation has no steep slopes: `D = time y^exponent / time of the flow`.
-        let multiplier = |y: f64| time / of_flow * y.powf(exponent);
+        let multiplier = |y: f64| time / of_flow * y.power(exponent);
         let residual = |y: f64| {
             let D = multiplier(y);
             size - stiffness * D - self.allowed(alpha + ROOT * D) - drag * y

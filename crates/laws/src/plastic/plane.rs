@@ -5,6 +5,7 @@
 //! `m = ln(det)/2` the logarithm of the block is `m I + theta/sinh(theta) dev(b)/sqrt(det)`. A return changes `theta`, `m` and the
 //! logarithm across by factors alone, and the block it leads to is a combination of `b` and `I`.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use mmsmith_scalar_functions::logarithm::ln_of_both_in_range;
 
 use super::multiplier::Yield;
@@ -142,7 +143,7 @@ fn sinh<const SMALL: bool>(x: f64) -> f64 {
         1.0 / (2.0 * 3.0),
     ];
     if !SMALL {
-        return x.sinh();
+        return libm::sinh(x);
     }
     let square = x * x;
     x * QUOTIENTS.iter().fold(1.0, |sum, quotient| 1.0 + sum * (square * quotient))
@@ -152,7 +153,7 @@ fn sinh<const SMALL: bool>(x: f64) -> f64 {
 #[inline(always)]
 fn exp<const SMALL: bool>(x: f64) -> f64 {
     if !SMALL {
-        return x.exp();
+        return x.exponential();
     }
     let sinh = sinh::<true>(x);
     sinh + (1.0 + sinh * sinh).sqrt()
@@ -272,12 +273,12 @@ pub(super) fn midpoint(
         0.5 * (A[0][0] * G.shear + A[0][1] * g22 + A[1][0] * g11 + A[1][1] * G.shear),
     ];
     let after = |D: f64| {
-        let (mean, x) = ((-2.0 * D * n.mean).exp(), 2.0 * D * n.size);
-        let (of_G, of_A) = (mean * x.cosh(), mean * sinh_over::<false>(x, n.size, 2.0 * D));
+        let (mean, x) = ((-2.0 * D * n.mean).exponential(), 2.0 * D * n.size);
+        let (of_G, of_A) = (mean * libm::cosh(x), mean * sinh_over::<false>(x, n.size, 2.0 * D));
         Sym {
             a: [of_G * g11 - of_A * AG[0], of_G * g22 - of_A * AG[1]],
             shear: of_G * G.shear - of_A * AG[2],
-            across: G.across * (-2.0 * D * n.across).exp(),
+            across: G.across * (-2.0 * D * n.across).exponential(),
         }
     };
     let D = if law.flow.overstress.is_some() {

@@ -1,5 +1,6 @@
 //! Return maps in space, by principal values and directions.
 
+use mmsmith_scalar_functions::ScalarFunctions;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::multiplier::Yield;
@@ -62,7 +63,7 @@ pub(super) fn exponential(
         return (*G, 0.0);
     }
     let share = 2.0 * law.mu * D / size;
-    let b = trial.tensor(trial.values.zip_map(&deviator, |b, s| b * (-share * s).exp()));
+    let b = trial.tensor(trial.values.zip_map(&deviator, |b, s| b * (-share * s).exponential()));
     let to_reference = inverse(F);
     (symmetric(to_reference * b * to_reference.transpose()), D)
 }
@@ -82,7 +83,7 @@ pub(super) fn midpoint(
     let n = deviator / deviator.norm();
     let to_reference = inverse(&middle);
     let after = |D: f64| {
-        let flow = at_middle.tensor(n.map(|n| (-2.0 * D * n).exp()));
+        let flow = at_middle.tensor(n.map(|n| (-2.0 * D * n).exponential()));
         symmetric(to_reference * flow * middle * G)
     };
     let D = if law.flow.overstress.is_some() {
