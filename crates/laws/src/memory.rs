@@ -110,6 +110,11 @@ pub trait LawWithMemory<T, const D: usize>: fmt::Debug + Send + Sync {
         false
     }
 
+    /// The caller's own elastic law whose change of volume is projected; a law of the library is [`elastic`](Self::elastic). Default: none.
+    fn own_projected_law(&self) -> Option<Arc<dyn ConstitutiveLaw<T, D>>> {
+        None
+    }
+
     /// Where changes of volume are projected: writes the stress and the mean stress of each particle at its deformation gradient with the
     /// projected change of volume, as [`ProjectedVolume`](crate::ProjectedVolume) has them.
     fn evaluate_projected(

@@ -12,13 +12,15 @@
 //! In the plane the stretch across it stays one, so that the change of volume is that of the plane and the root is a square root: `det Fb`
 //! is `theta` in every dimension.
 
+use std::sync::Arc;
+
 use mmsmith_lanes::tensor::{determinant, inverse_transpose, real};
 use mmsmith_vocabulary::Material;
 use nalgebra::{RealField, SMatrix};
 
 use crate::fault::{Fault, Planted};
 use crate::memory::{Increment, InternalVariable, LawWithMemory, of_particle, set_stress};
-use crate::{BLOCK, Law, SIDE_BY_SIDE, Stressed};
+use crate::{BLOCK, ConstitutiveLaw, Law, SIDE_BY_SIDE, Stressed};
 
 /// How the change of volume enters the stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,16 +52,6 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         is_elastic.then(|| Self { law, planted: Planted::here() })
     }
 
-    /// `(theta/J)^(1/D)`, from the quotient.
-    fn root(&self, share: T) -> T {
-        match D {
-            1 => share,
-            2 if self.planted.is(Fault::VolumeRoot) => share.cbrt(),
-            2 => share.sqrt(),
-            _ => share.cbrt(),
-        }
-    }
-
     /// Stresses `Pb`, and `(theta/J)^(1/D)`.
     fn stresses(
         &self,
@@ -70,7 +62,7 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         let mut scaled = *F;
         let ratios = std::array::from_fn(|n| {
             let own = of_particle(F, n);
-            let ratio = self.root(theta[n] / determinant(&own));
+            let ratio = root::<T, D>(self.planted, theta[n] / determinant(&own));
             set_stress(&mut scaled, n, &(own * ratio));
             ratio
         });
@@ -123,6 +115,13 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
         true
     }
 
+    fn own_projected_law(&self) -> Option<Arc<dyn ConstitutiveLaw<T, D>>> {
+        match &self.law {
+            Law::Own(law) => Some(law.clone()),
+            Law::Library(_) | Law::WithMemory(_) => None,
+        }
+    }
+
     fn evaluate_projected(
         &self,
         F: &[SMatrix<T, D, D>],
@@ -151,7 +150,7 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
-        let ratio = self.root(q.first().copied()? / determinant(F));
+        let ratio = root::<T, D>(self.planted, q.first().copied()? / determinant(F));
         Some(self.law.kirchhoff_in_space(&(F * ratio))?[(2, 2)])
     }
 
@@ -161,6 +160,28 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
             Law::Own(_) | Law::WithMemory(_) => None,
         }
     }
+}
+
+/// `(theta/J)^(1/D)`, from the quotient.
+#[inline(always)]
+fn root<T: RealField + Copy, const D: usize>(planted: Planted, share: T) -> T {
+    match D {
+        1 => share,
+        2 if planted.is(Fault::VolumeRoot) => share.cbrt(),
+        2 => share.sqrt(),
+        _ => share.cbrt(),
+    }
+}
+
+/// `Fb`: the deformation gradient with the change of volume `theta` in place of its own.
+#[inline(always)]
+#[must_use]
+pub fn with_volume<T: RealField + Copy, const D: usize>(
+    planted: Planted,
+    F: &SMatrix<T, D, D>,
+    theta: T,
+) -> SMatrix<T, D, D> {
+    F * root::<T, D>(planted, theta / determinant(F))
 }
 
 /// The stress of a particle from its deformation gradient, what [`LawWithMemory::evaluate_projected`] gave, and its projected mean stress.

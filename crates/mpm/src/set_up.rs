@@ -21,6 +21,7 @@ use crate::grid::{Layout, Sides};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
 use crate::kernel::half_plane;
+use crate::kernel::projected::ProjectedBlocks;
 use crate::processes::decomposition::{LocalBody, Share, admit};
 use crate::scheme::{Settings, VelocityUpdate};
 use crate::step::is_fused;
@@ -39,6 +40,12 @@ pub(crate) fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn Bl
         Law::Library(material) => *material,
         Law::Own(law) => return Box::new(OwnBlocks(law.clone())),
         Law::WithMemory(law) => {
+            let own = || law.own_projected_law().map(Law::Own);
+            if law.is_projected()
+                && let Some(elastic) = law.elastic().map(Law::Library).or_else(own)
+            {
+                return Box::new(ProjectedBlocks::new(law.clone(), of_blocks(&elastic)));
+            }
             let of_half_plane =
                 law.of_half_plane().and_then(|law| half_plane::of_law(law, planted));
             return of_half_plane.unwrap_or_else(|| Box::new(MemoryBlocks::new(law.clone())));
@@ -212,8 +219,8 @@ impl OtherGrids {
     }
 
     fn bytes_per_node<T, const D: usize>(self) -> usize {
-        let grids =
-            1 + [self.reprojected, self.ahead, self.means].map(usize::from).iter().sum::<usize>();
+        let others = [self.reprojected, self.ahead, self.means, self.means];
+        let grids = 1 + others.map(usize::from).iter().sum::<usize>();
         let of_filter = if self.filtered { size_of::<SVector<T, D>>() } else { 0 };
         grids * size_of::<Node<T, D>>() + of_filter
     }
@@ -239,6 +246,7 @@ impl OtherGrids {
             reprojected: nodes(self.reprojected)?,
             next: nodes(self.ahead)?,
             means: nodes(self.means)?,
+            means_again: nodes(self.means)?,
             is_ahead: false,
             filtered: if self.filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
             layout,

@@ -25,6 +25,8 @@ pub(crate) struct GridState<T, const D: usize> {
     pub(crate) is_ahead: bool,
     /// Means of scalars, where a change of volume is projected. One per node.
     pub(crate) means: Vec<Node<T, D>>,
+    /// Means of scalars that follow from `means`. One per node.
+    pub(crate) means_again: Vec<Node<T, D>>,
     /// XPIC: the filtered velocity at each node.
     pub(crate) filtered: Vec<SVector<T, D>>,
 }
@@ -46,9 +48,8 @@ impl<T: Lanes, const D: usize> GridState<T, D> {
                 *nodes = vec![Node::zero(); layout.nodes];
             }
         };
-        [&mut self.nodes, &mut self.reprojected, &mut self.next, &mut self.means]
-            .into_iter()
-            .for_each(resize);
+        let Self { nodes, reprojected, next, means, means_again, .. } = self;
+        [nodes, reprojected, next, means, means_again].into_iter().for_each(resize);
         if !self.filtered.is_empty() {
             self.filtered = vec![SVector::zeros(); layout.nodes];
         }

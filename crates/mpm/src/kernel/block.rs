@@ -53,8 +53,16 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
         false
     }
 
-    /// Writes the mean stresses of particles with these deformation gradients and projected changes of volume.
-    fn mean_stresses(&self, _F: &[SMatrix<T, D, D>], _theta: &[T], _mean: &mut [T]) {}
+    /// Where the change of volume is projected: sets the first component of momentum of each particle in `contributions.value` to its reference
+    /// volume times its mean stress at the projected change of volume, and the others to zero.
+    fn mean_stresses(
+        &self,
+        _c: &Constants<T, D>,
+        _F: &[SMatrix<T, D, D>; BLOCK],
+        _theta: &[T; BLOCK],
+        _contributions: &mut Contributions<T, D, BLOCK>,
+    ) {
+    }
 
     /// Advances the internal variables of no more than a block of particles.
     fn evolve(&self, _increment: BlockIncrement<'_, T, D>, _internal: &mut [T]) {}
@@ -206,15 +214,6 @@ impl<T: Lanes, const D: usize> BlockLaw<T, D> for MemoryBlocks<T, D> {
 
     fn initial(&self, X: &SVector<T, D>) -> Vec<T> {
         self.law.initial(X)
-    }
-
-    fn is_projected(&self) -> bool {
-        self.law.is_projected()
-    }
-
-    fn mean_stresses(&self, F: &[SMatrix<T, D, D>], theta: &[T], mean: &mut [T]) {
-        let mut scaled = vec![SMatrix::zeros(); F.len()];
-        self.law.evaluate_projected(F, theta, &mut scaled, mean);
     }
 
     fn evolve(&self, increment: BlockIncrement<'_, T, D>, internal: &mut [T]) {

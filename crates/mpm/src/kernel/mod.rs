@@ -21,6 +21,7 @@ mod lanes_space;
 pub(crate) mod points;
 pub(crate) mod prefetch;
 pub(crate) mod product;
+pub(crate) mod projected;
 pub(crate) mod revolving;
 pub(crate) mod shared;
 

@@ -16,106 +16,179 @@ use mmsmith_particles::Particles;
 use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corners::{Corners, grid_values};
+use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, ScalarMean};
 use crate::grid::node::Node;
 use crate::grid::state::GridState;
-use crate::kernel::buffers::Buffers;
+use crate::kernel::any::Interpolated;
+use crate::kernel::buffers::{Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::projected::VARIABLES;
 use crate::step::g2p::{CHUNK, FromGrid};
-use crate::step::p2g::{P2g, two_stages};
+use crate::step::p2g::P2g;
 use crate::step::state::State;
 use mmsmith_threads::each;
 
-/// Internal variables of a projected law.
-const VARIABLES: usize = 2;
+/// A scalar of each particle as a function of the particle, for P2G.
+enum Scalar {
+    /// The change of volume.
+    Volume,
+    /// The mean stress at the projected change of volume, which the nodes have, times the reference volume.
+    MeanStress,
+    /// The scalar that the nodes have.
+    OfNodes,
+}
 
 impl<T: Lanes, const D: usize> State<T, D> {
     /// Sets the projected changes of volume and mean stresses: of F as it is, or of F after the early part of a step.
+    ///
+    /// With `A` the mean to the nodes and back, a projection is `2 A - A^2`, since means alone smooth by `h^2`: at the nodes, twice the means less the
+    /// means of what these are at the particles. Particles that share corners are smoothed by `A`: of the corners' own values `2 A - A^2`
+    /// leaves too many for a body next to incompressibility to follow.
     pub(crate) fn project_volume(&mut self, is_early: bool) {
         if let Some(corners) = &mut self.corners {
             corners.shared.recompute_shares();
         }
-        let planted = self.grid.constants.planted;
-        let F = if is_early { &self.early.F } else { &self.particles.F };
-        let mut theta: Vec<T> = F.iter().map(determinant).collect();
-        if !planted.is(Fault::JacobianForTheta) {
-            self.project(&mut theta);
+        let is_repeated = self.corners.is_none();
+        self.means_of(&Scalar::Volume, is_early);
+        if is_repeated {
+            self.means_of(&Scalar::OfNodes, is_early);
+            let GridState { means, means_again, .. } = &mut self.grid;
+            for (node, again) in means.iter_mut().zip(means_again) {
+                node.values[0] = node.values[0] + node.values[0] - again.values[0];
+            }
         }
-        let F = if is_early { &self.early.F } else { &self.particles.F };
-        let mut p = vec![T::zero(); F.len()];
-        let law = &*self.law;
-        let pieces = F.chunks(CHUNK).zip(theta.chunks(CHUNK)).zip(p.chunks_mut(CHUNK));
-        each(pieces.collect(), &|((F, theta), p)| law.mean_stresses(F, theta, p));
-        let Particles { mass, volume, .. } = &self.particles;
-        let densities: Vec<T> = mass.iter().zip(volume).map(|(m, V)| *m / *V).collect();
-        p.iter_mut().zip(&densities).for_each(|(p, density)| *p /= *density);
-        self.project(&mut p);
-        p.iter_mut().zip(&densities).for_each(|(p, density)| *p *= *density);
-        let internal = match is_early {
-            true => &mut self.early.internal,
-            false => &mut self.particles.internal,
-        };
-        for (own, (theta, p)) in internal.chunks_exact_mut(VARIABLES).zip(theta.iter().zip(&p)) {
-            own.copy_from_slice(&[*theta, *p]);
+        self.means_of(&Scalar::MeanStress, is_early);
+        if is_repeated {
+            let GridState { means, means_again, .. } = &mut self.grid;
+            let theta: Vec<T> = means.iter().map(|node| node.values[0]).collect();
+            std::mem::swap(means, means_again);
+            self.means_of(&Scalar::OfNodes, is_early);
+            let GridState { means, means_again, .. } = &mut self.grid;
+            for ((node, again), theta) in means.iter_mut().zip(means_again).zip(theta) {
+                node.values[D] = node.values[0] + node.values[0] - again.values[0];
+                node.values[0] = theta;
+            }
+        } else {
+            let GridState { means, means_again, .. } = &mut self.grid;
+            for (node, again) in means.iter_mut().zip(means_again) {
+                node.values[D] = again.values[0];
+            }
         }
+        self.take_projected(is_early);
     }
 
-    /// `2 A - A^2` of values at the particles, `A` being the mean to the nodes and back: means alone smooth by `h^2`. Particles that share
-    /// corners are smoothed by `A`: of the corners' own values `2 A - A^2` leaves too many for a body next to incompressibility to follow.
-    fn project(&mut self, values: &mut [T]) {
-        if self.corners.is_some() {
-            return self.smooth(values);
-        }
-        let mut means = values.to_vec();
-        self.smooth(&mut means);
-        for (value, mean) in values.iter_mut().zip(&means) {
-            *value -= *mean;
-        }
-        self.smooth(values);
-        for (value, mean) in values.iter_mut().zip(&means) {
-            *value += *mean;
-        }
-    }
-
-    /// Means of the particles' values at the nodes, weighted with masses, and these interpolated at the particles.
-    fn smooth(&mut self, values: &mut [T]) {
-        let Self { particles, grid, corners, domain, buffers, .. } = self;
-        let GridState { constants, layout, bins, means, .. } = grid;
-        let (domain, buffers) = (&**domain, &*buffers);
-        let Particles { x, F, mass, .. } = &*particles;
+    /// Means at the nodes of a scalar of the particles, weighted with masses: in `means` of what needs nothing of the nodes, else in
+    /// `means_again` of what follows from `means`.
+    fn means_of(&mut self, scalar: &Scalar, is_early: bool) {
+        let Self { particles, early, grid, corners, domain, buffers, law, .. } = self;
+        let GridState { constants, layout, bins, means, means_again, .. } = grid;
+        let (domain, buffers, law) = (&**domain, &*buffers, &**law);
+        let Particles { x, F, mass, volume, .. } = &*particles;
+        let F_now = if is_early { &early.F } else { F };
         let c = *constants;
-        let sums = &*values;
+        let reads_grid = !matches!(scalar, Scalar::Volume);
+        let (from, to) = match reads_grid {
+            true => (&means[..], means_again),
+            false => (&[][..], means),
+        };
+        let (at_corners, stages) = match corners {
+            Some(corners) => {
+                if reads_grid {
+                    corners.interpolate(&c, from);
+                }
+                let Corners { shared, exchange, values, .. } = &mut **corners;
+                (Some((&*shared, &*values)), Some((&*shared, exchange)))
+            }
+            None => (None, None),
+        };
+        let values = GridValues { nodes: from, at_corners };
         let update = GridUpdate::new(layout, &c, ScalarMean);
-        let p2g = P2g::new(&c, (domain, buffers), false, (x, F));
-        let set = |Buffers { contributions, .. }: &mut Buffers<T, D>,
-                   _: &mut Copies<T, D>,
-                   ids: &[u32]| {
-            contributions.without_stress();
-            for (value, &p) in contributions.value.iter_mut().zip(ids) {
-                let p = p as usize;
-                let mut sum = SVector::zeros();
-                sum[0] = sums[p] * mass[p];
-                *value = Node::new(&sum, &SVector::zeros(), mass[p]);
+        let p2g = P2g { reads_grid, ..P2g::new(&c, (domain, buffers), false, (x, F)) };
+        let set = |buffers: &mut Buffers<T, D>, copies: &mut Copies<T, D>, ids: &[u32]| {
+            if reads_grid {
+                values.g2p(&c, buffers, ids);
+            }
+            let Buffers { contributions, interpolated, .. } = buffers;
+            match scalar {
+                Scalar::MeanStress => {
+                    let theta = projected(&c, interpolated, F_now, ids);
+                    contributions.take(ids, mass, volume);
+                    copies.pick_F(ids, F_now);
+                    law.mean_stresses(&c, &copies.F, &theta, contributions);
+                    contributions.without_stress();
+                }
+                Scalar::Volume | Scalar::OfNodes => {
+                    contributions.without_stress();
+                    let own = contributions.value.iter_mut().zip(&*interpolated);
+                    for ((value, of_nodes), &p) in own.zip(ids) {
+                        let p = p as usize;
+                        let mut sum = SVector::zeros();
+                        sum[0] = match reads_grid {
+                            true => of_nodes.velocity[0],
+                            false => determinant(&F_now[p]),
+                        } * mass[p];
+                        *value = Node::new(&sum, &SVector::zeros(), mass[p]);
+                    }
+                }
             }
         };
-        p2g.to_grid(&update, (bins, two_stages(corners), None), means, &set);
+        p2g.to_grid(&update, (bins, stages, None), to, &set);
+    }
+
+    /// G2P of the projected changes of volume, which are the first of the nodes' values, and of the projected mean stresses over densities, the
+    /// first of their second vectors.
+    fn take_projected(&mut self, is_early: bool) {
+        let Self { particles, early, grid, corners, domain, buffers, .. } = self;
+        let GridState { constants, means, .. } = grid;
+        let (domain, buffers, c) = (&**domain, &*buffers, *constants);
         if let Some(corners) = corners {
             corners.interpolate(&c, means);
         }
-        let at_nodes =
-            grid_values(means, corners.as_deref().map(|corners: &Corners<T, D>| corners));
-        each(values.chunks_mut(CHUNK).enumerate().collect(), &|(piece, values)| {
+        let at_nodes = grid_values(means, corners.as_deref());
+        let Particles { x, F, mass, volume, internal, .. } = &mut *particles;
+        let (x, F, mass, volume) = (&*x, &*F, &*mass, &*volume);
+        let F_now = if is_early { &early.F } else { F };
+        let internal = if is_early { &mut early.internal } else { internal };
+        each(internal.chunks_mut(CHUNK * VARIABLES).enumerate().collect(), &|(piece, internal)| {
             let mut grid = FromGrid::new(&c, at_nodes, buffers.take(domain, false));
-            let (x, F): (&[SVector<T, D>], &[SMatrix<T, D, D>]) =
-                (&x[piece * CHUNK..], &F[piece * CHUNK..]);
-            let blocks = values.chunks_mut(BLOCK).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
-            for (index, ((values, x), F)) in blocks.enumerate() {
-                let found = grid.g2p(piece * CHUNK + index * BLOCK, x, F);
-                for (value, found) in values.iter_mut().zip(found) {
-                    *value = found.velocity[0];
+            let of_piece = piece * CHUNK;
+            let (x, F) = (&x[of_piece..], &F[of_piece..]);
+            let blocks =
+                internal.chunks_mut(BLOCK * VARIABLES).zip(x.chunks(BLOCK)).zip(F.chunks(BLOCK));
+            for (index, ((internal, x), F)) in blocks.enumerate() {
+                let first = of_piece + index * BLOCK;
+                // The last block of a piece may end before that of all particles does.
+                let count = internal.len() / VARIABLES;
+                let found = grid.g2p(first, &x[..count], &F[..count]);
+                for (k, (own, found)) in internal.chunks_exact_mut(VARIABLES).zip(found).enumerate()
+                {
+                    let p = first + k;
+                    own[0] = match c.planted.is(Fault::JacobianForTheta) {
+                        true => determinant(&F_now[p]),
+                        false => found.velocity[0],
+                    };
+                    own[1] = found.second[0] * (mass[p] / volume[p]);
                 }
             }
             buffers.give_back(grid.buffers);
         });
     }
+}
+
+/// The projected change of volume of each particle of a block; one beyond its last.
+fn projected<T: Lanes, const D: usize>(
+    c: &Constants<T, D>,
+    interpolated: &[Interpolated<T, D>; BLOCK],
+    F: &[SMatrix<T, D, D>],
+    ids: &[u32],
+) -> [T; BLOCK] {
+    let mut theta = [T::one(); BLOCK];
+    for ((theta, interpolated), &p) in theta.iter_mut().zip(interpolated).zip(ids) {
+        *theta = match c.planted.is(Fault::JacobianForTheta) {
+            true => determinant(&F[p as usize]),
+            false => interpolated.velocity[0],
+        };
+    }
+    theta
 }
