@@ -167,7 +167,8 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     /// The body force per unit mass, from the values of one time and of one point; equal to
     /// [`Solution::body_force`] but for rounding.
     ///
-    /// If `NEAR`, logarithms of ratios take the form near one (`Real::ln_near_one`): the result is the same to the last bit, or NaN.
+    /// If `NEAR`, logarithms of ratios take the form near one (`Real::ln_near_one`), and sines and cosines the form of angles up to a million
+    /// (`Real::near_sine`): the result is the same to the last bit, or NaN.
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; TIME],
@@ -410,7 +411,7 @@ fn body_forces<S, T: Real, const D: usize, const TIME: usize, const POINT: usize
     }
 }
 
-/// Returns whether all values are numbers. If not, a ratio was not near one, or there is no force. A function of its own tells the
+/// Returns whether all values are numbers. If not, a ratio was not near one, an angle too large, or there is no force. A function of its own tells the
 /// compiler that the arrays do not overlap. It is generic instead of taking a closure, which is not always inlined: the loop would then
 /// go point by point.
 #[inline(always)]

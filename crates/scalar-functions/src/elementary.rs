@@ -24,6 +24,20 @@ pub(crate) fn cosine(x: f64) -> f64 {
     if x.abs() <= LARGEST_ANGLE { Angle::reduced(x).sine_and_quarters(1) } else { libm::cos(x) }
 }
 
+/// [`sine`] to the last bit, without a branch, of angles up to [`LARGEST_ANGLE`]; not a number beyond.
+#[inline(always)]
+pub(crate) fn near_sine(x: f64) -> f64 {
+    let value = Angle::reduced(x).sine_and_quarters(0);
+    if x.abs() <= LARGEST_ANGLE { value } else { f64::NAN }
+}
+
+/// [`cosine`], as [`near_sine`].
+#[inline(always)]
+pub(crate) fn near_cosine(x: f64) -> f64 {
+    let value = Angle::reduced(x).sine_and_quarters(1);
+    if x.abs() <= LARGEST_ANGLE { value } else { f64::NAN }
+}
+
 /// An angle as right angles and the rest.
 struct Angle {
     /// The number of right angles, in the last two bits.
@@ -94,7 +108,7 @@ impl Angle {
 }
 
 /// `exp(x)`, within one unit in the last place.
-#[inline]
+#[inline(always)]
 pub(crate) fn exponential(x: f64) -> f64 {
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
@@ -159,6 +173,20 @@ mod tests {
             let exponentials = worst(exponential, f64::exp, over(scale));
             assert!(exponentials <= 1.0, "{scale}: {exponentials}");
         }
+    }
+
+    #[test]
+    fn near_forms_have_the_same_bits_or_are_no_numbers() {
+        for n in -3_000..3_000 {
+            let x = f64::from(n) * 0.731 * f64::from(n).abs().max(1.0);
+            let near = x.abs() <= LARGEST_ANGLE;
+            let same = |found: f64, expected: f64| match near {
+                true => found.to_bits() == expected.to_bits(),
+                false => found.is_nan(),
+            };
+            assert!(same(near_sine(x), sine(x)) && same(near_cosine(x), cosine(x)), "{x}");
+        }
+        assert!(near_sine(f64::INFINITY).is_nan() && near_cosine(f64::NAN).is_nan());
     }
 
     #[test]

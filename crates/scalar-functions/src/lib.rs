@@ -33,6 +33,28 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
     #[must_use]
     fn cosine(self) -> Self;
 
+    /// [`sine`](Self::sine) to the last bit, without a branch, of angles up to a million; not a number beyond.
+    #[must_use]
+    fn near_sine(self) -> Self;
+
+    /// [`cosine`](Self::cosine), as [`near_sine`](Self::near_sine).
+    #[must_use]
+    fn near_cosine(self) -> Self;
+
+    /// [`near_sine`](Self::near_sine) if `NEAR`, else [`sine`](Self::sine).
+    #[inline(always)]
+    #[must_use]
+    fn sine_if<const NEAR: bool>(self) -> Self {
+        if NEAR { self.near_sine() } else { self.sine() }
+    }
+
+    /// [`near_cosine`](Self::near_cosine) if `NEAR`, else [`cosine`](Self::cosine).
+    #[inline(always)]
+    #[must_use]
+    fn cosine_if<const NEAR: bool>(self) -> Self {
+        if NEAR { self.near_cosine() } else { self.cosine() }
+    }
+
     /// `exp(x)`, within one unit in the last place, and without a call, as [`sine`](Self::sine).
     #[must_use]
     fn exponential(self) -> Self;
@@ -151,7 +173,17 @@ impl ScalarFunctions for f64 {
         elementary::cosine(self)
     }
 
-    #[inline]
+    #[inline(always)]
+    fn near_sine(self) -> Self {
+        elementary::near_sine(self)
+    }
+
+    #[inline(always)]
+    fn near_cosine(self) -> Self {
+        elementary::near_cosine(self)
+    }
+
+    #[inline(always)]
     fn exponential(self) -> Self {
         elementary::exponential(self)
     }
@@ -261,6 +293,16 @@ impl ScalarFunctions for f32 {
     #[inline]
     fn cosine(self) -> Self {
         f64::from(self).cosine() as f32
+    }
+
+    #[inline(always)]
+    fn near_sine(self) -> Self {
+        f64::from(self).near_sine() as f32
+    }
+
+    #[inline(always)]
+    fn near_cosine(self) -> Self {
+        f64::from(self).near_cosine() as f32
     }
 
     #[inline]

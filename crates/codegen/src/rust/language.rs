@@ -26,7 +26,7 @@ pub(crate) struct Translator<'a> {
     runtime: String,
     /// The blocks behind placeholders; `None` where tokens are wanted.
     blocks: Option<&'a RefCell<Vec<String>>>,
-    /// Whether a constant `NEAR` says that logarithms of ratios may take their short form.
+    /// Whether a constant `NEAR` says that functions may take forms that are not for all numbers.
     tells_near: bool,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Translator<'a> {
         (statements, outputs.iter().map(|output| tokens(output)).collect())
     }
 
-    /// As [`statements`](Self::statements), with a constant `NEAR` that says whether logarithms of ratios may take their short form.
+    /// As [`statements`](Self::statements), with a constant `NEAR` that says whether functions may take forms that are not for all numbers.
     pub(crate) fn statements_if_near(&self, block: &Block<'_>) -> (TokenStream, Vec<TokenStream>) {
         Translator { tells_near: true, ..self.clone() }.statements(block)
     }
@@ -101,6 +101,9 @@ impl Target for Translator<'_> {
             Operation::Number(value) => return self.number(value).into(),
             Operation::Call(function, _) => {
                 return match function.rust() {
+                    RustCall::Method(name @ ("sine" | "cosine")) if self.tells_near => {
+                        format!("#.{name}_if::<NEAR>()")
+                    }
                     RustCall::Method(name) => format!("#.{name}()"),
                     RustCall::Library(name) => {
                         let libm = format!("{}::libm", self.runtime);

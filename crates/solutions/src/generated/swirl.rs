@@ -1342,8 +1342,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 6, 6> for Swirl<T> {
         let t16 = t15 * t15;
         let t19 = t14 * t16;
         let t20 = time[1] * t19;
-        let t21 = t20.sine();
-        let t26 = t20.cosine();
+        let t21 = t20.sine_if::<NEAR>();
+        let t26 = t20.cosine_if::<NEAR>();
         let t29 = point[2] * t21;
         let t30 = point[3] * t26;
         let t31 = t29 + t30;
@@ -1602,8 +1602,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 4, 2, 5> for Swirl<T> {
         let v = {
             let time = velocity_time;
             let t20 = time[0] * point[0];
-            let t21 = t20.sine();
-            let t26 = t20.cosine();
+            let t21 = t20.sine_if::<NEAR>();
+            let t26 = t20.cosine_if::<NEAR>();
             let t29 = point[1] * t21;
             let t30 = point[2] * t26;
             let t31 = t29 + t30;
@@ -1622,8 +1622,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 4, 2, 5> for Swirl<T> {
             crate::nalgebra::SVector::<T, 2>::new(t46, t49)
         };
         let t20 = time[1] * point[0];
-        let t21 = t20.sine();
-        let t26 = t20.cosine();
+        let t21 = t20.sine_if::<NEAR>();
+        let t26 = t20.cosine_if::<NEAR>();
         let t29 = point[1] * t21;
         let t30 = point[2] * t26;
         let t31 = t29 + t30;

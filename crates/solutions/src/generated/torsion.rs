@@ -722,8 +722,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 3, 4, 3> for Torsion<T> {
         point: &[T; 3],
     ) -> crate::nalgebra::SVector<T, 3> {
         let t12 = time[1] * point[0];
-        let t13 = t12.sine();
-        let t16 = t12.cosine();
+        let t13 = t12.sine_if::<NEAR>();
+        let t16 = t12.cosine_if::<NEAR>();
         let t17 = point[1] * t13;
         let t18 = point[2] * t16;
         let t19 = t17 + t18;
@@ -883,8 +883,8 @@ impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
         let v = {
             let time = velocity_time;
             let t12 = time[0] * point[0];
-            let t13 = t12.sine();
-            let t16 = t12.cosine();
+            let t13 = t12.sine_if::<NEAR>();
+            let t16 = t12.cosine_if::<NEAR>();
             let t17 = point[1] * t13;
             let t18 = point[2] * t16;
             let t19 = t17 + t18;
@@ -905,8 +905,8 @@ impl<T: crate::Real> crate::StateStages<T, 3, 3, 2, 3> for Torsion<T> {
             crate::nalgebra::SVector::<T, 3>::new(t39, t43, T::zero())
         };
         let t12 = time[0] * point[0];
-        let t13 = t12.sine();
-        let t16 = t12.cosine();
+        let t13 = t12.sine_if::<NEAR>();
+        let t16 = t12.cosine_if::<NEAR>();
         let t17 = point[1] * t13;
         let t18 = point[2] * t16;
         let t19 = t17 + t18;

@@ -1037,8 +1037,8 @@ impl<T: crate::Real> crate::BodyForceStages<T, 2, 8, 4> for Vortex<T> {
         let t19 = T::one() - t18;
         let t21 = t19 * t19;
         let t24 = time[0] * t21;
-        let t25 = t24.sine();
-        let t26 = t24.cosine();
+        let t25 = t24.sine_if::<NEAR>();
+        let t26 = t24.cosine_if::<NEAR>();
         let t42 = t25 * t25;
         let t43 = t26 * t26;
         let t44 = t42 - t43;
@@ -1166,8 +1166,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 8> for Vortex<T> {
         let v = {
             let time = velocity_time;
             let t24 = time[0] * point[4];
-            let t25 = t24.sine();
-            let t26 = t24.cosine();
+            let t25 = t24.sine_if::<NEAR>();
+            let t26 = t24.cosine_if::<NEAR>();
             let t42 = t25 * t25;
             let t43 = t26 * t26;
             let t44 = t42 - t43;
@@ -1188,8 +1188,8 @@ impl<T: crate::Real> crate::StateStages<T, 2, 5, 2, 8> for Vortex<T> {
             crate::nalgebra::SVector::<T, 2>::new(t55, t61)
         };
         let t24 = time[1] * point[4];
-        let t25 = t24.sine();
-        let t26 = t24.cosine();
+        let t25 = t24.sine_if::<NEAR>();
+        let t26 = t24.cosine_if::<NEAR>();
         let t27 = point[0] * t25;
         let t28 = point[1] * t26;
         let t29 = t27 + t28;
