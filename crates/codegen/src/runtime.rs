@@ -514,7 +514,7 @@ mod tests {
         use mmsmith_scalar_functions::ScalarFunctions as S;
         let arguments: Vec<f64> = (0..400)
             .map(|k| 0.013 * f64::from(k))
-            .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0])
+            .chain([1e-9, 0.999, 37.5, 1e4, 0.25, 0.5, 1.0, 1e6, 1.3e6, 7.7e9, 2.9e13])
             .collect();
         type Case = (&'static str, fn(f64) -> f64, bool);
         let cases: [Case; 17] = [

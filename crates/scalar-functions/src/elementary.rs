@@ -3,8 +3,12 @@
 //! Reduction and coefficients are those of Sun's fdlibm (`e_rem_pio2.c`, `k_sin.c`, `k_cos.c`, `e_exp.c`), whose approximations are
 //! within one unit in the last place. Generated code in other languages has these functions as text of its own, with the same bits.
 
-/// Angles beyond are reduced by the crate `libm`: a whole number of right angles times the parts of pi/2 is exact up to here.
+use crate::ScalarFunctions;
+
+/// A whole number of right angles times the parts of pi/2 is exact for angles up to here.
 const LARGEST_ANGLE: f64 = 1e6;
+/// Angles beyond, whose last digit is a hundredth, are left to the crate `libm`.
+const FARTHEST_ANGLE: f64 = 3e13;
 /// Adding it and taking it away rounds to a whole number.
 const SHIFT: f64 = 1.5 * 4_503_599_627_370_496.0;
 /// The largest number whose exponential is finite.
@@ -12,16 +16,22 @@ const LARGEST_EXPONENT: f64 = 709.782_712_893_384;
 /// The least number whose exponential is not zero.
 const LEAST_EXPONENT: f64 = -745.133_219_101_941_2;
 
-/// `sin(x)` of an angle in radians, within one unit in the last place.
+/// `sin(x)` of an angle in radians, within one unit in the last place, and beyond a million within 1e-18 besides.
 #[inline]
 pub(crate) fn sine(x: f64) -> f64 {
-    if x.abs() <= LARGEST_ANGLE { Angle::reduced(x).sine_and_quarters(0) } else { libm::sin(x) }
+    match Angle::of(x) {
+        Some(angle) => angle.sine_and_quarters(0),
+        None => libm::sin(x),
+    }
 }
 
 /// `cos(x)`, as [`sine`].
 #[inline]
 pub(crate) fn cosine(x: f64) -> f64 {
-    if x.abs() <= LARGEST_ANGLE { Angle::reduced(x).sine_and_quarters(1) } else { libm::cos(x) }
+    match Angle::of(x) {
+        Some(angle) => angle.sine_and_quarters(1),
+        None => libm::cos(x),
+    }
 }
 
 /// [`sine`] to the last bit, without a branch, of angles up to [`LARGEST_ANGLE`]; not a number beyond.
@@ -49,6 +59,30 @@ struct Angle {
 }
 
 impl Angle {
+    /// None of an angle that is too far, or no number.
+    #[inline]
+    fn of(x: f64) -> Option<Self> {
+        if x.abs() <= LARGEST_ANGLE {
+            Some(Self::reduced(x))
+        } else if x.abs() <= FARTHEST_ANGLE {
+            Some(Self::reduced_from_far(x))
+        } else {
+            None
+        }
+    }
+
+    /// Of angles up to [`FARTHEST_ANGLE`], with pi/2 in two doubles.
+    #[inline(never)]
+    fn reduced_from_far(x: f64) -> Self {
+        const REST: f64 = 6.123_233_995_736_766e-17;
+        let shifted = x * std::f64::consts::FRAC_2_PI + SHIFT;
+        let n = shifted - SHIFT;
+        let first = x - n * std::f64::consts::FRAC_PI_2;
+        let lost = n.product_error(std::f64::consts::FRAC_PI_2) + n * REST;
+        Self { quarters: shifted.to_bits(), rest: first - lost, tail: first.sum_error(-lost) }
+    }
+
+    /// Of angles up to [`LARGEST_ANGLE`].
     #[inline(always)]
     fn reduced(x: f64) -> Self {
         // pi/2 in parts of 33, 33 and 53 bits.
