@@ -80,7 +80,7 @@ pub use statics::{
 fn piece(numbers: usize) -> usize {
     const LEAST: usize = 1024;
     const MOST: usize = 8192;
-    match rayon::current_num_threads() {
+    match mmsmith_threads::parallel::current_num_threads() {
         1 => MOST,
         threads => numbers.div_ceil(4 * threads).clamp(LEAST, MOST),
     }

@@ -8,7 +8,7 @@
 use mmsmith_scalar_functions::ScalarFunctions;
 use std::ops::Range;
 
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 
 /// Values of several quantities at a position, at each of some times: `values[quantity][time]`.
 pub type Series = Vec<Vec<f64>>;

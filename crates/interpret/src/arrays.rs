@@ -7,7 +7,7 @@ use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_runtime::{AnySolution, BLOCK, Solution, Surface};
 use mmsmith_spec::Spec;
 use mmsmith_stage::{FieldName, Staged};
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 use std::sync::{Arc, OnceLock};
 
 /// Points that one thread does at a time: long against what starts it, and many such pieces for each thread.

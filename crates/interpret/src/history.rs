@@ -7,7 +7,7 @@ use mmsmith_history::{
 };
 use mmsmith_runtime::{Around, Domain, HistoryReport, Law, Real, ScalarFunctions, Smoothness};
 use mmsmith_stage::History;
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::{Arc, RwLock};

@@ -10,7 +10,7 @@ use crate::{InterpretError, Interpreted, resolve};
 use mmsmith_history::{AtPoint, HistoryError, Table};
 use mmsmith_spec::{Coordinates, Spec};
 use mmsmith_stage::Staged;
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 use std::fmt::Write;
 use thiserror::Error;
 

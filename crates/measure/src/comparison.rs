@@ -5,9 +5,9 @@ use std::ops::Range;
 use mmsmith_laws::{BlockWithMemory, Law, Stressed};
 use mmsmith_particles::Particles;
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
+use mmsmith_threads::parallel::*;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 use crate::homes::{GROUP, Holder, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
@@ -519,7 +519,7 @@ fn tallies<R, const N: usize>(
         if scales == [1.0; N] { tallies } else { pass(g, scales) }
     };
     let groups = count.div_ceil(GROUP);
-    let place = backwards(groups, rayon::current_num_threads());
+    let place = backwards(groups, current_num_threads());
     let at_places = each_group(groups, &|at| group(place(at)));
     (0..groups).map(|g| at_places[place(g)]).collect()
 }

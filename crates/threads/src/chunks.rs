@@ -6,7 +6,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 /// Calls `work` with the number of each chunk of `size` elements, and the chunk.
 pub fn each_chunk<A: Send>(array: &mut [A], size: usize, work: &(dyn Fn(usize, &mut [A]) + Sync)) {
@@ -43,6 +43,6 @@ fn numbers(count: usize, work: &(dyn Fn(usize) + Sync)) {
 
 /// Calls `work` with `(i, n)` for i from 0 to n - 1, for as many threads as the pool has, on those that have time.
 pub fn on_all_threads(work: &(dyn Fn((usize, usize)) + Sync)) {
-    let threads = rayon::current_num_threads();
+    let threads = current_num_threads();
     numbers(threads, &|thread| work((thread, threads)));
 }

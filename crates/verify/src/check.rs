@@ -10,8 +10,8 @@ use mmsmith_runtime::{
     AnySolution, Around, Boundary, ComponentCondition, Condition, Domain, Fields, Form, Solution,
     Surface,
 };
+use mmsmith_threads::parallel::*;
 use nalgebra::{SMatrix, SVector};
-use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 

@@ -5,8 +5,8 @@ use super::{Histories, Tables, is_identity, turn_tensor, turn_tensors, turn_vect
 use mmsmith_history::AtPoint;
 use mmsmith_runtime::Real;
 use mmsmith_runtime::nalgebra::SVector;
+use mmsmith_threads::parallel::*;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A field, or several, by their place among the quantities of tables.

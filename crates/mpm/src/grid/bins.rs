@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_particles::Division;
 use mmsmith_ranks::Ranks;
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 
 use crate::grid::division::division;
 use crate::grid::tiles::Tiles;

@@ -20,7 +20,7 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 use mmsmith_ranks::Ranks;
 use mmsmith_rare_states::{RareState, met_if};
-use rayon::prelude::*;
+use mmsmith_threads::parallel::*;
 
 use crate::grid::bins::{AddToBand, Bins};
 use crate::grid::geometry::Constants;
