@@ -531,6 +531,18 @@ pub fn dispatch<L: Loop>(work: L) {
     Scalar::new().vectorize(Instance(work, Scalar::new()));
 }
 
+/// Runs the widest instance of a loop over plain arrays that this processor supports.
+///
+/// A module of WebAssembly cannot ask which instructions its browser has, and has the instance for one number after the other alone.
+#[inline(always)]
+pub fn widest<W: WithSimd>(work: W) -> W::Output {
+    #[cfg(target_family = "wasm")]
+    let found = Scalar::new().vectorize(work);
+    #[cfg(not(target_family = "wasm"))]
+    let found = pulp::Arch::new().dispatch(work);
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

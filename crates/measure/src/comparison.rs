@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use mmsmith_lanes::simd::widest;
 use mmsmith_laws::{BlockWithMemory, Law, Stressed};
 use mmsmith_particles::Particles;
 use mmsmith_runtime::{BLOCK, Real, Solution, StateAtPoints, StateRun};
 use mmsmith_threads::parallel::*;
 use nalgebra::SVector;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use crate::homes::{GROUP, Holder, Homes};
 use crate::norms::{PerField, PerNorm, Tallies, Tally, is_squarable, magnitude};
@@ -220,7 +221,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
                     law.first_piola_kirchhoff_side_by_side(&run.F, &mut run.P);
                 }
             }
-            Arch::new().dispatch(Errors { run, exact, magnitudes });
+            widest(Errors { run, exact, magnitudes });
         }
     }
 }
@@ -507,7 +508,7 @@ fn tallies<R, const N: usize>(
             for (n, scale) in scales.into_iter().enumerate().filter(|(_, scale)| *scale != 1.0) {
                 chunk.iter_mut().for_each(|rows| rows[n].iter_mut().for_each(|m| *m /= scale));
             }
-            Arch::new().dispatch(Add { rows: chunk, tallies: &mut tallies });
+            widest(Add { rows: chunk, tallies: &mut tallies });
         }
         let mut scaled = tallies.map(|tallies| tallies.joined());
         scaled.iter_mut().zip(scales).for_each(|(tally, scale)| *tally = tally.divided_by(scale));

@@ -6,8 +6,9 @@
 //! time is short, and many points go through it at once.
 
 use crate::{Real, Solution};
+use mmsmith_lanes::simd::widest;
 use nalgebra::{SMatrix, SVector};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use std::array;
 use std::ops::Range;
 
@@ -474,7 +475,7 @@ impl<S, T: Real, const TIME: usize, const POINT: usize> StagedPoints<S, T, TIME,
         S: BodyForceStages<T, D, TIME, POINT>,
     {
         let Self { solution, values, len, .. } = self;
-        Arch::new().dispatch(Runs { solution, time, values, len: *len, numbers, b });
+        widest(Runs { solution, time, values, len: *len, numbers, b });
     }
 }
 
@@ -525,7 +526,7 @@ where
         let velocity_time = self.solution.velocity_time(velocity_time);
         let (time, velocity_time) = (&time, &velocity_time);
         let solution = &self.solution;
-        Arch::new().dispatch(BlocksOfStates { solution, time, velocity_time, blocks, runs });
+        widest(BlocksOfStates { solution, time, velocity_time, blocks, runs });
     }
 
     fn bytes_per_point(&self) -> usize {

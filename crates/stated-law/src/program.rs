@@ -2,9 +2,10 @@
 
 use crate::function::{self, Function, Parts};
 use crate::tape::{Node, Operation, Tape, Value};
+use mmsmith_lanes::simd::widest;
 use mmsmith_scalar_functions::ScalarFunctions;
 use nalgebra::RealField;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use std::any::Any;
 use std::cell::RefCell;
 
@@ -252,7 +253,7 @@ impl Program {
     ) {
         with_room(self.rows, |rows| {
             let mut valid = [true; N];
-            Arch::new().dispatch(Run { program: self, given, inputs, rows, valid: &mut valid });
+            widest(Run { program: self, given, inputs, rows, valid: &mut valid });
             for (output, result) in self.outputs.iter().zip(results) {
                 self.take(*output, part, rows, &valid, result);
             }

@@ -3,10 +3,11 @@
 use super::packed::{MOST_TERMS, Packed, PackedTime};
 use super::{Histories, Tables, is_identity, turn_tensor, turn_tensors, turn_vector};
 use mmsmith_history::AtPoint;
+use mmsmith_lanes::simd::widest;
 use mmsmith_runtime::Real;
 use mmsmith_runtime::nalgebra::SVector;
 use mmsmith_threads::parallel::*;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use std::sync::Arc;
 
 /// A field, or several, by their place among the quantities of tables.
@@ -196,7 +197,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
             && self.has(moment.t)
         {
             let forces = Forces { points: self, series, moment, particles, b };
-            return Arch::new().dispatch(forces);
+            return widest(forces);
         }
         for (n, b) in particles.iter().zip(b) {
             let own = self.body_force(*n as usize, moment);
