@@ -140,6 +140,7 @@
 //! # Modules
 //!
 //! - `scheme`: the choices. `simulation`: set-up and life cycle. `solver`: solvers of any scheme behind one door.
+//! - `every_scheme`: what the usual scheme does without, for builds of that one alone.
 //! - `particles`: what a particle has; bodies, and meshes of domains that share corners.
 //! - `grid`: memory layout, walls, ghost nodes, grid update. `shape`: shape functions and weights.
 //! - `domain`: the domains that weights are means over, of each particle alone or on shared corners.
@@ -148,6 +149,7 @@
 //! - `processes`: several processes, and the state to resume from.
 
 mod domain;
+mod every_scheme;
 mod grid;
 mod kernel;
 mod named;
@@ -160,6 +162,7 @@ mod solver;
 mod step;
 
 pub use domain::Shape;
+pub use every_scheme::EVERY_SCHEME;
 pub use grid::division::division_of_lattice;
 pub use mmsmith_lanes::simd::Registers;
 #[doc(hidden)]

@@ -12,6 +12,7 @@ use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::SharedCorners;
 use crate::domain::{self, Shape};
+use crate::every_scheme::{EVERY_SCHEME, beyond, is_compiled};
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
@@ -99,7 +100,7 @@ pub(crate) fn check<T: Lanes, const D: usize>(
         return Err(SetupError::Revolving { shape: settings.shape.to_string() });
     }
     check_domains(body, settings.shape)?;
-    check_mesh(grid, body, settings.shape, share)
+    if EVERY_SCHEME { check_mesh(grid, body, settings.shape, share) } else { Ok(()) }
 }
 
 fn check_particles<T: Lanes, const D: usize>(
@@ -263,15 +264,21 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     settings: &Settings<T>,
     share: Option<Share>,
 ) -> Result<State<T, D>, SetupError> {
+    let is_usual = is_compiled(settings) && share.is_none() && !law.is_projected();
+    if !EVERY_SCHEME && !is_usual {
+        return Err(SetupError::UsualSchemeOnly);
+    }
     let Settings { shape, integrator, transfer, .. } = *settings;
     let Body { mut particles, half_edges, mesh, revolves, sticks } = body;
+    // The same, as a constant.
+    let shape = if EVERY_SCHEME { shape } else { Shape::Gimp };
     let count = particles.x.len();
     let domain = match revolves {
         true => domain::revolving(shape, &particles.half_size, grid.spacing)
             .ok_or_else(|| SetupError::Revolving { shape: shape.to_string() })?,
         false => domain::new(shape, half_edges, &particles.half_size, grid.spacing),
     };
-    let corners = mesh.and_then(|mesh| {
+    let corners = mesh.filter(|_| EVERY_SCHEME).and_then(|mesh| {
         let at_corner = domain::at_corners(shape, &mesh)?;
         Some(SharedCorners::new(mesh, at_corner))
     });
@@ -289,7 +296,7 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         None => domain.most_nodes(),
     };
     let tiles = Tiles::new(&layout, &grid.cells, most_nodes);
-    let part = share.map(LocalBody::new);
+    let part = share.and_then(|share| beyond(LocalBody::new(share)));
     if let Some(part) = &part {
         admit(part.ranks.count(), &layout, &tiles)?;
         // The first sort tells which rows this process holds.
@@ -307,10 +314,10 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     let density = least(&mut mass.iter().zip(volume).map(|(&mass, &volume)| mass / volume));
     let mass_of_cell = density * grid.spacing.powi(D as i32);
     let uniform = particles.uniform();
-    let corners = corners.map(|corners| {
+    let corners = corners.and_then(|corners| {
         let (is_affine, reprojects) = (transfer.is_affine(), integrator.reprojects());
         let of_body = (mass_of_cell, law.follows_position());
-        Box::new(Corners::new(corners, of_body, is_affine, reprojects))
+        beyond(Corners::new(corners, of_body, is_affine, reprojects))
     });
     let constants = Constants::new(grid, &layout, &tiles, settings.time_step, least_mass);
     let bins = || {

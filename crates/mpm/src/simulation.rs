@@ -16,6 +16,7 @@ use nalgebra::RealField;
 use crate::domain::corner_exchange::invalidity_of_corner;
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::axis_too_large;
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::state::GridState;
 use crate::processes::decomposition::{LocalBody, Share};
 use crate::scheme::Settings;
@@ -164,7 +165,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         state.sort();
         state.start_affine();
-        if state.law.is_projected() {
+        if EVERY_SCHEME && state.law.is_projected() {
             state.project_volume(false);
         }
         Ok(Self { grid, law, settings, state, steps_done: 0, failed: None, own: None })
@@ -233,7 +234,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// Which particles this process holds, where there are several.
     pub fn arrangement(&self) -> Option<Arrangement<'_>> {
-        self.state.part.as_ref().map(LocalBody::arrangement)
+        self.state.part.as_deref().map(LocalBody::arrangement)
     }
 
     /// The domains of the particles at the current time, where they share corners.

@@ -166,6 +166,11 @@ pub enum SetupError {
          projected; leave --volume out, or write --formulation total-lagrangian --grid cylindrical"
     )]
     ProjectedHalfPlane,
+    /// Another scheme than the usual one, where the solver is compiled for that one alone.
+    #[error(
+        "the solver is compiled without the feature every-scheme: for gimp, cd and flip on one process"
+    )]
+    UsualSchemeOnly,
     /// More processes than a grid can be cut for.
     #[error(
         "{ranks} processes are more than the {most} that the rows of this grid can be shared out to; start {most} at most"

@@ -8,6 +8,11 @@ pub type SavedState = Vec<Vec<u8>>;
 /// A saved state that a simulation cannot go on from.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum SavedStateError {
+    /// The solver is compiled for the usual scheme alone, whose runs go on from no saved state.
+    #[error(
+        "the solver is compiled without the feature every-scheme, and goes on from no saved state"
+    )]
+    LeftOut,
     /// Another number of arrays.
     #[error("it has {found} arrays where this run has {expected}")]
     Arrays {

@@ -2,7 +2,7 @@
 
 use mmsmith_laws::{HalfPlane, ReturnMap, Stressed, Volume, with_memory, with_projected_volume};
 use mmsmith_mpm::fault::{Fault, Planted};
-use mmsmith_mpm::{Integrator, Law, Material, SetupError, Shape};
+use mmsmith_mpm::{EVERY_SCHEME, Integrator, Law, Material, SetupError, Shape};
 use mmsmith_runtime::{Real, Solution};
 use mmsmith_stated_law::Compiled;
 
@@ -147,6 +147,9 @@ impl Case {
             }
         }
         match self.scheme {
+            Scheme::Updated(updated) if !EVERY_SCHEME && updated != Updated::default() => {
+                Err(SetupError::UsualSchemeOnly.into())
+            }
             Scheme::Updated(Updated { integrator, start, .. })
                 if integrator != Integrator::Cd && start != Start::Halved =>
             {

@@ -1,7 +1,7 @@
 //! From a solution to a grid with walls and particles.
 
 use mmsmith_clip::Side;
-use mmsmith_mpm::Grid;
+use mmsmith_mpm::{EVERY_SCHEME, Grid};
 use mmsmith_runtime::{
     AnySolution, Around, Boundary, ComponentCondition, Condition, Domain, Real, Solution, Surface,
 };
@@ -222,7 +222,7 @@ impl<const D: usize> Scene<D> {
         let unknown = || SceneError::Unknown { what: "shape", value: format!("{domain:?}") };
         let size = points::size(&domain).ok_or_else(unknown)?;
         let placement = case.scheme.updated().map(|updated| updated.placement);
-        let clipped = placement.filter(|placement| placement.is_clipped());
+        let clipped = placement.filter(|placement| EVERY_SCHEME && placement.is_clipped());
         let quarter = quarter(solution, case.extent, clipped)?;
         let surfaces: Vec<Surface> = match domain {
             Domain::Annulus { .. } => vec![Surface::Inner, Surface::Outer],

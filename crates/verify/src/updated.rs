@@ -8,7 +8,8 @@ use std::sync::Arc;
 use mmsmith_clip::{Clip, Facet, Side};
 use mmsmith_laws::Hoop;
 use mmsmith_mpm::{
-    Annulus, Body, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share, Solver,
+    Annulus, Body, EVERY_SCHEME, Integrator, Law, Load, Mesh, Particles, Settings, Shape, Share,
+    Solver,
 };
 use mmsmith_ranks::{Ranks, total};
 use mmsmith_runtime::{Domain, Real, Solution};
@@ -170,12 +171,12 @@ fn body<T: Precision<D>, const D: usize>(
     };
     let (grid, exact_density, density) = (scene.grid::<T>(), density, T::nearest(density));
     let offset = match (updated.placement, &scene.domain) {
-        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) => {
+        (Placement::BodyFitted, &Domain::Annulus { inner, outer }) if EVERY_SCHEME => {
             let quarter = scene.extent() == Some(Extent::Quarter);
             let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
             return Ok(part(Body::annulus(&ring, grid.spacing, per_cell, density)?));
         }
-        (placement @ Placement::Clipped { .. }, _) => {
+        (placement @ Placement::Clipped { .. }, _) if EVERY_SCHEME => {
             return Ok(part(clipped(scene, placement, per_cell, exact_density)?));
         }
         (placement, _) => placement.offset(),
@@ -190,7 +191,7 @@ fn body<T: Precision<D>, const D: usize>(
         is_inside && own.as_ref().is_none_or(|own| own.contains(&number))
     };
     let mut body = match updated.shape {
-        Shape::Cpdi2 => Body::lattice(&grid, per_cell, density, inside),
+        Shape::Cpdi2 if EVERY_SCHEME => Body::lattice(&grid, per_cell, density, inside),
         _ => Particles::lattice(&grid, per_cell, density, inside).into(),
     };
     if offset != 0.0 {
@@ -232,7 +233,7 @@ pub(crate) fn set_up<T: Precision<D>, const D: usize>(
     let law = law_of::<T, D>(model, case)?;
     set_in_motion(&mut body.particles, exact, updated.start, time_step.to_f64());
     set_memory(&mut body.particles, exact, &law, time_step.to_f64());
-    if let Some(Mesh { X, x, .. }) = &mut body.mesh {
+    if EVERY_SCHEME && let Some(Mesh { X, x, .. }) = &mut body.mesh {
         let grid = scene.grid::<T>();
         for (x, X) in x.iter_mut().zip(X) {
             let place = X.map(Real::to_f64);

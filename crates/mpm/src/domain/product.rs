@@ -22,12 +22,12 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
     }
 
     fn beyond_box(&self) -> f64 {
-        self.on_axis.beyond_box()
+        self.on_axis().beyond_box()
     }
 
     fn most_nodes(&self) -> usize {
         let may_be_extended =
-            self.on_axis.stretches() || self.l.iter().any(|&l| l > self.extended_above());
+            self.on_axis().stretches() || self.l.iter().any(|&l| l > self.extended_above());
         if may_be_extended { EXTENDED } else { self.width() }
     }
 
@@ -47,7 +47,7 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
     fn are_valid(&self, of_block: OfBlock<'_, T, D>) -> bool {
         let mut all_valid = true;
         let (shape, all) = (self, &mut all_valid);
-        if self.on_axis.stretches() {
+        if self.on_axis().stretches() {
             dispatch(CheckBoxes::<_, D, true> { of_block, shape, all_valid: all });
         } else {
             dispatch(CheckBoxes::<_, D, false> { of_block, shape, all_valid: all });
@@ -71,7 +71,7 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
         let OfBlock { c, ids, tiles, kinematics: Kinematics { x, F } } = of_block;
         let (width, above) = (shape.width(), shape.extended_above());
         let more_nodes: T = real((EXTENDED - width) as f64);
-        let beyond: T = real(shape.on_axis.beyond_box());
+        let beyond: T = real(shape.on_axis().beyond_box());
         let half_size =
             |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]) + beyond;
         // By the lower edges, and the same where they would be for the last node of a box with extended support.

@@ -26,7 +26,7 @@ impl<T: Lanes> Domain<T, 3> for Revolving<T> {
     }
 
     fn beyond_box(&self) -> f64 {
-        self.0.on_axis.beyond_box()
+        self.0.on_axis().beyond_box()
     }
 
     fn most_nodes(&self) -> usize {

@@ -19,6 +19,7 @@ use mmsmith_particles::Division;
 use mmsmith_ranks::Ranks;
 use mmsmith_threads::parallel::*;
 
+use crate::every_scheme::{Beyond, beyond};
 use crate::grid::division::division;
 use crate::grid::tiles::Tiles;
 use crate::grid::{Layout, NODES_AT_ONCE};
@@ -40,7 +41,7 @@ pub(crate) struct Bins<N, const D: usize> {
     /// These buffers, between passes.
     buffers: TileBuffers<N>,
     /// The processes that hold all of them, where those are several.
-    ranks: Option<Arc<dyn Ranks>>,
+    ranks: Option<Beyond<Arc<dyn Ranks>>>,
     /// Particle numbers, tile after tile.
     order: Partition,
     /// Buffer of the two-colour schedule.
@@ -136,12 +137,12 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
 
     /// Shares the layers out among processes; [`hold`](Self::hold) has to follow.
     pub(crate) fn share_out(&mut self, ranks: Arc<dyn Ranks>) {
-        self.ranks = Some(ranks);
+        self.ranks = beyond(ranks);
     }
 
     /// The processes that hold all layers, where those are several.
     pub(crate) fn ranks(&self) -> Option<Arc<dyn Ranks>> {
-        self.ranks.clone()
+        self.ranks.as_deref().cloned()
     }
 
     /// The rows that other processes hold as well, at the lower and at the upper end of those here.

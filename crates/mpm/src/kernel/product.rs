@@ -7,10 +7,12 @@ use mmsmith_lanes::tensor::real;
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{SMatrix, SVector};
 
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
+use crate::kernel::beyond;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
@@ -63,20 +65,20 @@ pub(crate) struct ProductWeights<T, const D: usize> {
 macro_rules! dispatch_by_width {
     ($width:expr, true, $pass:ident<$($of:tt),*>, $block:expr) => {
         match $width {
-            2 => dispatch($pass::<$($of,)* 2, true>($block)),
-            3 => dispatch($pass::<$($of,)* 3, true>($block)),
-            _ => dispatch($pass::<$($of,)* 4, true>($block)),
+            2 if EVERY_SCHEME => dispatch($pass::<$($of,)* 2, true>($block)),
+            4 if EVERY_SCHEME => dispatch($pass::<$($of,)* 4, true>($block)),
+            _ => dispatch($pass::<$($of,)* 3, true>($block)),
         }
     };
     ($width:expr, false, $pass:ident<$($of:tt),*>, $block:expr) => {
         match $width {
-            2 => dispatch($pass::<$($of,)* 2, false>($block)),
-            3 => dispatch($pass::<$($of,)* 3, false>($block)),
-            _ => dispatch($pass::<$($of,)* 4, false>($block)),
+            2 if EVERY_SCHEME => dispatch($pass::<$($of,)* 2, false>($block)),
+            4 if EVERY_SCHEME => dispatch($pass::<$($of,)* 4, false>($block)),
+            _ => dispatch($pass::<$($of,)* 3, false>($block)),
         }
     };
     ($width:expr, $is_affine:expr, $pass:ident<$($of:tt),*>, $block:expr) => {
-        match $is_affine {
+        match EVERY_SCHEME && $is_affine {
             true => dispatch_by_width!($width, true, $pass<$($of),*>, $block),
             false => dispatch_by_width!($width, false, $pass<$($of),*>, $block),
         }
@@ -113,7 +115,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         let (is_affine, on_axis) = (self.is_affine, PhantomData::<R>);
         let weights = &mut *self;
         dispatch(Compute::<_, _, D, W, STRETCHING, false> { weights, c, kinematics, l, on_axis });
-        if is_affine {
+        if EVERY_SCHEME && is_affine {
             let weights = self;
             dispatch(Compute::<_, _, D, W, STRETCHING, true> {
                 weights,
@@ -148,15 +150,15 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
             (xi[a], l[a]) = (self.xi[a][k], self.l[a][k]);
             is_extended |= l[a] > self.shape.extended_above();
         }
-        is_extended.then_some(Extended { on_axis: self.shape.on_axis, xi, l })
+        is_extended.then_some(Extended { on_axis: self.shape.on_axis(), xi, l })
     }
 }
 
 impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
     fn compute(&mut self, c: &Constants<T, D>, _: &[u32], kinematics: Kinematics<'_, T, D>) {
         self.nodes_before = c.nodes_before as usize;
-        let ProductShape { on_axis, l } = self.shape;
-        match on_axis {
+        let l = self.shape.l;
+        match self.shape.on_axis() {
             OnAxis::Hat => self.compute_on_axes::<Hat, 2, false>(c, &l, kinematics),
             OnAxis::FixedBox => self.compute_on_axes::<Gimp, 3, false>(c, &l, kinematics),
             OnAxis::StretchingBox => self.compute_on_axes::<Gimp, 3, true>(c, &l, kinematics),
@@ -188,6 +190,9 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
         nodes: &[Node<T, D>],
         receiver: &mut [Interpolated<T, D>],
     ) {
+        if !EVERY_SCHEME {
+            beyond("values that the usual scheme stores nowhere");
+        }
         let count = receiver.len();
         if !self.is_affine {
             self.g2p_with(strides, nodes, count, receiver);

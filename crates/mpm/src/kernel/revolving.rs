@@ -18,6 +18,7 @@ use mmsmith_lanes::tensor::real;
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{Matrix2, Matrix3, RealField, Vector2, Vector3};
 
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::PAD_BELOW;
 use crate::grid::geometry::Constants;
 use crate::grid::node::{Components, LANES, Node};

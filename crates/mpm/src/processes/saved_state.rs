@@ -15,6 +15,7 @@ use mmsmith_ranks::total;
 use nalgebra::SVector;
 
 use crate::domain::corners::Corners;
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::state::GridState;
 use crate::simulation::Simulation;
 use crate::step::state::State;
@@ -241,6 +242,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// See [`take_up`](Self::take_up).
     pub(crate) fn put(&mut self, parts: Vec<SavedState>) -> Result<(), SavedStateError> {
+        if !EVERY_SCHEME {
+            return Err(SavedStateError::LeftOut);
+        }
         // The grid no longer belongs to the particles.
         self.state.grid.is_ahead = false;
         self.steps_done = self.state.take_up(parts)?;

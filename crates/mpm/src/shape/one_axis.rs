@@ -9,6 +9,7 @@
 use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SVector};
 
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::PAD_BELOW;
 
 /// Largest supported half-size of a particle's box, in cells.
@@ -225,18 +226,24 @@ pub(crate) struct ProductShape<T, const D: usize> {
 }
 
 impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
+    /// The shape function on an axis; a constant in builds of the usual scheme alone.
+    #[inline(always)]
+    pub(crate) fn on_axis(&self) -> OnAxis {
+        if EVERY_SCHEME { self.on_axis } else { OnAxis::StretchingBox }
+    }
+
     /// Half-size of a box along an axis, in cells, for the diagonal entry `F_aa` of the deformation gradient.
     pub(crate) fn half_size(&self, axis: usize, F_aa: T) -> T {
-        let of_box = match self.on_axis.stretches() {
+        let of_box = match self.on_axis().stretches() {
             true => half_size::<_, true>(self.l[axis], F_aa),
             false => half_size::<_, false>(self.l[axis], F_aa),
         };
-        of_box + real(self.on_axis.beyond_box())
+        of_box + real(self.on_axis().beyond_box())
     }
 
     /// Nodes along each axis, except for a box with extended support.
     pub(crate) fn width(&self) -> usize {
-        match self.on_axis {
+        match self.on_axis() {
             OnAxis::Hat => 2,
             OnAxis::FixedBox | OnAxis::StretchingBox | OnAxis::Quadratic => 3,
             OnAxis::Cubic | OnAxis::QuadraticMean => 4,
@@ -251,7 +258,7 @@ impl<T: RealField + Copy, const D: usize> ProductShape<T, D> {
 
     /// Half-size beyond which the support is extended.
     pub(crate) fn extended_above(&self) -> T {
-        match self.on_axis {
+        match self.on_axis() {
             OnAxis::FixedBox | OnAxis::StretchingBox => real(0.5),
             OnAxis::QuadraticMean => real(1.0),
             OnAxis::Hat | OnAxis::Quadratic | OnAxis::Cubic => real(HALF_SIZE_LIMIT),

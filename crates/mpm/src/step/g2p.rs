@@ -18,6 +18,7 @@ use crate::domain::corner_exchange;
 use crate::domain::corners::{Corners, grid_values, reprojected_values};
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::SharedCorners;
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
@@ -171,7 +172,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
 
     /// APIC: the affine velocities of particles that have none yet are those of their velocities on the grid.
     pub(crate) fn start_affine(&mut self) {
-        if !self.transfer.is_affine() {
+        if !EVERY_SCHEME || !self.transfer.is_affine() {
             return;
         }
         self.p2g_momentum();

@@ -14,6 +14,7 @@ use mmsmith_particles::columns::{
 };
 
 use crate::domain::of_particles::{Domain, OfBlock};
+use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::bins::Band;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
@@ -131,7 +132,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         }
         forcing.evaluate(ids, x, &mut contributions.b);
         let interpolated = &mut interpolated[..ids.len()];
-        if transfer != Transfer::Flip {
+        if EVERY_SCHEME && transfer != Transfer::Flip {
             weights.g2p(&c.strides, nodes, interpolated);
             let mut own = particles.first(ids.len());
             let follow = Follow { c, law, late: c.time_step, early: None };

@@ -18,6 +18,7 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
 use mmsmith_particles::{BodyForce, Pass};
 
+use crate::every_scheme::EVERY_SCHEME;
 use crate::scheme::{Integrator, Transfer, VelocityUpdate};
 use crate::step::health::Outcome;
 use crate::step::state::State;
@@ -52,7 +53,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
             corners.shared.recompute_shares();
         }
         let projects = self.law.is_projected();
-        if is_fused(integrator, self.transfer) && !projects {
+        if !EVERY_SCHEME || (is_fused(integrator, self.transfer) && !projects) {
             return match self.corners {
                 Some(_) => {
                     self.timed(Pass::AtCorners, |state| state.step_at_corners(body_force, times))

@@ -15,6 +15,7 @@ use crate::domain::corner_exchange::{ChunkSums, Exchange, Loading};
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
+use crate::every_scheme::Beyond;
 use crate::grid::bins::{Band, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
@@ -174,7 +175,7 @@ pub(crate) type TwoStages<'a, T, const D: usize> =
     (&'a SharedCorners<T, D>, &'a mut Exchange<T, D>);
 
 pub(crate) fn two_stages<T, const D: usize>(
-    corners: &mut Option<Box<Corners<T, D>>>,
+    corners: &mut Option<Beyond<Corners<T, D>>>,
 ) -> Option<TwoStages<'_, T, D>> {
     let Corners { shared, exchange, .. } = &mut **corners.as_mut()?;
     Some((shared, exchange))

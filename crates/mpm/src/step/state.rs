@@ -7,6 +7,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
+use crate::every_scheme::Beyond;
 use crate::grid::geometry::Constants;
 use crate::grid::state::GridState;
 use crate::kernel::block::BlockLaw;
@@ -22,7 +23,7 @@ pub(crate) struct State<T, const D: usize> {
     /// The domains by which particles reach nodes, or else the corners that they share.
     pub(crate) domain: Box<dyn Domain<T, D>>,
     /// The corners that particles share, where they do.
-    pub(crate) corners: Option<Box<Corners<T, D>>>,
+    pub(crate) corners: Option<Beyond<Corners<T, D>>>,
     pub(crate) law: Box<dyn BlockLaw<T, D>>,
     pub(crate) transfer: Transfer,
     /// How many elements a particle has in the columns that steps change.
@@ -32,7 +33,7 @@ pub(crate) struct State<T, const D: usize> {
     /// The grid, with the particles sorted by tile.
     pub(crate) grid: GridState<T, D>,
     /// Where other processes hold the rest of the body: this one's part.
-    pub(crate) part: Option<LocalBody>,
+    pub(crate) part: Option<Beyond<LocalBody>>,
     /// Particles after the early part of a step.
     pub(crate) early: EarlyState<T, D>,
     /// Buffers for blocks of particles.
