@@ -79,6 +79,10 @@ impl<'a> Outputs<'a> {
     }
 }
 
+/// Whether runs give their rows and nothing else: modules of WebAssembly have no files and no other process, and are compiled without what
+/// serves these.
+const ROWS_ALONE: bool = cfg!(target_family = "wasm");
+
 /// Messages that one of several processes sent to the others, from the first step to the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunTraffic {
@@ -295,7 +299,7 @@ where
     let &OnGrid { exact, steps, .. } = on_grid;
     let mut counters = None;
     let mut of_steps = None;
-    if let Some(ranks) = outputs.ranks.take() {
+    if let Some(ranks) = outputs.ranks.take().filter(|_| !ROWS_ALONE) {
         let (stepping, measuring) = (counted(ranks.clone()), counted(ranks));
         counters = Some(Counters { stepping: stepping.1, measuring: measuring.1 });
         (of_steps, outputs.ranks) = (Some(stepping.0), Some(measuring.0));
@@ -417,7 +421,7 @@ where
         let Outputs { progress, frames, snapshot, checkpoints, history, ranks, until, .. } =
             outputs;
         // What is kept of particles is of those that are here then.
-        let resumed = match checkpoints.filter(|checkpoints| checkpoints.resume) {
+        let resumed = match checkpoints.filter(|checkpoints| !ROWS_ALONE && checkpoints.resume) {
             Some(checkpoints) => take_up(checkpoints, driven, ranks.as_deref())?,
             None => None,
         };
@@ -426,12 +430,16 @@ where
         let measurement = Measurement::new(exact, solver, ranks.as_ref());
         let is_first = ranks.as_deref().is_none_or(|ranks| ranks.rank() == 0);
         let frames = match frames {
-            Some(output) => Some(FrameWriter::new(output, steps.count, lag, is_first)?),
-            None => None,
+            Some(output) if !ROWS_ALONE => {
+                Some(FrameWriter::new(output, steps.count, lag, is_first)?)
+            }
+            _ => None,
         };
         let recorder = match history {
-            Some(moments) => Some(Recorder::new(moments, exact, law_of_body(exact)?, steps.count)),
-            None => None,
+            Some(moments) if !ROWS_ALONE => {
+                Some(Recorder::new(moments, exact, law_of_body(exact)?, steps.count))
+            }
+            _ => None,
         };
         let mut watch = Self {
             on_grid,
@@ -454,8 +462,8 @@ where
             until: *until,
         };
         match resumed {
-            Some((reached, history)) => watch.resume(reached, history, driven.dt)?,
-            None => watch.start(driven.solver.as_mut())?,
+            Some((reached, history)) if !ROWS_ALONE => watch.resume(reached, history, driven.dt)?,
+            _ => watch.start(driven.solver.as_mut())?,
         }
         let begun = watch.reached.step;
         Ok((watch, begun))
@@ -491,6 +499,9 @@ where
         step: u64,
         time: f64,
     ) -> Result<(), CaseError> {
+        if ROWS_ALONE {
+            return Ok(());
+        }
         let &OnGrid { exact, steps, .. } = self.on_grid;
         if let Some(frames) = &mut self.frames {
             frames.write(solver.observe(), self.measurement.held(), exact, (step, time))?;
@@ -509,7 +520,7 @@ where
         times: (f64, f64),
         u: PerNorm<f64>,
     ) {
-        if let Some(recorder) = &mut self.recorder {
+        if let Some(recorder) = self.recorder.as_mut().filter(|_| !ROWS_ALONE) {
             let particles = solver.observe().0;
             recorder.take((particles, self.measurement.homes()), step, times, u);
         }
@@ -546,7 +557,7 @@ where
         if let Some(end) = end {
             return Ok(ControlFlow::Break(end));
         }
-        if let Some(checkpoints) = self.checkpoints
+        if let Some(checkpoints) = self.checkpoints.filter(|_| !ROWS_ALONE)
             && (step % checkpoints.every == 0 || is_interrupted)
         {
             let history = self.recorder.as_ref().map_or(&[][..], Recorder::moments);
