@@ -120,12 +120,6 @@ impl<'a> Code<'a> {
         })
     }
 
-    /// Whether an operation is a power with an exponent that neither products nor roots form.
-    pub(crate) fn has_powers(&self) -> bool {
-        let mut operations = self.staged.program().operations().iter();
-        operations.any(|operation| matches!(operation, Operation::Power(..)))
-    }
-
     /// The displacement and the law, a line each.
     pub(crate) fn formulas(&self) -> Vec<String> {
         let spec = self.spec;

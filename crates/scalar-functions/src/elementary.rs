@@ -59,7 +59,7 @@ struct Angle {
 }
 
 impl Angle {
-    /// None of an angle that is too far, or no number.
+    /// Reduces angles; `None` of what is too far, or no number.
     #[inline]
     fn of(x: f64) -> Option<Self> {
         if x.abs() <= LARGEST_ANGLE {
@@ -71,7 +71,7 @@ impl Angle {
         }
     }
 
-    /// Of angles up to [`FARTHEST_ANGLE`], with pi/2 in two doubles.
+    /// Reduces angles up to [`FARTHEST_ANGLE`], with pi/2 in two doubles.
     #[inline(never)]
     fn reduced_from_far(x: f64) -> Self {
         const REST: f64 = 6.123_233_995_736_766e-17;
@@ -82,7 +82,7 @@ impl Angle {
         Self { quarters: shifted.to_bits(), rest: first - lost, tail: first.sum_error(-lost) }
     }
 
-    /// Of angles up to [`LARGEST_ANGLE`].
+    /// Reduces angles up to [`LARGEST_ANGLE`].
     #[inline(always)]
     fn reduced(x: f64) -> Self {
         // pi/2 in parts of 33, 33 and 53 bits.

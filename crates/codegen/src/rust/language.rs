@@ -88,7 +88,7 @@ impl Target for Translator<'_> {
     fn function(&self, function: Called) -> Cow<'static, str> {
         let (Called::Library(name) | Called::Support(name)) = function;
         let name = match function {
-            Called::Library("pow") => "power",
+            Called::Library("pow") => "powf",
             Called::Library("atan2") => "polar_angle",
             _ => name,
         };

@@ -133,7 +133,7 @@ impl Code<'_> {
         let called =
             |function: &&Function| function.own().is_none() && self.calls(|f| f == **function);
         let foreign = Function::ALL.iter().filter(called).filter_map(|function| function.math_h());
-        lines.extend(foreign.chain(self.has_powers().then_some("pow")).map(|name| {
+        lines.extend(foreign.map(|name| {
             format!("Of {name} the Rust functions have the last bits of another library.")
         }));
         commented(&lines, " *", 115)

@@ -108,7 +108,7 @@ impl Operation {
             Operation::Sqrt(a) => of(a).map(T::sqrt),
             Operation::Power(a, ref exponent) => {
                 let exponent = T::rounded(nearest_f64(exponent));
-                of(a).map(|a| a.power(exponent))
+                of(a).map(|a| a.powf(exponent))
             }
             Operation::SinPi(a) => of(a).map(T::sin_pi),
             Operation::CosPi(a) => of(a).map(T::cos_pi),

@@ -22,7 +22,7 @@ fn cases() -> Vec<Case> {
         (Operation::Div(x, y), |x, y| x / y, [0, 0, 1, 0, 0]),
         (Operation::Neg(y), |_, y| -y, [1, 0, 0, 0, 0]),
         (Operation::Sqrt(x), |x, _| x.sqrt(), [0, 0, 0, 1, 0]),
-        (Operation::Power(x, third), |x, _| x.power(1.0 / 3.0), [0, 0, 0, 0, 1]),
+        (Operation::Power(x, third), |x, _| x.powf(1.0 / 3.0), [0, 0, 0, 0, 1]),
         (Operation::Atan2(x, y), |x, y| x.polar_angle(y), [0, 0, 0, 0, 1]),
         // What one operation takes, and what is left of it (T. J. Dekker, 1971).
         (Operation::SumError(x, y), |x, y| two_sum(x, y), [5, 0, 0, 0, 0]),
