@@ -1,25 +1,16 @@
-//! What the usual scheme does without.
+//! Builds of the usual scheme alone.
 //!
 //! Without the feature `every-scheme` the crate runs the usual scheme alone, on one process and from the start, and refuses every other:
 //! boxes that stretch (`gimp`), centred differences, FLIP, the change of volume at each particle. The module of the page is compiled so.
 //! What other schemes have besides lies [beyond](Beyond) it: there is no such value then, and the compiler leaves out all that is done
 //! with one.
 
-use crate::domain::Shape;
-use crate::scheme::{Integrator, Settings, Transfer};
-
 /// Whether the crate is compiled for every scheme.
 pub const EVERY_SCHEME: bool = cfg!(feature = "every-scheme");
 
-/// Whether the crate is compiled for these settings.
-pub(crate) fn is_compiled<T>(settings: &Settings<T>) -> bool {
-    let Settings { shape, integrator, transfer, .. } = *settings;
-    EVERY_SCHEME || (shape, integrator, transfer) == (Shape::Gimp, Integrator::Cd, Transfer::Flip)
-}
-
 #[cfg(feature = "every-scheme")]
 mod beyond {
-    /// What only other schemes than the usual one have.
+    /// Parts that only other schemes than the usual one have.
     pub(crate) type Beyond<A> = Box<A>;
 
     /// A value, where there are other schemes.
@@ -34,7 +25,7 @@ mod beyond {
     use std::marker::PhantomData;
     use std::ops::{Deref, DerefMut};
 
-    /// What only other schemes than the usual one have: nothing is.
+    /// Parts that only other schemes than the usual one have: no value has this type.
     pub(crate) struct Beyond<A>(Infallible, PhantomData<A>);
 
     /// A value, where there are other schemes.

@@ -140,7 +140,7 @@
 //! # Modules
 //!
 //! - `scheme`: the choices. `simulation`: set-up and life cycle. `solver`: solvers of any scheme behind one door.
-//! - `every_scheme`: what the usual scheme does without, for builds of that one alone.
+//! - `every_scheme`: builds of the usual scheme alone.
 //! - `particles`: what a particle has; bodies, and meshes of domains that share corners.
 //! - `grid`: memory layout, walls, ghost nodes, grid update. `shape`: shape functions and weights.
 //! - `domain`: the domains that weights are means over, of each particle alone or on shared corners.

@@ -12,7 +12,7 @@ use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::SharedCorners;
 use crate::domain::{self, Shape};
-use crate::every_scheme::{EVERY_SCHEME, beyond, is_compiled};
+use crate::every_scheme::{EVERY_SCHEME, beyond};
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
@@ -24,7 +24,7 @@ use crate::kernel::buffers::BufferPool;
 use crate::kernel::half_plane;
 use crate::kernel::projected::ProjectedBlocks;
 use crate::processes::decomposition::{LocalBody, Share, admit};
-use crate::scheme::{Settings, VelocityUpdate};
+use crate::scheme::{Integrator, Settings, Transfer, VelocityUpdate};
 use crate::step::is_fused;
 use crate::step::passes::Passes;
 use crate::step::state::{EarlyState, State};
@@ -61,6 +61,12 @@ pub(crate) fn of_blocks<T: Lanes, const D: usize>(law: &Law<T, D>) -> Box<dyn Bl
         };
     }
     Box::new(AnyLaw(planted.law_in_stresses(material)))
+}
+
+/// Whether the crate is compiled for these settings.
+fn is_compiled<T>(settings: &Settings<T>) -> bool {
+    let Settings { shape, integrator, transfer, .. } = *settings;
+    EVERY_SCHEME || (shape, integrator, transfer) == (Shape::Gimp, Integrator::Cd, Transfer::Flip)
 }
 
 /// Refuses a quantity that is not a positive number.

@@ -18,7 +18,7 @@ mod one_thread {
         1
     }
 
-    /// What has elements of its own.
+    /// Collections with elements of their own.
     pub trait IntoParallelIterator: IntoIterator + Sized {
         /// The elements.
         fn into_par_iter(self) -> Self::IntoIter {

@@ -112,7 +112,7 @@ fn functions_of_another_library_are_named() {
         };
         assert!(header.contains(&format!("{called}(X[0])")), "{}", function.name());
         let note = format!("Of {called} the Rust functions");
-        let foreign = function.own().is_none();
+        let foreign = function.is_of_another_library();
         assert_eq!(header.contains(&note), foreign, "{}", function.name());
     }
 }

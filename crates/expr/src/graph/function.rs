@@ -265,9 +265,9 @@ functions! {
         differential: "exp(x)*dx",
         difference: "exp(a)*expm1(b)",
         at_zero: "0",
-        double: libm::expm1,
-        single: libm::expm1f,
-        rust: RustCall::Library("expm1"),
+        double: f64::exp_m1,
+        single: f32::exp_m1,
+        rust: RustCall::Method("exp_m1"),
         math_h: Some("expm1"),
     }
     /// Error function: `2/sqrt(Pi)` times the integral of `exp(-s^2)` from zero to `x`.
@@ -431,6 +431,12 @@ impl Function {
     #[must_use]
     pub fn own(self) -> Option<&'static str> {
         self.row().own
+    }
+
+    /// Whether Rust and C take it from different libraries, so that last bits may differ.
+    #[must_use]
+    pub fn is_of_another_library(self) -> bool {
+        matches!(self.row().rust, RustCall::Library(_)) || self == Function::Atan2
     }
 
     /// Its name in `math.h`, if it has one.

@@ -41,7 +41,7 @@ fn cases() -> Vec<Case> {
         (Function::Exp, |x, _| x.exponential()),
         (Function::Ln, |x, _| x.logarithm()),
         (Function::Ln1p, |x, _| x.log_1p()),
-        (Function::Expm1, |x, _| libm::expm1(x)),
+        (Function::Expm1, |x, _| x.exp_m1()),
     ];
     let call = |(function, value)| (Operation::Call(function, x), value, [0, 0, 0, 0, 1]);
     cases.extend(functions.map(call));
