@@ -130,8 +130,9 @@ impl Code<'_> {
 
     fn c_head(&self, name: &str) -> String {
         let mut lines = self.head_for_host(&REMARKS.replace("NAME", name));
-        let called =
-            |function: &&Function| function.own().is_none() && self.calls(|f| f == **function);
+        let called = |function: &&Function| {
+            function.is_of_another_library() && self.calls(|f| f == **function)
+        };
         let foreign = Function::ALL.iter().filter(called).filter_map(|function| function.math_h());
         lines.extend(foreign.map(|name| {
             format!("Of {name} the Rust functions have the last bits of another library.")
