@@ -142,8 +142,8 @@ fn sines_and_exponentials_are_the_nearest_numbers() {
         found("cosine", x.cosine(), wide.cos(), ROUNDED);
         // Beyond half a unit above the largest number.
         let exponential = wide.exp();
-        let is_finite = exponential < 3.402_823_567_797_336_6e38;
-        let exponential = if is_finite { exponential } else { f64::INFINITY };
+        let is_too_large = exponential >= 3.402_823_567_797_336_6e38;
+        let exponential = if is_too_large { f64::INFINITY } else { exponential };
         found("exponential", x.exponential(), exponential, ROUNDED);
         found("logarithm", x.logarithm(), wide.ln(), ROUNDED);
     }));
