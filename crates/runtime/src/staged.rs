@@ -169,7 +169,7 @@ pub trait BodyForceStages<T: Real, const D: usize, const TIME: usize, const POIN
     /// [`Solution::body_force`] but for rounding.
     ///
     /// If `NEAR`, logarithms of ratios take the form near one (`Real::ln_near_one`), and sines and cosines the form of angles up to a million
-    /// (`Real::near_sine`): the result is the same to the last bit, or NaN.
+    /// (`Real::sine_in_range`): the result is the same to the last bit, or NaN.
     fn body_force_staged<const NEAR: bool>(
         &self,
         time: &[T; TIME],

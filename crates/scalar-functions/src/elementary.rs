@@ -36,14 +36,14 @@ pub(crate) fn cosine(x: f64) -> f64 {
 
 /// [`sine`] to the last bit, without a branch, of angles up to [`LARGEST_ANGLE`]; not a number beyond.
 #[inline(always)]
-pub(crate) fn near_sine(x: f64) -> f64 {
+pub(crate) fn sine_in_range(x: f64) -> f64 {
     let value = Angle::reduced(x).sine_and_quarters(0);
     if x.abs() <= LARGEST_ANGLE { value } else { f64::NAN }
 }
 
-/// [`cosine`], as [`near_sine`].
+/// [`cosine`], as [`sine_in_range`].
 #[inline(always)]
-pub(crate) fn near_cosine(x: f64) -> f64 {
+pub(crate) fn cosine_in_range(x: f64) -> f64 {
     let value = Angle::reduced(x).sine_and_quarters(1);
     if x.abs() <= LARGEST_ANGLE { value } else { f64::NAN }
 }
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn near_forms_have_the_same_bits_or_are_no_numbers() {
+    fn forms_in_range_have_the_same_bits_or_are_no_numbers() {
         for n in -3_000..3_000 {
             let x = f64::from(n) * 0.731 * f64::from(n).abs().max(1.0);
             let near = x.abs() <= LARGEST_ANGLE;
@@ -218,9 +218,9 @@ mod tests {
                 true => found.to_bits() == expected.to_bits(),
                 false => found.is_nan(),
             };
-            assert!(same(near_sine(x), sine(x)) && same(near_cosine(x), cosine(x)), "{x}");
+            assert!(same(sine_in_range(x), sine(x)) && same(cosine_in_range(x), cosine(x)), "{x}");
         }
-        assert!(near_sine(f64::INFINITY).is_nan() && near_cosine(f64::NAN).is_nan());
+        assert!(sine_in_range(f64::INFINITY).is_nan() && cosine_in_range(f64::NAN).is_nan());
     }
 
     #[test]
@@ -230,6 +230,14 @@ mod tests {
                 (sine(x) - x.sin()).abs() < 1e-15 && (cosine(x) - x.cos()).abs() < 1e-15,
                 "{x}"
             );
+        }
+        // Angles that are reduced from far, and farther ones.
+        for n in 0..20_000 {
+            let x = 1e6 * (1.0 + 1e-3 * f64::from(n)).powi(5);
+            for x in [x, -x, f64::MAX / x] {
+                let (of_sine, of_cosine) = (sine(x) - x.sin(), cosine(x) - x.cos());
+                assert!(of_sine.abs() < 1.2e-16 && of_cosine.abs() < 1.2e-16, "{x}");
+            }
         }
         assert!(
             sine(f64::INFINITY).is_nan()

@@ -35,24 +35,24 @@ pub trait ScalarFunctions: Copy + Add<Output = Self> + Sub<Output = Self> {
 
     /// [`sine`](Self::sine) to the last bit, without a branch, of angles up to a million; not a number beyond.
     #[must_use]
-    fn near_sine(self) -> Self;
+    fn sine_in_range(self) -> Self;
 
-    /// [`cosine`](Self::cosine), as [`near_sine`](Self::near_sine).
+    /// [`cosine`](Self::cosine), as [`sine_in_range`](Self::sine_in_range).
     #[must_use]
-    fn near_cosine(self) -> Self;
+    fn cosine_in_range(self) -> Self;
 
-    /// [`near_sine`](Self::near_sine) if `NEAR`, else [`sine`](Self::sine).
+    /// [`sine_in_range`](Self::sine_in_range) if `NEAR`, else [`sine`](Self::sine).
     #[inline(always)]
     #[must_use]
     fn sine_if<const NEAR: bool>(self) -> Self {
-        if NEAR { self.near_sine() } else { self.sine() }
+        if NEAR { self.sine_in_range() } else { self.sine() }
     }
 
-    /// [`near_cosine`](Self::near_cosine) if `NEAR`, else [`cosine`](Self::cosine).
+    /// [`cosine_in_range`](Self::cosine_in_range) if `NEAR`, else [`cosine`](Self::cosine).
     #[inline(always)]
     #[must_use]
     fn cosine_if<const NEAR: bool>(self) -> Self {
-        if NEAR { self.near_cosine() } else { self.cosine() }
+        if NEAR { self.cosine_in_range() } else { self.cosine() }
     }
 
     /// `exp(x)`, within one unit in the last place, and without a call, as [`sine`](Self::sine).
@@ -174,13 +174,13 @@ impl ScalarFunctions for f64 {
     }
 
     #[inline(always)]
-    fn near_sine(self) -> Self {
-        elementary::near_sine(self)
+    fn sine_in_range(self) -> Self {
+        elementary::sine_in_range(self)
     }
 
     #[inline(always)]
-    fn near_cosine(self) -> Self {
-        elementary::near_cosine(self)
+    fn cosine_in_range(self) -> Self {
+        elementary::cosine_in_range(self)
     }
 
     #[inline(always)]
@@ -296,13 +296,13 @@ impl ScalarFunctions for f32 {
     }
 
     #[inline(always)]
-    fn near_sine(self) -> Self {
-        f64::from(self).near_sine() as f32
+    fn sine_in_range(self) -> Self {
+        f64::from(self).sine_in_range() as f32
     }
 
     #[inline(always)]
-    fn near_cosine(self) -> Self {
-        f64::from(self).near_cosine() as f32
+    fn cosine_in_range(self) -> Self {
+        f64::from(self).cosine_in_range() as f32
     }
 
     #[inline]
