@@ -286,7 +286,7 @@ functions! {
         names: &["atan2"],
         arguments: &["y", "x"],
         differential: "(x*dy - y*dx)/(x^2 + y^2)",
-        rust: RustCall::Method("polar_angle"),
+        rust: RustCall::Library("atan2"),
         math_h: Some("atan2"),
     }
     /// `arcosh(1 + z)^2`: the squared logarithm of `a/b` for `z = (a - b)^2/(2 a b)`, smooth at zero.
@@ -436,7 +436,7 @@ impl Function {
     /// Whether Rust and C take it from different libraries, so that last bits may differ.
     #[must_use]
     pub fn is_of_another_library(self) -> bool {
-        matches!(self.row().rust, RustCall::Library(_)) || self == Function::Atan2
+        matches!(self.row().rust, RustCall::Library(_))
     }
 
     /// Its name in `math.h`, if it has one.
