@@ -89,7 +89,7 @@ pub struct Graph {
     /// Results of [`Graph::open`].
     pub(crate) open: NumberMap<Expr, Expr>,
     /// Results of [`Graph::residue`].
-    pub(crate) residues: NumberMap<Expr, Option<u64>>,
+    pub(crate) residues: NumberMap<(usize, Expr), Option<u64>>,
 }
 
 /// A map whose keys are small numbers. Nothing may depend on the order of its entries.

@@ -13,26 +13,36 @@ use std::hash::{Hash, Hasher};
 /// The Mersenne prime `2^61 - 1`.
 const PRIME: u64 = (1 << 61) - 1;
 
+/// Choices of values that are tried. One number in two has a root modulo the prime, so that an expression with a few roots has a value for
+/// one of some choices.
+const CHOICES: usize = 32;
+
 impl Graph {
-    /// The value of `expr` modulo the prime; `None` where something is divided by zero.
+    /// The value of `expr` modulo the prime, for the first choice of values for which it has one; `None` where something is divided by
+    /// zero, or has no root.
     ///
     /// Quantities in one piece are looked into, but not for function values: [`Graph::open`] comes first.
     pub(crate) fn residue(&mut self, expr: Expr) -> Option<u64> {
-        if let Some(&known) = self.residues.get(&expr) {
+        (0..CHOICES).find_map(|choice| self.residue_for(choice, expr))
+    }
+
+    fn residue_for(&mut self, choice: usize, expr: Expr) -> Option<u64> {
+        if let Some(&known) = self.residues.get(&(choice, expr)) {
             return known;
         }
-        let residue = self.find_residue(expr);
-        self.residues.insert(expr, residue);
+        let residue = self.find_residue(choice, expr);
+        self.residues.insert((choice, expr), residue);
         residue
     }
 
-    fn find_residue(&mut self, expr: Expr) -> Option<u64> {
+    fn find_residue(&mut self, choice: usize, expr: Expr) -> Option<u64> {
         match self.node(expr).clone() {
             Node::Number(value) => of_number(&value),
             Node::Sum { constant, terms } => {
                 let mut sum = of_number(&constant)?;
                 for (term, coefficient) in &terms {
-                    sum = add(sum, times(of_number(coefficient)?, self.residue(*term)?));
+                    sum =
+                        add(sum, times(of_number(coefficient)?, self.residue_for(choice, *term)?));
                 }
                 Some(sum)
             }
@@ -41,11 +51,11 @@ impl Graph {
                 for (base, exponent) in &factors {
                     let twice = exponent * Rational::from(2);
                     let factor = if exponent.is_integer() {
-                        of_power(self.residue(*base)?, exponent)?
+                        of_power(self.residue_for(choice, *base)?, exponent)?
                     } else if twice.is_integer() {
-                        of_power(square_root(self.residue(*base)?)?, &twice)?
+                        of_power(square_root(self.residue_for(choice, *base)?)?, &twice)?
                     } else {
-                        at_random((base, exponent))
+                        at_random(choice, (base, exponent))
                     };
                     product = times(product, factor);
                 }
@@ -53,7 +63,7 @@ impl Graph {
             }
             Node::Call(function @ (Function::Sin | Function::Cos), arguments) => {
                 // A point of the unit circle.
-                let t = at_random(arguments[0]);
+                let t = at_random(choice, arguments[0]);
                 let square = times(t, t);
                 let above = match function {
                     Function::Sin => add(t, t),
@@ -63,10 +73,10 @@ impl Graph {
             }
             Node::Pi | Node::Symbol(_) | Node::Call(..) => {
                 // A square, so that it has a root.
-                let root = at_random(expr);
+                let root = at_random(choice, expr);
                 Some(times(root, root))
             }
-            Node::Whole(inner) => self.residue(inner),
+            Node::Whole(inner) => self.residue_for(choice, inner),
         }
     }
 }
@@ -123,10 +133,10 @@ fn of_number(value: &Rational) -> Option<u64> {
     }
 }
 
-/// A definite value for `what`, without a pattern.
-fn at_random(what: impl Hash) -> u64 {
+/// A definite value for `what` in a choice of values, without a pattern.
+fn at_random(choice: usize, what: impl Hash) -> u64 {
     let mut hasher = std::hash::DefaultHasher::new();
-    what.hash(&mut hasher);
+    (choice, what).hash(&mut hasher);
     reduced(hasher.finish() & PRIME)
 }
 
@@ -171,10 +181,16 @@ mod tests {
             "(ln(a) + ln(b))^2 - ln(a)^2 - 2*ln(a)*ln(b) - ln(b)^2",
             "(sqrt(a) + sqrt(b))*(sqrt(a) - sqrt(b)) - a + b",
             "1/(sqrt(a) + 1) + 1/sqrt(a)^3 - (sqrt(a)^3 + sqrt(a) + 1)/(a^2 + sqrt(a)^3)",
+            "(sqrt(a^2 + b^2) + c)*(sqrt(a^2 + b^2) - c) - a^2 - b^2 + c^2",
         ] {
             assert_eq!(residue(text), Some(0), "{text}");
         }
         assert_eq!(residue("a/((b + c)^2 - b^2 - 2*b*c - c^2)"), None);
+        // Roots of sums, for which not every choice of values has a root.
+        for (a, b) in [("a", "b"), ("b", "c"), ("c", "d"), ("d", "e"), ("e", "f"), ("f", "g")] {
+            let text = format!("sqrt({a}^2 + {b}^2)*(sqrt({a} + 1) + {b})*sqrt({a} + {b} + 2)");
+            assert!(residue(&text).is_some_and(|residue| residue != 0), "{text}");
+        }
         for text in ["cos(a)^2 + sin(b)^2 - 1", "(a + b)^2 - a^2 - b^2", "sin(a) - sin(b)"] {
             assert_ne!(residue(text), Some(0), "{text}");
         }
