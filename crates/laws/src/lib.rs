@@ -49,7 +49,7 @@ pub use mmsmith_vocabulary::{Element, Flow, Material, Memory, Overstress, Volume
 #[doc(hidden)]
 pub use neo_hookean::{NeoHookean, NeoHookeanNoLog};
 pub use plastic::{Plastic, ReturnMap};
-pub use projected::{ProjectedVolume, Volume, projected_stress, with_volume};
+pub use projected::{ProjectedVolume, Volume, projected_stress, volume_root};
 pub use tangent::{Differentiated, Tangent};
 
 use crate::fault::Planted;

@@ -62,7 +62,7 @@ impl<T: Stressed<D>, const D: usize> ProjectedVolume<T, D> {
         let mut scaled = *F;
         let ratios = std::array::from_fn(|n| {
             let own = of_particle(F, n);
-            let ratio = root::<T, D>(self.planted, theta[n] / determinant(&own));
+            let ratio = volume_root::<T, D>(self.planted, theta[n] / determinant(&own));
             set_stress(&mut scaled, n, &(own * ratio));
             ratio
         });
@@ -150,7 +150,7 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
     }
 
     fn kirchhoff_across(&self, F: &SMatrix<T, D, D>, q: &[T]) -> Option<T> {
-        let ratio = root::<T, D>(self.planted, q.first().copied()? / determinant(F));
+        let ratio = volume_root::<T, D>(self.planted, q.first().copied()? / determinant(F));
         Some(self.law.kirchhoff_in_space(&(F * ratio))?[(2, 2)])
     }
 
@@ -162,26 +162,16 @@ impl<T: Stressed<D>, const D: usize> LawWithMemory<T, D> for ProjectedVolume<T, 
     }
 }
 
-/// `(theta/J)^(1/D)`, from the quotient.
+/// `(theta/J)^(1/D)`, from the quotient: the factor of F in `Fb`.
 #[inline(always)]
-fn root<T: RealField + Copy, const D: usize>(planted: Planted, share: T) -> T {
+#[must_use]
+pub fn volume_root<T: RealField + Copy, const D: usize>(planted: Planted, share: T) -> T {
     match D {
         1 => share,
         2 if planted.is(Fault::VolumeRoot) => share.cbrt(),
         2 => share.sqrt(),
         _ => share.cbrt(),
     }
-}
-
-/// `Fb`: the deformation gradient with the change of volume `theta` in place of its own.
-#[inline(always)]
-#[must_use]
-pub fn with_volume<T: RealField + Copy, const D: usize>(
-    planted: Planted,
-    F: &SMatrix<T, D, D>,
-    theta: T,
-) -> SMatrix<T, D, D> {
-    F * root::<T, D>(planted, theta / determinant(F))
 }
 
 /// The stress of a particle from its deformation gradient, what [`LawWithMemory::evaluate_projected`] gave, and its projected mean stress.

@@ -18,6 +18,7 @@ use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::grid::state::GridState;
 use crate::grid::tiles::Tiles;
+use crate::grid::volume_rates::VolumeRates;
 use crate::grid::{Layout, Sides};
 use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
@@ -255,6 +256,7 @@ impl OtherGrids {
             means: nodes(self.means)?,
             means_again: nodes(self.means)?,
             is_ahead: false,
+            rates: None,
             filtered: if self.filtered { vec![SVector::zeros(); layout.nodes] } else { Vec::new() },
             layout,
             bins: bins(),
@@ -266,7 +268,7 @@ impl OtherGrids {
 pub(crate) fn allocate<T: Lanes, const D: usize>(
     grid: &Grid<T, D>,
     body: Body<T, D>,
-    law: Box<dyn BlockLaw<T, D>>,
+    mut law: Box<dyn BlockLaw<T, D>>,
     settings: &Settings<T>,
     share: Option<Share>,
 ) -> Result<State<T, D>, SetupError> {
@@ -293,7 +295,11 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
     if revolves && projects {
         return Err(SetupError::ProjectedHalfPlane);
     }
-    let others = OtherGrids::of(settings, projects, corners.is_some());
+    let follows_grid = projects && corners.is_none() && domain.exchanges_scalars();
+    if follows_grid {
+        law.follow_grid();
+    }
+    let others = OtherGrids::of(settings, projects && !follows_grid, corners.is_some());
     let sides = Sides { around: revolves.then_some(1), sticks };
     let mut layout = Layout::with_sides(grid, &sides, others.bytes_per_node::<T, D>())?;
     let points = corners.as_ref().map_or(count, SharedCorners::count);
@@ -325,7 +331,10 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         let of_body = (mass_of_cell, law.follows_position());
         beyond(Corners::new(corners, of_body, is_affine, reprojects))
     });
-    let constants = Constants::new(grid, &layout, &tiles, settings.time_step, least_mass);
+    let mut constants = Constants::new(grid, &layout, &tiles, settings.time_step, least_mass);
+    if follows_grid {
+        constants.sent += 1;
+    }
     let bins = || {
         let mut bins = Bins::new(tiles, points);
         if let Some(part) = &part {
@@ -333,7 +342,8 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         }
         bins
     };
-    let grid = others.allocate(grid, constants, (layout, bins))?;
+    let mut grid = others.allocate(grid, constants, (layout, bins))?;
+    grid.rates = follows_grid.then(|| beyond(VolumeRates::new(mass_of_cell))).flatten();
     let is_kept = integrator.early() > 0.0;
     let early = EarlyState {
         F: if is_kept { vec![SMatrix::identity(); count] } else { Vec::new() },
@@ -368,6 +378,11 @@ fn fill<T: Lanes, const D: usize>(
     let (found, expected) = (particles.internal.len(), count * variables);
     if found == 0 {
         particles.internal = particles.X.iter().flat_map(|X| law.initial(X)).collect();
+        if law.is_projected() {
+            for (own, F) in particles.internal.chunks_exact_mut(variables).zip(&particles.F) {
+                own[0] = determinant(F);
+            }
+        }
     } else if found != expected {
         return Err(SetupError::LengthMismatch { array: "internal", found, expected });
     }

@@ -165,7 +165,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
         }
         state.sort();
         state.start_affine();
-        if EVERY_SCHEME && state.law.is_projected() {
+        if EVERY_SCHEME && state.law.is_projected() && state.grid.rates.is_none() {
             state.project_volume(false);
         }
         Ok(Self { grid, law, settings, state, steps_done: 0, failed: None, own: None })
@@ -224,6 +224,9 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// These, and their law.
     pub(crate) fn observed(&mut self) -> (&Particles<T, D>, &Law<T, D>) {
+        if self.state.grid.rates.is_some() {
+            self.state.tell_mean_stress();
+        }
         let Self { state: State { particles, part, .. }, own: buffer, law, .. } = self;
         let own = match part.as_ref().and_then(|part| part.own.as_ref()) {
             Some(own) => buffer.insert(particles.some(&own.places)),

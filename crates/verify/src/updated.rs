@@ -308,6 +308,10 @@ fn set_memory<T: Real, const D: usize>(
 ) {
     let Law::WithMemory(law) = law else { return };
     particles.internal = Vec::new();
+    if law.is_projected() {
+        // The solver takes the change of volume of each particle.
+        return;
+    }
     for (X, x) in particles.X.iter().zip(&particles.x) {
         let place = X.map(Real::to_f64);
         let F = |t: f64| exact.deformation_gradient(&place, t);

@@ -68,26 +68,53 @@ fn a_motion_that_keeps_the_volume_has_the_errors_of_a_compressible_body() {
     }
 }
 
-/// In the updated formulation the projection goes by the transfers of the scheme.
+/// In the updated formulation changes of volume follow the grid, or are projected by the transfers of the scheme.
 #[test]
-fn transfers_project_volumes_in_the_updated_formulation() {
+fn updated_schemes_follow_motions_next_to_incompressibility() {
     let [far, near] = [0.3, NEAR].map(|nu| solution("swirl", &[("nu", nu), ("A", 0.01)]));
-    for shape in ["gimp", "bspline2", "gimp-bspline2", "cpdi"] {
+    // With how much smaller errors of u than at each particle; means of splines hardly lock on as many cells.
+    for (shape, gain) in [("gimp", 3.0), ("bspline2", 3.0), ("gimp-bspline2", 0.7), ("cpdi", 1.5)] {
         let scheme =
             Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
-        let pointwise = Case {
+        let pointwise = |cells: usize, periods: f64| Case {
             scheme,
-            cells: 16,
-            periods: 0.05,
+            cells,
+            periods,
             cfl_speed: CflSpeed::PWave,
             ..Case::default()
         };
-        let projected = Case { volume: Volume::Projected, ..pointwise };
-        let [u, _] = errors(&far, &pointwise);
-        let [near_u, near_P] = errors(&near, &projected);
-        let [_, locked_P] = errors(&near, &pointwise);
+        let projected = |case: Case| Case { volume: Volume::Projected, ..case };
+        // Before the exact motion has become unstable.
+        let short = pointwise(16, 0.05);
+        let [u, _] = errors(&far, &short);
+        let [near_u, _] = errors(&near, &projected(short));
         assert!(near_u < 1.5 * u, "{shape}: {u:e}, {near_u:e}");
-        assert!(locked_P > 3.0 * near_P, "{shape}: {locked_P:e} without, {near_P:e} with");
+        let long = pointwise(32, 0.25);
+        let [near_u, near_P] = errors(&near, &projected(long));
+        let [locked_u, locked_P] = errors(&near, &long);
+        assert!(locked_P > 1.5 * near_P, "{shape}: {locked_P:e} without, {near_P:e} with");
+        assert!(locked_u > gain * near_u, "{shape}: {locked_u:e} without, {near_u:e} with");
+    }
+}
+
+/// Far from incompressibility a change of volume that follows the grid costs no digits, of fields that it has no part in either.
+#[test]
+fn changes_of_volume_that_follow_the_grid_cost_nothing_far_from_incompressibility() {
+    for (name, periods) in [("axis-aligned", 0.1), ("swirl", 0.25), ("axis-aligned-3d", 0.05)] {
+        for shape in ["gimp", "bspline2"] {
+            let exact = solution(name, &[("A", 0.05)]);
+            let scheme =
+                Scheme::Updated(Updated { shape: shape.parse().unwrap(), ..Updated::default() });
+            let pointwise = Case { scheme, cells: 16, periods, ..Case::default() };
+            let [without, with] = [Volume::Pointwise, Volume::Projected].map(|volume| {
+                let Row { errors, .. } = run(&exact, &Case { volume, ..pointwise });
+                [errors.u.l2, errors.v.l2, errors.F.l2, errors.P.l2]
+            });
+            for ((without, with), field) in without.into_iter().zip(with).zip(["u", "v", "F", "P"])
+            {
+                assert!(with < 1.2 * without, "{name}, {shape}, {field}: {with:e} {without:e}");
+            }
+        }
     }
 }
 

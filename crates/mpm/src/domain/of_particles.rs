@@ -31,6 +31,11 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
         0.0
     }
 
+    /// Whether its weights exchange scalars of nodes. Default: they do not.
+    fn exchanges_scalars(&self) -> bool {
+        false
+    }
+
     /// The most nodes along an axis that a particle reaches.
     fn most_nodes(&self) -> usize {
         EXTENDED

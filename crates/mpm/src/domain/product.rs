@@ -25,6 +25,10 @@ impl<T: Lanes, const D: usize> Domain<T, D> for ProductShape<T, D> {
         self.on_axis().beyond_box()
     }
 
+    fn exchanges_scalars(&self) -> bool {
+        true
+    }
+
     fn most_nodes(&self) -> usize {
         let may_be_extended =
             self.on_axis().stretches() || self.l.iter().any(|&l| l > self.extended_above());

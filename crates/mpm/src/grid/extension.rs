@@ -96,7 +96,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
         let shared = bins.shared_rows().map(|rows| rows.map(|rows| rows.len() * row));
         let mut padded = std::mem::take(&mut self.padded);
         let first_row = layout.first_row - if shared[0].is_some() { ROWS_AROUND } else { 0 };
-        pad((ranks, shared), ROWS_AROUND * row, nodes, &mut padded);
+        pad((ranks, shared), (ROWS_AROUND * row, grid.c.sent), nodes, &mut padded);
         self.update(grid, first_row, &mut padded);
         let own = (layout.first_row - first_row) * row;
         nodes.copy_from_slice(&padded[own..own + nodes.len()]);
@@ -185,10 +185,10 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
 }
 
 /// Puts `nodes` between `count` nodes of the processes below and above, where there are such, with which so many of the first and of the
-/// last nodes are `shared`.
-fn pad<T: Lanes, const D: usize>(
+/// last nodes are `shared`; of these come the first `sent` numbers.
+pub(crate) fn pad<T: Lanes, const D: usize>(
     (ranks, shared): (&dyn Ranks, [Option<usize>; 2]),
-    count: usize,
+    (count, sent): (usize, usize),
     nodes: &[Node<T, D>],
     padded: &mut Vec<Node<T, D>>,
 ) {
@@ -201,17 +201,17 @@ fn pad<T: Lanes, const D: usize>(
     // Neighbours have the shared rows, too, so that what they lack comes next. A process has the rows of two layers at least.
     let rank = ranks.rank();
     if let Some(shared) = below {
-        send_nodes(ranks, rank - 1, &nodes[shared..shared + count]);
+        send_nodes(ranks, rank - 1, sent, &nodes[shared..shared + count]);
     }
     if let Some(shared) = above {
         let end = nodes.len() - shared;
-        send_nodes(ranks, rank + 1, &nodes[end - count..end]);
+        send_nodes(ranks, rank + 1, sent, &nodes[end - count..end]);
     }
     if below.is_some() {
-        receive_nodes(ranks, rank - 1, &mut padded[..low]);
+        receive_nodes(ranks, rank - 1, sent, &mut padded[..low]);
     }
     if above.is_some() {
-        receive_nodes(ranks, rank + 1, &mut padded[low + nodes.len()..]);
+        receive_nodes(ranks, rank + 1, sent, &mut padded[low + nodes.len()..]);
     }
 }
 

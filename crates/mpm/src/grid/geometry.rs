@@ -27,6 +27,8 @@ pub(crate) struct Constants<T, const D: usize> {
     pub(crate) nodes_before: f64,
     pub(crate) tiles: Tiles<D>,
     pub(crate) time_step: T,
+    /// The first numbers of a node, which other processes get.
+    pub(crate) sent: usize,
     /// Nodes with less mass than this count as empty.
     least_mass: T,
     pub(crate) planted: Planted,
@@ -49,6 +51,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             nodes_before: (layout.first_row * layout.row()) as f64,
             tiles: *tiles,
             time_step,
+            sent: 2 * D + 1,
             // Weights below the square of the rounding error only come about by rounding.
             least_mass: least_particle_mass * T::default_epsilon() * T::default_epsilon(),
             planted: Planted::here(),
@@ -72,6 +75,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             nodes_before: self.nodes_before,
             tiles: self.tiles.half_plane(),
             time_step: self.time_step,
+            sent: self.sent,
             least_mass: self.least_mass,
             planted: self.planted,
         }

@@ -325,8 +325,10 @@ where
             true => ranks.rank() - 1,
             false => ranks.rank() + 1,
         };
-        let send = |shared, nodes: &[_]| send_nodes(ranks, neighbour(shared), nodes);
-        let receive = |shared, nodes: &mut [_]| receive_nodes(ranks, neighbour(shared), nodes);
+        let sent = self.c.sent;
+        let send = |shared, nodes: &[_]| send_nodes(ranks, neighbour(shared), sent, nodes);
+        let receive =
+            |shared, nodes: &mut [_]| receive_nodes(ranks, neighbour(shared), sent, nodes);
         let finish = |nodes: &mut [_]| self.finish(nodes);
         let has_arrived = |shared| ranks.has_arrived(neighbour(shared));
         // Rows of an edge are updated with all of it.
@@ -418,28 +420,30 @@ where
     }
 }
 
-/// Sends nodes to a process.
+/// Sends the first `sent` numbers of nodes to a process.
 pub(crate) fn send_nodes<T: RealField + Pod, const D: usize>(
     ranks: &dyn Ranks,
     to: usize,
+    sent: usize,
     nodes: &[Node<T, D>],
 ) {
-    let mut numbers = Vec::with_capacity(nodes.len() * (2 * D + 1));
-    nodes.iter().for_each(|node| numbers.extend_from_slice(node.numbers()));
+    let mut numbers = Vec::with_capacity(nodes.len() * sent);
+    nodes.iter().for_each(|node| numbers.extend_from_slice(&node.values[..sent]));
     ranks.send(to, cast_slice(&numbers));
 }
 
-/// Receives as many nodes from a process.
+/// Receives the first `sent` numbers of as many nodes from a process.
 pub(crate) fn receive_nodes<T: RealField + Pod, const D: usize>(
     ranks: &dyn Ranks,
     from: usize,
+    sent: usize,
     nodes: &mut [Node<T, D>],
 ) {
-    let mut numbers = vec![T::zero(); nodes.len() * (2 * D + 1)];
+    let mut numbers = vec![T::zero(); nodes.len() * sent];
     ranks.receive(from, cast_slice_mut(&mut numbers));
-    for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(2 * D + 1)) {
+    for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(sent)) {
         *node = Node::zero();
-        node.values[..=2 * D].copy_from_slice(numbers);
+        node.values[..sent].copy_from_slice(numbers);
     }
 }
 

@@ -8,6 +8,7 @@ pub(crate) mod grid_update;
 pub(crate) mod node;
 pub(crate) mod state;
 pub(crate) mod tiles;
+pub(crate) mod volume_rates;
 
 use std::ops::Range;
 

@@ -37,9 +37,10 @@ impl Components {
     }
 }
 
-/// Values at a node in the order `[velocity, acceleration, mass, zeros]`, D + D + 1 numbers and padding, so that they go through
+/// Values at a node in the order `[velocity, acceleration, mass, scalar, zeros]`, D + D + 2 numbers and padding, so that they go through
 /// vector instructions together. P2G sums momentum in place of velocity and force in place of acceleration; the grid update
-/// divides by the mass.
+/// divides by the mass. Where a change of volume follows the grid, the scalar is that of [`VolumeRates`](crate::grid::volume_rates::VolumeRates), else
+/// zero.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Node<T, const D: usize> {
@@ -53,7 +54,7 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
 
     #[inline(always)]
     pub(crate) fn new(velocity: &SVector<T, D>, acceleration: &SVector<T, D>, mass: T) -> Self {
-        const { assert!(2 * D < LANES) };
+        const { assert!(2 * D + 1 < LANES) };
         let mut values = [T::zero(); LANES];
         for a in 0..D {
             values[a] = velocity[a];
@@ -68,14 +69,19 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         self.values == Self::zero().values
     }
 
-    /// All but the padding.
-    pub(crate) fn numbers(&self) -> &[T] {
-        &self.values[..=2 * D]
-    }
-
     #[inline(always)]
     pub(crate) fn mass(&self) -> T {
         self.values[2 * D]
+    }
+
+    #[inline(always)]
+    pub(crate) fn scalar(&self) -> T {
+        self.values[2 * D + 1]
+    }
+
+    #[inline(always)]
+    pub(crate) fn scalar_mut(&mut self) -> &mut T {
+        &mut self.values[2 * D + 1]
     }
 
     /// Clears components of velocity and acceleration.
@@ -97,10 +103,12 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         self
     }
 
+    /// Adds the acceleration and the scalar alone.
     pub(crate) fn add_acceleration(&mut self, other: &Self) {
         for a in 0..D {
             self.values[D + a] += other.values[D + a];
         }
+        *self.scalar_mut() += other.scalar();
     }
 
     #[inline(always)]

@@ -6,10 +6,12 @@ use mmsmith_lanes::simd::Lanes;
 use mmsmith_threads::coloring::Held;
 use nalgebra::SVector;
 
+use crate::every_scheme::Beyond;
 use crate::grid::Layout;
 use crate::grid::bins::Bins;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
+use crate::grid::volume_rates::VolumeRates;
 
 /// The grid: what all steps know of it, and its nodes.
 pub(crate) struct GridState<T, const D: usize> {
@@ -23,7 +25,9 @@ pub(crate) struct GridState<T, const D: usize> {
     pub(crate) next: Vec<Node<T, D>>,
     /// The fused pass: whether `nodes` has the velocities and accelerations of the next step, with no factor on the latter.
     pub(crate) is_ahead: bool,
-    /// Means of scalars, where a change of volume is projected. One per node.
+    /// Where changes of volume follow the grid.
+    pub(crate) rates: Option<Beyond<VolumeRates<T, D>>>,
+    /// Means of scalars, where a change of volume is projected by means. One per node.
     pub(crate) means: Vec<Node<T, D>>,
     /// Means of scalars that follow from `means`. One per node.
     pub(crate) means_again: Vec<Node<T, D>>,

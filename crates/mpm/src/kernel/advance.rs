@@ -21,6 +21,8 @@ pub(crate) struct AdvanceParticles<'a, T, const D: usize> {
     pub(crate) F: &'a mut [SMatrix<T, D, D>; BLOCK],
     /// `b` holds the body forces per mass on entry.
     pub(crate) contributions: &'a mut Contributions<T, D, BLOCK>,
+    /// The scalars of nodes, but in the plane.
+    pub(crate) growth: &'a mut [T; BLOCK],
 }
 
 impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
@@ -38,6 +40,9 @@ impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
         }
         *x += c.planted.change(velocity * c.time_step);
         *F = c.stretch(&interpolated.velocity_gradient, F);
+        if D != 2 {
+            self.growth[k] = interpolated.scalar;
+        }
         contributions.set_value(c, k, v);
     }
 

@@ -20,6 +20,8 @@ pub(crate) struct Interpolated<T, const D: usize> {
     pub(crate) velocity_gradient: SMatrix<T, D, D>,
     /// The affine velocity per cell of the second vector at nodes, where there are [weights](Weights) for it.
     pub(crate) affine: SMatrix<T, D, D>,
+    /// The scalar, but in the plane, whose kernels leave it out.
+    pub(crate) scalar: T,
 }
 
 impl<T: Lanes, const D: usize> Interpolated<T, D> {
@@ -31,6 +33,7 @@ impl<T: Lanes, const D: usize> Interpolated<T, D> {
         slope: &[[T; R]; D],
     ) -> Self {
         let mut own = Self::zero();
+        own.scalar = value.get(2 * D + 1).copied().unwrap_or(T::zero());
         let mut moments = SMatrix::zeros();
         for i in 0..D {
             (own.velocity[i], own.second[i]) = (value[i], value[D + i]);
@@ -52,6 +55,7 @@ impl<T: Lanes, const D: usize> Interpolated<T, D> {
             second: SVector::zeros(),
             velocity_gradient: SMatrix::zeros(),
             affine: SMatrix::zeros(),
+            scalar: T::zero(),
         }
     }
 }
@@ -101,7 +105,8 @@ pub(crate) struct Contributions<T, const D: usize, const N: usize> {
     pub(crate) volume: [T; N],
     /// Body forces, per mass.
     pub(crate) b: [SVector<T, D>; N],
-    /// Momentum, body force and mass, in the order of a node's values.
+    /// Momentum, body force and mass, in the order of a node's values. Where the change of volume follows the grid, the scalar is `V0` times the mean
+    /// Kirchhoff stress, which `stress_flux` is without.
     pub(crate) value: [Node<T, D>; N],
     /// `-V0 tau / h`: column `a` multiplies the gradient along axis `a`, per cell.
     pub(crate) stress_flux: [SMatrix<T, D, D>; N],
@@ -370,6 +375,33 @@ pub(crate) fn add_values<T, L, const A: usize, const C: usize, const W: usize>(
             }
         }
     }
+}
+
+/// G2P of the scalars of nodes.
+#[inline(always)]
+pub(crate) fn g2p_scalar<T, L, const D: usize, const W: usize>(
+    weights: &L,
+    strides: &[usize; D],
+    nodes: &[Node<T, D>],
+) -> T
+where
+    T: Lanes,
+    L: Weights<T, D, W>,
+{
+    let mut sum = T::zero();
+    let start = weights.first_node();
+    for index in 0..rows::<D, W>() {
+        let row = row(weights, start, strides, index);
+        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
+            beyond("a stencil beyond the grid")
+        };
+        let mut of_row = T::zero();
+        for (i, node) in nodes.iter().enumerate() {
+            of_row += node.scalar() * weights.S(0, i);
+        }
+        sum += of_row * row.S;
+    }
+    sum
 }
 
 /// Sums of G2P: all values of a node interpolated, `value[q]`, and their slopes, `slope[axis][q]`.

@@ -14,6 +14,7 @@ use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::any::{Contributions, Interpolated, Receive};
+use crate::kernel::beyond;
 use crate::kernel::copies::{BLOCK, Kinematics};
 
 /// A law for blocks of particles.
@@ -52,6 +53,10 @@ pub(crate) trait BlockLaw<T: Lanes, const D: usize>: Send + Sync {
     fn is_projected(&self) -> bool {
         false
     }
+
+    /// Where the change of volume follows the grid from now on: [`stress`](Self::stress) leaves the mean stress out of the fluxes, and sets
+    /// the scalars of `contributions.value`. The first internal variable is the change of volume.
+    fn follow_grid(&mut self) {}
 
     /// Where the change of volume is projected: sets the first component of momentum of each particle in `contributions.value` to its reference
     /// volume times its mean stress at the projected change of volume, and the others to zero.
@@ -143,6 +148,23 @@ pub(crate) trait BlockWeights<T: Lanes, const D: usize>: Send {
         for (k, interpolated) in interpolated.iter().enumerate() {
             particles.receive(k, interpolated);
         }
+    }
+
+    /// P2G of the scalars of the first `count` particles, where [`p2g`](Self::p2g) leaves them out. Default: none, since only shapes whose
+    /// [domains exchange scalars](crate::domain::of_particles::Domain::exchanges_scalars) are asked.
+    fn p2g_scalars(
+        &mut self,
+        _strides: &[usize; D],
+        _band: (&mut [Node<T, D>], usize),
+        _contributions: &Contributions<T, D, BLOCK>,
+        _count: usize,
+    ) {
+        beyond("scalars of a shape that exchanges none");
+    }
+
+    /// G2P of the scalars of nodes to as many particles as `values` has places, as [`p2g_scalars`](Self::p2g_scalars).
+    fn g2p_scalars(&mut self, _strides: &[usize; D], _nodes: &[Node<T, D>], _values: &mut [T]) {
+        beyond("scalars of a shape that exchanges none");
     }
 
     /// A planted fault: particles in the last cell of an axis skip the last node they reach along it. Default: none does.

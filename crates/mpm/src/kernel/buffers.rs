@@ -21,6 +21,8 @@ pub(crate) struct Buffers<T, const D: usize> {
     pub(crate) weights: Box<dyn BlockWeights<T, D>>,
     pub(crate) contributions: Contributions<T, D, BLOCK>,
     pub(crate) interpolated: [Interpolated<T, D>; BLOCK],
+    /// Interpolated scalars, where a change of volume follows the grid.
+    pub(crate) growth: [T; BLOCK],
 }
 
 /// Buffers that no thread uses at present; at most two for each thread come about.
@@ -43,6 +45,7 @@ impl<T: Lanes, const D: usize> BufferPool<T, D> {
                 weights: domain.weights(is_affine),
                 contributions: Contributions::zero(),
                 interpolated: [Interpolated::zero(); BLOCK],
+                growth: [T::zero(); BLOCK],
             })
         })
     }
@@ -72,6 +75,18 @@ impl<T: Lanes, const D: usize> GridValues<'_, T, D> {
         if self.at_corners.is_none() {
             buffers.weights.compute(c, ids, kinematics);
         }
+    }
+
+    /// Interpolates the scalars of nodes at the first `count` particles of a block, which reach nodes themselves.
+    pub(crate) fn growth(
+        &self,
+        c: &Constants<T, D>,
+        buffers: &mut Buffers<T, D>,
+        count: usize,
+    ) -> [T; BLOCK] {
+        let Buffers { weights, growth, .. } = buffers;
+        weights.g2p_scalars(&c.strides, self.nodes, &mut growth[..count]);
+        *growth
     }
 
     /// Interpolates at the particles `ids` of a block; those on shared corners are successive.

@@ -11,7 +11,7 @@ use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::advance::AdvanceParticles;
-use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, p2g};
+use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, g2p_scalar, p2g};
 use crate::kernel::beyond;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
@@ -210,6 +210,26 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
         particles: AdvanceParticles<'_, T, D>,
     ) {
         self.g2p_with(strides, nodes, interpolated.len(), particles);
+    }
+
+    fn p2g_scalars(
+        &mut self,
+        strides: &[usize; D],
+        band: (&mut [Node<T, D>], usize),
+        contributions: &Contributions<T, D, BLOCK>,
+        count: usize,
+    ) {
+        // Kernels but those of the plane have registers for all of a node.
+        if D != 2 || self.any_extended {
+            return;
+        }
+        let of_block = ScalarsToNodes { weights: self, strides, band, contributions, count };
+        dispatch_by_width!(self.width, false, ToNodes<_, D>, of_block);
+    }
+
+    fn g2p_scalars(&mut self, strides: &[usize; D], nodes: &[Node<T, D>], values: &mut [T]) {
+        let of_block = ScalarsFromNodes { weights: self, strides, nodes, values };
+        dispatch_by_width!(self.width, false, FromNodes<_, D>, of_block);
     }
 
     fn skip_last_node(&mut self, c: &Constants<T, D>, x: &[SVector<T, D>; BLOCK]) {
@@ -549,6 +569,113 @@ fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
 ) -> Interpolated<T, D> {
     let weights = extended.weights::<AFFINE>((strides, nodes_before));
     g2p(&weights, strides, nodes)
+}
+
+struct ToNodes<'a, T, const D: usize, const W: usize, const AFFINE: bool>(ScalarsToNodes<'a, T, D>);
+
+struct ScalarsToNodes<'a, T, const D: usize> {
+    weights: &'a ProductWeights<T, D>,
+    strides: &'a [usize; D],
+    band: (&'a mut [Node<T, D>], usize),
+    contributions: &'a Contributions<T, D, BLOCK>,
+    count: usize,
+}
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for ToNodes<'_, T, D, W, AFFINE>
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(ScalarsToNodes { weights, strides, band: (band, first), contributions, count }) =
+            self;
+        let mut k = 0;
+        while k < count {
+            // Successive particles with the same nodes.
+            let start = weights.first_node[k];
+            let mut sums = [[T::zero(); W]; W];
+            while k < count && weights.first_node[k] == start {
+                let own = ParticleWeights::<T, D, W, AFFINE> { weights, k };
+                let value = contributions.value[k].scalar();
+                for (j, sums) in sums.iter_mut().enumerate() {
+                    let of_row = value * own.S(D - 1, j);
+                    for (i, sum) in sums.iter_mut().enumerate() {
+                        *sum += of_row * own.S(0, i);
+                    }
+                }
+                k += 1;
+            }
+            for (j, sums) in sums.into_iter().enumerate() {
+                let place = start - first + j * strides[D - 1];
+                let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>())
+                else {
+                    beyond("a stencil beyond its band")
+                };
+                for (node, sum) in nodes.iter_mut().zip(sums) {
+                    *node.scalar_mut() += sum;
+                }
+            }
+        }
+    }
+}
+
+struct FromNodes<'a, T, const D: usize, const W: usize, const AFFINE: bool>(
+    ScalarsFromNodes<'a, T, D>,
+);
+
+struct ScalarsFromNodes<'a, T, const D: usize> {
+    weights: &'a ProductWeights<T, D>,
+    strides: &'a [usize; D],
+    nodes: &'a [Node<T, D>],
+    values: &'a mut [T],
+}
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for FromNodes<'_, T, D, W, AFFINE>
+{
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(ScalarsFromNodes { weights, strides, nodes, values }) = self;
+        let (mut k, count) = (0, values.len());
+        while k < count {
+            if let Some(extended) = weights.extended(k) {
+                let of_particle = extended.weights::<AFFINE>((strides, weights.nodes_before));
+                values[k] = g2p_scalar(&of_particle, strides, nodes);
+                k += 1;
+                continue;
+            }
+            if D != 2 {
+                let own = ParticleWeights::<T, D, W, AFFINE> { weights, k };
+                values[k] = g2p_scalar(&own, strides, nodes);
+                k += 1;
+                continue;
+            }
+            // Successive particles with the same nodes; a particle's bits do not depend on the others.
+            let start = weights.first_node[k];
+            let mut scalars = [[T::zero(); W]; W];
+            for (j, scalars) in scalars.iter_mut().enumerate() {
+                let place = start + j * strides[D - 1];
+                let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
+                    beyond("a stencil beyond the grid")
+                };
+                for (scalar, node) in scalars.iter_mut().zip(nodes) {
+                    *scalar = node.scalar();
+                }
+            }
+            while k < count && weights.first_node[k] == start && weights.extended(k).is_none() {
+                let own = ParticleWeights::<T, D, W, AFFINE> { weights, k };
+                let mut sum = T::zero();
+                for (j, scalars) in scalars.iter().enumerate() {
+                    let mut of_row = T::zero();
+                    for (i, scalar) in scalars.iter().enumerate() {
+                        of_row += *scalar * own.S(0, i);
+                    }
+                    sum += of_row * own.S(D - 1, j);
+                }
+                values[k] = sum;
+                k += 1;
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -174,6 +174,7 @@ impl<T: Lanes> Frame<T> {
             second: second.into(),
             velocity_gradient: self.matrix_out(&gradient),
             affine,
+            scalar: T::zero(),
         }
     }
 }

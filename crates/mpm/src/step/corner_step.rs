@@ -156,7 +156,7 @@ impl<T: Lanes, const D: usize> Pass<'_, T, D> {
             let shares = measured.from(mesh, (of_chunk, first));
             FromCorners { c, corners, shares, values, first, receiver: interpolated }
                 .interpolate(is_affine);
-            let follow = Follow { c, law, late: c.time_step, early: None };
+            let follow = Follow { c, law, late: c.time_step, early: None, growth: None };
             follow.advance(transfer, interpolated, &mut block);
             let Moving { x, v, F, affine, internal, .. } = block;
 

@@ -27,6 +27,7 @@ use crate::kernel::any::Interpolated;
 use crate::kernel::block::{BlockIncrement, BlockLaw};
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
+use crate::kernel::projected::VARIABLES;
 use crate::kernel::shared::have_volume_next;
 use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::health::{Outcome, SharedOutcome};
@@ -40,7 +41,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// F follows the velocity at the start of the step for a time, before forces are computed; stored beside the old F.
     pub(crate) fn g2p_stretch(&mut self, time: T) -> Outcome {
         let Self { particles, grid, domain, corners, buffers, .. } = self;
-        let GridState { constants, nodes, .. } = grid;
+        let GridState { constants, nodes, rates, .. } = grid;
+        let follows_grid = rates.is_some();
         let Self { early, law, .. } = self;
         let EarlyState { F: F_early, internal: internal_early, .. } = early;
         let c = *constants;
@@ -75,7 +77,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
                     }
                 }
                 let internal = of_internal.next().unwrap_or_default();
-                if !internal.is_empty() {
+                if follows_grid {
+                    grow(internal, &grid.growth(x.len()));
+                } else if !internal.is_empty() {
                     // Positions follow when forces are known; until then particles are as far as their velocity takes them.
                     let moved = x.iter().zip(interpolated).map(|(x, of)| x + of.velocity * time);
                     let ahead: Vec<SVector<T, D>> = match law.follows_position() {
@@ -95,15 +99,16 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// Velocity by the transfer, position, and F for the rest of the step.
     pub(crate) fn g2p(&mut self, late: T) -> Outcome {
         let Self { particles, grid, domain, corners, transfer, .. } = self;
-        let GridState { constants, nodes, bins, .. } = grid;
+        let GridState { constants, nodes, bins, rates, .. } = grid;
         let (law, early) = (&*self.law, Early::of(&self.early.F, &self.early.internal));
-        let (c, transfer) = (*constants, *transfer);
+        let (c, transfer, follows_grid) = (*constants, *transfer, rates.is_some());
         let values = grid_values(nodes, corners.as_deref());
         let pass = G2p { c: &c, bins, domain: &**domain, corners: corners.as_deref() };
         let found = pass.all(particles, (&self.buffers, transfer), |buffers, ids, of_block| {
+            let growth = follows_grid.then(|| values.growth(&c, buffers, ids.len()));
             let interpolated = values.g2p(&c, buffers, ids);
-            let early = early(ids);
-            Follow { c: &c, law, late, early }.advance(transfer, interpolated, of_block);
+            let (early, growth) = (early(ids), growth.as_ref());
+            Follow { c: &c, law, late, early, growth }.advance(transfer, interpolated, of_block);
         });
         drop(early);
         self.arrive(found)
@@ -129,7 +134,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// MUSL, second G2P: position by the grid velocity, and F, for a time `late`, by the reprojected one.
     pub(crate) fn g2p_reprojected(&mut self, late: T) -> Outcome {
         let Self { particles, grid, domain, corners, .. } = self;
-        let GridState { constants, nodes, bins, reprojected, .. } = grid;
+        let GridState { constants, nodes, bins, reprojected, rates, .. } = grid;
+        let follows_grid = rates.is_some();
         let (law, early) = (&*self.law, Early::of(&self.early.F, &self.early.internal));
         let c = *constants;
         if let Some(corners) = corners {
@@ -147,8 +153,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 for (x, interpolated) in of_block.x.iter_mut().zip(&*interpolated) {
                     *x += interpolated.velocity * c.time_step;
                 }
+                let growth = follows_grid.then(|| reprojected.growth(&c, buffers, ids.len()));
                 let interpolated = reprojected.g2p(&c, buffers, ids);
-                let follow = Follow { c: &c, law, late, early: early(ids) };
+                let (early, growth) = (early(ids), growth.as_ref());
+                let follow = Follow { c: &c, law, late, early, growth };
                 follow.stretch(interpolated, of_block);
             });
         drop(early);
@@ -226,6 +234,11 @@ impl<'a, T: Lanes, const D: usize> FromGrid<'a, T, D> {
         values.compute_weights(c, buffers, ids, copies.of_successive(x, F));
         values.g2p(c, buffers, ids)
     }
+
+    /// The growth at the first particles of the block of the last [`g2p`](Self::g2p).
+    fn growth(&mut self, count: usize) -> [T; BLOCK] {
+        self.values.growth(self.c, &mut self.buffers, count)
+    }
 }
 
 /// F and the internal variables of some particles after the early part of a step.
@@ -260,6 +273,8 @@ pub(crate) struct Follow<'a, T, const D: usize> {
     pub(crate) late: T,
     /// After the early part, where there is one.
     pub(crate) early: Option<Early<'a, T, D>>,
+    /// The growth of the change of volume, where that follows the grid.
+    pub(crate) growth: Option<&'a [T; BLOCK]>,
 }
 
 impl<T: Lanes, const D: usize> Follow<'_, T, D> {
@@ -280,7 +295,7 @@ impl<T: Lanes, const D: usize> Follow<'_, T, D> {
 
     /// F at the end of the step, and the internal variables.
     fn stretch(&self, interpolated: &[Interpolated<T, D>], particles: &mut Moving<'_, T, D>) {
-        let Self { c, law, late, early } = *self;
+        let Self { c, law, late, early, growth } = *self;
         let Moving { x, F, internal, .. } = particles;
         if let Some(early) = early {
             F.copy_from_slice(early.F);
@@ -294,10 +309,19 @@ impl<T: Lanes, const D: usize> Follow<'_, T, D> {
             for (F, interpolated) in F.iter_mut().zip(interpolated) {
                 *F = c.stretch_for(late, &interpolated.velocity_gradient, F);
             }
-            if !internal.is_empty() {
+            if let Some(growth) = growth {
+                grow(internal, growth);
+            } else if !internal.is_empty() {
                 law.evolve(BlockIncrement { time: late, start: &start, end: F, x }, internal);
             }
         }
+    }
+}
+
+/// Lets the changes of volume of a block grow; they are the first internal variables.
+pub(crate) fn grow<T: Lanes>(internal: &mut [T], growth: &[T; BLOCK]) {
+    for (own, growth) in internal.chunks_exact_mut(VARIABLES).zip(growth) {
+        own[0] *= T::one() + *growth;
     }
 }
 

@@ -26,7 +26,7 @@ use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::scheme::Transfer;
 use crate::step::forcing::Forcing;
-use crate::step::g2p::Follow;
+use crate::step::g2p::{Follow, grow};
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::State;
 
@@ -34,15 +34,27 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// G2P of this step, then P2G and grid update of the next step, whose grid becomes `nodes`.
     pub(crate) fn g2p2g(&mut self, body_force: &dyn BodyForce<T, D>, t_next: T) -> Outcome {
         let Self { particles, grid, uniform, of_time, .. } = self;
-        let GridState { constants: c, layout, bins, nodes, next, .. } = grid;
+        let GridState { constants: c, layout, bins, nodes, next, rates, .. } = grid;
+        let follows_grid = rates.is_some();
         let (transfer, shares) = (self.transfer, self.shares);
         let buffers = &self.buffers;
         let (domain, law) = (&*self.domain, &*self.law);
         let (fixed, moving) = particles.split();
         let forcing = Forcing::new(body_force, fixed.X, t_next, c, of_time);
         let uniform = *uniform;
-        let step =
-            G2p2g { c, domain, law, transfer, nodes, fixed, uniform, forcing, buffers, shares };
+        let step = G2p2g {
+            c,
+            domain,
+            law,
+            transfer,
+            nodes,
+            fixed,
+            uniform,
+            forcing,
+            buffers,
+            shares,
+            follows_grid,
+        };
         let found = SharedOutcome::default();
         let vectors = NodeVectors::of(transfer);
         let update =
@@ -50,11 +62,18 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let divide = |partition| {
             DisjointMoving::new(partition, moving).expect("each particle is in one tile")
         };
-        update.g2p2g(bins, next, divide, &|band, divided, part| {
+        let add = |band: Band<'_, _, D>, divided: &DisjointMoving<'_, T, D>, part| {
             if let Some(particles) = divided.take(part) {
                 found.add(step.advance_tile(band, particles));
             }
-        });
+        };
+        match rates {
+            Some(rates) => {
+                update.sums().g2p2g(bins, next, divide, &add);
+                rates.update(&update, bins, next);
+            }
+            None => update.g2p2g(bins, next, divide, &add),
+        }
         std::mem::swap(nodes, next);
         found.all()
     }
@@ -74,6 +93,8 @@ struct G2p2g<'a, T, const D: usize> {
     forcing: Forcing<'a, T, D>,
     buffers: &'a BufferPool<T, D>,
     shares: Shares,
+    /// Whether the change of volume follows the grid.
+    follows_grid: bool,
 }
 
 impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
@@ -114,7 +135,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// As [`advance_tile`](Self::advance_tile) for a block of particles.
     fn advance_block(
         &self,
-        Buffers { weights, contributions, interpolated, .. }: &mut Buffers<T, D>,
+        Buffers { weights, contributions, interpolated, growth, .. }: &mut Buffers<T, D>,
         (band, in_band): (&mut Band<'_, Node<T, D>, D>, &Constants<T, D>),
         ids: &[u32],
         mut particles: Moving<'_, T, D>,
@@ -131,11 +152,15 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             weights.compute(c, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
+        if self.follows_grid && (D == 2 || transfer != Transfer::Flip) {
+            weights.g2p_scalars(&c.strides, nodes, &mut growth[..ids.len()]);
+        }
         let interpolated = &mut interpolated[..ids.len()];
         if EVERY_SCHEME && transfer != Transfer::Flip {
             weights.g2p(&c.strides, nodes, interpolated);
             let mut own = particles.first(ids.len());
-            let follow = Follow { c, law, late: c.time_step, early: None };
+            let growth = self.follows_grid.then_some(&*growth);
+            let follow = Follow { c, law, late: c.time_step, early: None, growth };
             follow.advance(transfer, interpolated, &mut own);
             contributions.set_values(c, own.v, own.affine);
         } else {
@@ -151,9 +176,12 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 v,
                 F,
                 contributions,
+                growth,
             };
             weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
-            if let Some(start) = start {
+            if self.follows_grid {
+                grow(particles.internal, growth);
+            } else if let Some(start) = start {
                 let Moving { x, F, internal, .. } = &mut particles;
                 law.evolve_to_stress(c, (&start, whole(F)), whole(x), internal, contributions);
                 has_stress = true;
@@ -181,6 +209,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             law.stress(c, F, internal, contributions);
         }
         weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
+        if self.follows_grid {
+            let band_nodes = (&mut *band.nodes, band.first);
+            weights.p2g_scalars(&band.strides, band_nodes, contributions, ids.len());
+        }
         Outcome::default()
     }
 }

@@ -52,7 +52,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if let Some(corners) = &mut self.corners {
             corners.shared.recompute_shares();
         }
-        let projects = self.law.is_projected();
+        let follows_grid = self.grid.rates.is_some();
+        let projects = self.law.is_projected() && !follows_grid;
         if !EVERY_SCHEME || (is_fused(integrator, self.transfer) && !projects) {
             return match self.corners {
                 Some(_) => {
@@ -66,6 +67,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let late = dt * real(1.0 - early);
         if early > 0.0 {
             self.timed(Pass::P2gOfMomentum, Self::p2g_momentum);
+            if follows_grid {
+                self.timed(Pass::Projection, |state| state.set_growth(true, dt * real(early)));
+            }
             let outcome =
                 self.timed(Pass::G2pOfStretch, |state| state.g2p_stretch(dt * real(early)));
             let outcome = self.reduce_outcome(outcome);
@@ -86,9 +90,15 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if self.corners.is_some() {
             self.timed(Pass::Corners, Self::move_corners);
         }
+        if follows_grid && !integrator.reprojects() {
+            self.timed(Pass::Projection, |state| state.set_growth(false, late));
+        }
         let outcome = if integrator.reprojects() {
             self.timed(Pass::G2pOfVelocity, Self::g2p_velocity);
             self.timed(Pass::P2gOfUpdatedMomentum, Self::p2g_updated_momentum);
+            if follows_grid {
+                self.timed(Pass::Projection, |state| state.set_reprojected_growth(late));
+            }
             self.timed(Pass::G2p, |state| state.g2p_reprojected(late))
         } else {
             self.timed(Pass::G2p, |state| state.g2p(late))
@@ -113,6 +123,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
     fn fused_step(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) -> Outcome {
         if !self.grid.is_ahead {
             self.timed(Pass::P2g, |state| state.p2g(body_force, times));
+        }
+        if self.grid.rates.is_some() {
+            let dt = self.grid.constants.time_step;
+            self.timed(Pass::Projection, |state| state.set_growth(false, dt));
         }
         let outcome = self.timed(Pass::G2pAndP2g, |state| state.g2p2g(body_force, times.end));
         let outcome = self.reduce_outcome(outcome);

@@ -24,6 +24,7 @@ use crate::grid::grid_update::{
 };
 use crate::grid::node::Node;
 use crate::grid::state::GridState;
+use crate::grid::volume_rates::VolumeRates;
 use crate::kernel::buffers::{BufferPool, Buffers, GridValues};
 use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::shared::ToCorners;
@@ -36,7 +37,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// P2G of mass, momentum and force, and from them velocities and accelerations.
     pub(crate) fn p2g(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, grid, of_time, corners, .. } = self;
-        let GridState { constants, layout, bins, nodes, .. } = grid;
+        let GridState { constants, layout, bins, nodes, rates, .. } = grid;
         let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let (buffers, variables) = (&self.buffers, self.shares.internal);
         let Particles { X, x, v, F, mass, volume, affine, internal, .. } = &*particles;
@@ -58,7 +59,10 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 copies.pick_internal(ids, internal, variables);
                 law.stress(&c, &copies.F, &copies.internal, contributions);
             };
-        p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set);
+        match rates {
+            Some(rates) => p2g.with_mean_stress(&update, (bins, rates), nodes, &set),
+            None => p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set),
+        }
     }
 
     /// P2G of mass and momentum, and from them the velocities at the start of the step.
@@ -78,7 +82,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
     /// accelerations and the velocities at the end of the step.
     pub(crate) fn p2g_force(&mut self, body_force: &dyn BodyForce<T, D>, times: StepTimes<T>) {
         let Self { particles, grid, of_time, corners, .. } = self;
-        let GridState { constants, layout, bins, nodes, .. } = grid;
+        let GridState { constants, layout, bins, nodes, rates, .. } = grid;
         let (domain, law, transfer) = (&*self.domain, &self.law, self.transfer);
         let buffers = &self.buffers;
         let Particles { X, x, F, mass, volume, internal, .. } = &*particles;
@@ -103,7 +107,14 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 }
                 law.stress(&c, &copies.F, &copies.internal, contributions);
             };
-        p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set);
+        match rates {
+            Some(rates) => {
+                // The growth that the early part took.
+                nodes.iter_mut().for_each(|node| *node.scalar_mut() = T::zero());
+                p2g.with_mean_stress(&update, (bins, rates), nodes, &set);
+            }
+            None => p2g.to_grid(&update, (bins, two_stages(corners), loading), nodes, &set),
+        }
     }
 
     /// MUSL: P2G of mass and of the updated momenta, and from them the reprojected velocities.
@@ -189,6 +200,8 @@ pub(crate) struct P2g<'a, T, const D: usize> {
     pub(crate) is_affine: bool,
     /// Whether contributions need the grid's values at the particles.
     pub(crate) reads_grid: bool,
+    /// Whether mean stresses go to the scalars of nodes.
+    pub(crate) has_mean_stress: bool,
     pub(crate) x: &'a [SVector<T, D>],
     pub(crate) F: &'a [SMatrix<T, D, D>],
 }
@@ -201,7 +214,7 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
         is_affine: bool,
         (x, F): (&'a [SVector<T, D>], &'a [SMatrix<T, D, D>]),
     ) -> Self {
-        Self { c, domain, buffers, is_affine, reads_grid: false, x, F }
+        Self { c, domain, buffers, is_affine, reads_grid: false, has_mean_stress: false, x, F }
     }
 
     /// P2G of what `set(buffers, copies, ids)` says of each block, and the update of the grid after it: tile by tile, and by
@@ -224,6 +237,18 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
         self.to_corners(corners, exchange, set);
         exchange.load(corners, loading);
         exchange.update_grid(update, corners, bins, nodes);
+    }
+
+    /// P2G with mean stresses, whose forces the grid computes.
+    fn with_mean_stress<S: NodeUpdate<T, D>>(
+        self,
+        update: &GridUpdate<'_, T, S, D>,
+        (bins, rates): (&mut Bins<Node<T, D>, D>, &mut VolumeRates<T, D>),
+        nodes: &mut [Node<T, D>],
+        set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
+    ) {
+        let own = Self { has_mean_stress: true, ..self };
+        rates.p2g(update, bins, nodes, &|band, ids| own.tile(band, ids, set));
     }
 
     /// Sums what `set` says of each particle at its corners, chunk by chunk.
@@ -270,7 +295,7 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
         ids: &[u32],
         set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
-        let &Self { c, domain, buffers: pool, is_affine, reads_grid, x, F } = self;
+        let &Self { c, domain, buffers: pool, is_affine, reads_grid, has_mean_stress, x, F } = self;
         let in_band = c.in_band(&band);
         // In a window the nodes have other numbers, which its strides need not show: a body may be wide along one axis alone.
         let is_window = band.strides != c.strides || band.nodes_before != c.nodes_before;
@@ -292,6 +317,10 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
             }
             let Buffers { weights, contributions, .. } = &mut *buffers;
             weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
+            if has_mean_stress {
+                let nodes = (&mut *band.nodes, band.first);
+                weights.p2g_scalars(&band.strides, nodes, contributions, ids.len());
+            }
         }
         pool.give_back(buffers);
     }

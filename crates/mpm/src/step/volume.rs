@@ -1,5 +1,5 @@
-//! The projection of the change of volume and of its mean stress, by the transfers of the scheme: to the nodes as a mean weighted with
-//! masses, and back to the particles.
+//! Changes of volume that are projected by the transfers of the scheme, for domains that do not [exchange
+//! scalars](crate::domain::of_particles::Domain::exchanges_scalars): to the nodes as a mean weighted with masses, and back to the particles.
 //!
 //! ```text
 //! theta_p = sum_i S_ip (sum_q m_q J_q S_iq / m_i);   p_p = rho_p sum_i S_ip (sum_q V0_q P_q S_iq / m_i)
@@ -8,6 +8,9 @@
 //! with the mean stress `P` of the law at `theta`, and `rho_p = m_p/V0_p`. Both projections are adjoint to each other, so that forces follow
 //! from an energy. Sources: Zhao, Jiang & Choo, "Circumventing volumetric locking in explicit material point methods", IJNME 124 (2023)
 //! 5334-5355, for the transfers; Simo, Taylor & Pister (see `ProjectedVolume`) for the energy.
+//!
+//! Where changes of volume follow the grid instead, [`VolumeRates`](crate::grid::volume_rates::VolumeRates) has the sums; when they are taken,
+//! and the mean stress that is told, are here.
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::determinant;
@@ -22,7 +25,7 @@ use crate::grid::node::Node;
 use crate::grid::state::GridState;
 use crate::kernel::any::Interpolated;
 use crate::kernel::buffers::{Buffers, GridValues};
-use crate::kernel::copies::{BLOCK, Copies};
+use crate::kernel::copies::{BLOCK, Copies, successive};
 use crate::kernel::projected::VARIABLES;
 use crate::step::g2p::{CHUNK, FromGrid};
 use crate::step::p2g::P2g;
@@ -40,6 +43,56 @@ enum Scalar {
 }
 
 impl<T: Lanes, const D: usize> State<T, D> {
+    /// Where changes of volume follow the grid: sets the growth of nodes in a time, by their velocities; by their masses before forces are
+    /// known, `is_early`, weights are computed first.
+    pub(crate) fn set_growth(&mut self, is_early: bool, time: T) {
+        let GridState { constants, layout, bins, nodes, rates, .. } = &mut self.grid;
+        if let Some(rates) = rates {
+            if is_early {
+                rates.weigh_all((constants, layout), bins, nodes);
+            }
+            rates.set((constants, layout), bins, nodes, time);
+        }
+    }
+
+    /// As [`set_growth`](Self::set_growth) by the reprojected velocities.
+    pub(crate) fn set_reprojected_growth(&mut self, time: T) {
+        let GridState { constants, layout, bins, reprojected, rates, .. } = &mut self.grid;
+        if let Some(rates) = rates {
+            rates.set((constants, layout), bins, reprojected, time);
+        }
+    }
+
+    /// Where changes of volume follow the grid: sets the mean stresses that are told, each of a particle alone.
+    pub(crate) fn tell_mean_stress(&mut self) {
+        let Self { particles, grid, law, domain, buffers, .. } = self;
+        let c = grid.constants;
+        let Particles { F, mass, volume, internal, .. } = particles;
+        let (F, mass, volume, law, domain) = (&*F, &*mass, &*volume, &**law, &**domain);
+        let buffers = &*buffers;
+        each(internal.chunks_mut(CHUNK * VARIABLES).enumerate().collect(), &|(piece, internal)| {
+            let mut own = buffers.take(domain, false);
+            let mut copies = Copies::new();
+            for (index, internal) in internal.chunks_mut(BLOCK * VARIABLES).enumerate() {
+                let first = piece * CHUNK + index * BLOCK;
+                let ids = &successive(first)[..internal.len() / VARIABLES];
+                let mut theta = [T::one(); BLOCK];
+                for (theta, own) in theta.iter_mut().zip(internal.chunks_exact(VARIABLES)) {
+                    *theta = own[0];
+                }
+                own.contributions.take(ids, mass, volume);
+                copies.pick_F(ids, F);
+                law.mean_stresses(&c, &copies.F, &theta, &mut own.contributions);
+                for (k, internal) in internal.chunks_exact_mut(VARIABLES).enumerate() {
+                    let p = first + k;
+                    let mean = own.contributions.value[k].values[0] / volume[p];
+                    internal[1] = mean * theta[k] / determinant(&F[p]);
+                }
+            }
+            buffers.give_back(own);
+        });
+    }
+
     /// Sets the projected changes of volume and mean stresses: of F as it is, or of F after the early part of a step.
     ///
     /// With `A` the mean to the nodes and back, a projection is `2 A - A^2`, since means alone smooth by `h^2`: at the nodes, twice the means less the
