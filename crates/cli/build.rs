@@ -6,6 +6,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "build/commit.rs"]
+mod commit;
+
 fn main() -> io::Result<()> {
     // A published package lies beside strangers; its own Cargo.lock tells the versions of all others.
     let in_repository = Path::new("../../crates/cli/Cargo.toml").is_file();
@@ -47,24 +50,11 @@ fn main() -> io::Result<()> {
         std::env::var(name).unwrap_or_default().hash(&mut sum);
     }
     println!("cargo::rustc-env=MMS_BUILD={:016x}", sum.finish());
-    let commit = if in_repository { commit_of(&root) } else { packaged_commit() };
+    let commit = if in_repository { commit::of(&root) } else { packaged_commit() };
     let commit = commit.map(|commit| format!(" ({commit})")).unwrap_or_default();
     let version = std::env::var("CARGO_PKG_VERSION").unwrap_or_default();
     println!("cargo::rustc-env=MMS_VERSION={version}{commit}");
     Ok(())
-}
-
-/// The commit that is checked out, and whether sources differ from it. This runs anew where sources change, so that it is the state
-/// from which the command was built, also after that state has been committed.
-fn commit_of(root: &Path) -> Option<String> {
-    let git = |arguments: &[&str]| {
-        let done = Command::new("git").arg("-C").arg(root).args(arguments).output().ok()?;
-        done.status.success().then(|| String::from_utf8_lossy(&done.stdout).trim().to_owned())
-    };
-    let commit = git(&["rev-parse", "--short=10", "HEAD"]).filter(|commit| !commit.is_empty())?;
-    let changes =
-        git(&["status", "--porcelain", "--", "crates", "mms-specs", "Cargo.toml", "Cargo.lock"])?;
-    Some(if changes.is_empty() { commit } else { format!("{commit} with changes") })
 }
 
 /// The commit from which `cargo package` took this package.

@@ -26,4 +26,5 @@ mod statics;
 mod terminal;
 mod told_causes;
 mod tradeoff;
+mod version;
 mod warnings;
