@@ -56,7 +56,7 @@ enum Task {
         #[arg(value_name = "supports OUTPUT")]
         question: Vec<String>,
     },
-    /// Look whether all crates can be published: what their manifests say, and what `cargo publish` would do.
+    /// Look whether all crates can be published: what their manifests say, and whether each compiles from what would be published.
     Publish {
         /// Publish nothing. There is no other way: whoever publishes runs `cargo publish --workspace`.
         #[arg(long, required = true)]
@@ -127,7 +127,7 @@ fn run(task: Task) -> anyhow::Result<ExitCode> {
             (Vec::new(), false)
         }
         Task::Page { out, no_solver } => (page::run(&repository(), &out, !no_solver)?, false),
-        Task::Publish { no_build, .. } => publish::check(&repository(), no_build)?,
+        Task::Publish { no_build, .. } => publish::check(&repository(), no_build, say)?,
         Task::Release { out, allow_dirty } => {
             (release::run(&repository(), &out, allow_dirty)?, false)
         }

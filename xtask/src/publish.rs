@@ -3,14 +3,20 @@
 use crate::read;
 use anyhow::{Context, bail};
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 
 /// Keys that each published package states.
 const KEYS: [&str; 5] = ["description", "license", "readme", "documentation", "rust_version"];
 
-/// A line for each fault, or one that says that there is none, and whether there is one.
-pub(crate) fn check(repository: &Path, no_build: bool) -> anyhow::Result<(Vec<String>, bool)> {
+/// A line for each fault, or one that says that there is none, and whether there is one. What takes time is told meanwhile.
+pub(crate) fn check(
+    repository: &Path,
+    no_build: bool,
+    say: impl Fn(&str),
+) -> anyhow::Result<(Vec<String>, bool)> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let described = Command::new(&cargo)
         .args(["metadata", "--no-deps", "--format-version", "1"])
@@ -20,44 +26,123 @@ pub(crate) fn check(repository: &Path, no_build: bool) -> anyhow::Result<(Vec<St
     if !described.status.success() {
         bail!("cargo metadata fails:\n{}", String::from_utf8_lossy(&described.stderr));
     }
-    let packages: Value =
+    let described: Value =
         serde_json::from_slice(&described.stdout).context("cargo metadata writes no JSON")?;
-    let packages = packages["packages"].as_array().context("cargo metadata lists no packages")?;
+    let packages = described["packages"].as_array().context("cargo metadata lists no packages")?;
     let mut lines: Vec<String> = packages.iter().flat_map(manifest_faults).collect();
-    let mut published = 0;
-    for package in packages.iter().filter(|package| is_published(package)) {
-        published += 1;
+    let (published, others): (Vec<&Value>, Vec<&Value>) =
+        packages.iter().partition(|package| is_published(package));
+    for package in &published {
         lines.extend(leaving(package)?);
     }
     if !lines.is_empty() {
         return Ok((lines, true));
     }
     // In the order of their dependencies, which stand in for those that the registry does not have yet.
-    let mut order = Command::new(&cargo);
-    order.current_dir(repository);
-    if no_build {
-        order.args(["package", "--workspace", "--no-verify", "--allow-dirty"]);
-        for package in packages.iter().filter(|package| !is_published(package)) {
-            order.args(["--exclude", package["name"].as_str().unwrap_or_default()]);
-        }
-    } else {
-        order.args(["publish", "--workspace", "--dry-run", "--allow-dirty"]);
+    say("packing");
+    let mut pack = Command::new(&cargo);
+    pack.current_dir(repository).args(["package", "--workspace", "--no-verify", "--allow-dirty"]);
+    for package in others {
+        pack.args(["--exclude", text(package, "name")]);
     }
-    let done = order.output().context("cannot start cargo")?;
-    let said = String::from_utf8_lossy(&done.stderr);
-    let warnings =
-        said.lines().filter(|line| line.starts_with("warning:") && !line.contains("dry run"));
-    lines.extend(warnings.map(str::to_owned));
-    if !done.status.success() {
-        lines.push(format!("cargo ends with {}:\n{said}", done.status));
+    lines = faults(&mut pack)?;
+    if lines.is_empty() && !no_build {
+        let target = Path::new(text(&described, "target_directory"));
+        let place = target.join("package/unpacked");
+        let names: Vec<&str> = published.iter().map(|package| text(package, "name")).collect();
+        unpack(&published, &target.join("package"), &place)?;
+        std::fs::copy(repository.join("Cargo.lock"), place.join("Cargo.lock"))
+            .context("cannot copy Cargo.lock")?;
+        lines = compile(&cargo, repository, &place, target, &names, say)?;
     }
     let failed = !lines.is_empty();
     if !failed {
         lines.push(format!(
-            "{published} packages can be published, in the order of cargo publish --workspace"
+            "{} packages can be published, in the order of cargo publish --workspace",
+            published.len()
         ));
     }
     Ok((lines, failed))
+}
+
+/// Unpacks the files of `packages` from the folder `packed` into a workspace of their own at `place`, in which they are the packages of the
+/// registry to each other.
+fn unpack(packages: &[&Value], packed: &Path, place: &Path) -> anyhow::Result<()> {
+    if place.exists() {
+        std::fs::remove_dir_all(place)
+            .with_context(|| format!("cannot remove {}", place.display()))?;
+    }
+    let mut members = String::new();
+    let mut patches = String::new();
+    for package in packages {
+        let name = text(package, "name");
+        let folder = format!("{name}-{}", text(package, "version"));
+        members += &format!("    \"{folder}\",\n");
+        patches += &format!("{name} = {{ path = \"{folder}\" }}\n");
+    }
+    let manifest = format!(
+        "[workspace]\nresolver = \"3\"\nmembers = [\n{members}]\n\n[patch.crates-io]\n{patches}"
+    );
+    crate::write(&place.join("Cargo.toml"), &manifest)?;
+    for package in packages {
+        let file = format!("{}-{}.crate", text(package, "name"), text(package, "version"));
+        let mut tar = Command::new("tar");
+        // All files in it have one and the same time, from which Cargo would take changed ones for those that it has compiled.
+        tar.args(["--extract", "--gzip", "--touch", "--directory"]).arg(place);
+        let done =
+            tar.arg("--file").arg(packed.join(&file)).output().context("cannot start tar")?;
+        if !done.status.success() {
+            bail!("{file} cannot be unpacked:\n{}", String::from_utf8_lossy(&done.stderr));
+        }
+    }
+    Ok(())
+}
+
+/// Compiles each package by itself, with the features that it asks of the others and no more, up to the first fault.
+///
+/// `cargo publish --dry-run` would keep the sources of all packages in Cargo's home by name and version, and compile these when it is called
+/// again after a change.
+fn compile(
+    cargo: &OsStr,
+    repository: &Path,
+    place: &Path,
+    target: &Path,
+    names: &[&str],
+    say: impl Fn(&str),
+) -> anyhow::Result<Vec<String>> {
+    for (number, name) in names.iter().enumerate() {
+        say(&format!("{name}, {} of {}", number + 1, names.len()));
+        let start = Instant::now();
+        let mut check = Command::new(cargo);
+        // With the compiler that the repository names, also where the target lies elsewhere.
+        check.current_dir(repository).args(["check", "--package", name, "--manifest-path"]);
+        check.arg(place.join("Cargo.toml")).arg("--target-dir").arg(target);
+        // Whoever builds the package has no lints of this repository.
+        check.env_remove("RUSTC_WRAPPER").env_remove("CLIPPY_ARGS");
+        let lines = faults(&mut check)?;
+        if !lines.is_empty() {
+            return Ok(lines);
+        }
+        say(&format!("{name}: {:.0} s", start.elapsed().as_secs_f64()));
+    }
+    Ok(Vec::new())
+}
+
+/// Warnings of a call of Cargo, and all that it says where it fails.
+fn faults(cargo: &mut Command) -> anyhow::Result<Vec<String>> {
+    let done = cargo.output().context("cannot start cargo")?;
+    let said = String::from_utf8_lossy(&done.stderr);
+    let warnings = said.lines().filter(|line| line.starts_with("warning:"));
+    let mut lines: Vec<String> = warnings.map(str::to_owned).collect();
+    if !done.status.success() {
+        lines.push(format!("cargo ends with {}:\n{said}", done.status));
+    }
+    Ok(lines)
+}
+
+/// A text in what Cargo tells of a package, or an empty one.
+fn text<'a>(package: &'a Value, key: &str) -> &'a str {
+    package[key].as_str().unwrap_or_default()
 }
 
 /// Whether a package goes to the registry: `publish = false` is an empty list.
@@ -137,6 +222,47 @@ fn leaving(package: &Value) -> anyhow::Result<Vec<String>> {
 mod tests {
     use super::*;
     use serde_json::json;
+    use std::fs;
+
+    /// Packs a package as Cargo does: all files are of one time.
+    fn pack(place: &Path, name: &str, dependencies: &str, code: &str) {
+        let folder = place.join(format!("{name}-0.1.0"));
+        fs::create_dir_all(folder.join("src")).unwrap();
+        let manifest = format!(
+            "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n{dependencies}"
+        );
+        fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+        fs::write(folder.join("src/lib.rs"), code).unwrap();
+        let mut tar = Command::new("tar");
+        tar.args(["--create", "--gzip", "--mtime=@1000000000", "--directory"]).arg(place);
+        tar.arg("--file").arg(place.join(format!("{name}-0.1.0.crate")));
+        assert!(tar.arg(format!("{name}-0.1.0")).status().unwrap().success());
+    }
+
+    #[test]
+    fn packages_are_compiled_with_each_other_as_they_are_now() {
+        let folder = tempfile::tempdir().unwrap();
+        let (packed, target) = (folder.path().join("packed"), folder.path().join("target"));
+        let names = ["mmsmith-small", "mmsmith-user"];
+        let packages = names.map(|name| json!({"name": name, "version": "0.1.0"}));
+        let compiled = || {
+            let place = folder.path().join("unpacked");
+            unpack(&packages.each_ref(), &packed, &place).unwrap();
+            compile(OsStr::new("cargo"), folder.path(), &place, &target, &names, |_| ()).unwrap()
+        };
+        let user = "pub fn g() -> u8 { mmsmith_small::";
+        pack(&packed, names[0], "", "pub fn first() -> u8 { 1 }");
+        pack(&packed, names[1], "mmsmith-small = \"0.1.0\"", &format!("{user}first() }}"));
+        assert_eq!(compiled(), [""; 0]);
+        pack(&packed, names[0], "", "pub fn other() -> u8 { 1 }");
+        let faults = compiled().join("\n");
+        assert!(faults.contains("cannot find function `first`"), "{faults}");
+        pack(&packed, names[1], "mmsmith-small = \"0.1.0\"", &format!("{user}other() }}"));
+        assert_eq!(compiled(), [""; 0]);
+        pack(&packed, names[0], "", "pub fn other() -> u8 { let unused = 2; 1 }");
+        let faults = compiled().join("\n");
+        assert!(faults.contains("warning: unused variable"), "{faults}");
+    }
 
     #[test]
     fn a_package_of_crates_states_all_that_the_registry_asks() {
