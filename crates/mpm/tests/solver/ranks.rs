@@ -4,8 +4,8 @@
 
 use mmsmith_clip::{Clip, Side};
 use mmsmith_mpm::{
-    Body, BodyForce, Grid, Integrator, Interpolation, Load, Material, SavedState, SavedStateError,
-    Scalar, Settings, SetupError, Shape, Share, Simulation, StepError, Transfer,
+    Body, BodyForce, Grid, Integrator, Interpolation, Law, Load, Material, SavedState,
+    SavedStateError, Scalar, Settings, SetupError, Shape, Share, Simulation, StepError, Transfer,
 };
 use mmsmith_ranks::{Ranks, counted, in_process};
 use nalgebra::{SMatrix, SVector};
@@ -56,6 +56,14 @@ pub(crate) fn body<const D: usize>(speed: f64, is_uniform: bool) -> Body<f64, D>
 
 pub(crate) fn law() -> Material<f64> {
     Material::NeoHookean { lambda: 60.0, mu: 40.0 }
+}
+
+/// That law with changes of volume that follow the grid, or are projected.
+fn projected<const D: usize>() -> Law<f64, D>
+where
+    f64: Scalar<D>,
+{
+    mmsmith_laws::with_projected_volume(law().into()).unwrap()
 }
 
 fn body_force<const D: usize>(X: &[SVector<f64, D>], t: f64, b: &mut [SVector<f64, D>]) {
@@ -130,18 +138,18 @@ where
     f64: Scalar<D>,
 {
     let whole = body::<D>(speed, settings.transfer == Transfer::Flip);
-    agrees_on((&grid::<D>(), &whole), settings, counts, steps);
+    agrees_on((&grid::<D>(), &whole, law().into()), settings, counts, steps);
 }
 
 fn agrees_on<const D: usize>(
-    (grid, whole): (&Grid<f64, D>, &Body<f64, D>),
+    (grid, whole, law): (&Grid<f64, D>, &Body<f64, D>, Law<f64, D>),
     settings: Settings<f64>,
     counts: &[usize],
     steps: usize,
 ) where
     f64: Scalar<D>,
 {
-    let set_up = || Simulation::new(grid.clone(), whole.clone(), law(), settings).unwrap();
+    let set_up = || Simulation::new(grid.clone(), whole.clone(), law.clone(), settings).unwrap();
     let (expected, error, _) = fly(&mut set_up(), steps);
     assert_ne!(expected, state(&mut set_up()));
     for &count in counts {
@@ -149,7 +157,7 @@ fn agrees_on<const D: usize>(
             let (body, ids) = share(whole, &*ranks);
             let share = Share { ranks, ids };
             let mut part =
-                Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
+                Simulation::shared_out(grid.clone(), body, share, law.clone(), settings).unwrap();
             fly(&mut part, steps)
         });
         let what = format!("{count} processes, {steps} steps, {settings:?}");
@@ -178,6 +186,45 @@ pub(crate) fn flying(settings: Settings<f64>) -> Settings<f64> {
 fn every_scheme_has_the_bits_of_one_process() {
     for settings in schemes::schemes().map(flying) {
         agrees::<2>(settings, &[2, 3], 14.0, 14);
+    }
+}
+
+/// With changes of volume that follow the grid, whose forces reach farther than the nodes of a particle, and with means.
+#[test]
+fn projected_changes_of_volume_have_the_bits_of_one_process() {
+    for (n, settings) in schemes::schemes().map(flying).enumerate() {
+        // Particles that share corners have a body of their own.
+        if settings.shape == Shape::Cpdi2 {
+            continue;
+        }
+        let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
+        agrees_on((&grid(), &whole, projected()), settings, &[2 + n % 3], 14);
+        if n % 9 == 0 {
+            let whole = body::<1>(-16.0, false);
+            agrees_on((&grid(), &whole, projected()), settings, &[4], 30);
+            let whole = body::<3>(-14.0, true);
+            agrees_on((&grid(), &whole, projected()), settings, &[3], 9);
+        }
+    }
+}
+
+#[test]
+fn what_is_saved_of_projected_changes_of_volume_goes_on() {
+    for (n, settings) in schemes::schemes().map(flying).enumerate().step_by(5) {
+        if settings.shape == Shape::Cpdi2 {
+            continue;
+        }
+        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
+        let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
+        let grid = grid();
+        let case = || (&grid, &whole, settings, projected());
+        let (many, expected) = save_and_go_on(case(), 2 + n % 3, None);
+        for count in [1, 5] {
+            let (again, found) = save_and_go_on(case(), count, Some(&many));
+            let other = found.iter().zip(&expected).find(|(a, b)| a != b);
+            assert_eq!(other, None, "{} to {count} processes, {settings:?}", many.len());
+            assert_eq!(again.len(), count);
+        }
     }
 }
 
@@ -282,7 +329,7 @@ fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
 
 /// The states that `count` processes save after some steps, each its part, and what they come to in some more.
 fn save_and_go_on<const D: usize>(
-    (grid, whole, settings): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>),
+    (grid, whole, settings, law): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>, Law<f64, D>),
     count: usize,
     taken_up: Option<&[SavedState]>,
 ) -> (Vec<SavedState>, Vec<Of<D>>)
@@ -293,7 +340,8 @@ where
         let rank = ranks.rank();
         let (body, ids) = share(whole, &*ranks);
         let share = Share { ranks, ids };
-        let mut part = Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
+        let mut part =
+            Simulation::shared_out(grid.clone(), body, share, law.clone(), settings).unwrap();
         match taken_up {
             // What continues has gone another way before.
             Some(parts) => {
@@ -319,12 +367,13 @@ fn what_any_number_of_processes_saved_any_other_goes_on_with() {
     for (n, settings) in schemes::schemes().map(flying).enumerate() {
         let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
         let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
-        let (one, expected) = save_and_go_on((&grid(), &whole, settings), 1, None);
-        let (many, _) = save_and_go_on((&grid(), &whole, settings), 2 + n % 3, None);
+        let (one, expected) = save_and_go_on((&grid(), &whole, settings, law().into()), 1, None);
+        let (many, _) = save_and_go_on((&grid(), &whole, settings, law().into()), 2 + n % 3, None);
         let pairs = [(&one, 3), (&many, 1), (&many, 2), (&many, 5)];
         // Two of them for a scheme, so that each is there for half of the schemes.
         for (saved, count) in [pairs[n % 4], pairs[(n + 1) % 4]] {
-            let (again, found) = save_and_go_on((&grid(), &whole, settings), count, Some(saved));
+            let (again, found) =
+                save_and_go_on((&grid(), &whole, settings, law().into()), count, Some(saved));
             let other = found.iter().zip(&expected).find(|(a, b)| a != b);
             let what = format!("{} to {count} processes, {settings:?}", saved.len());
             assert_eq!((found.len(), other), (expected.len(), None), "{what}");
@@ -344,13 +393,13 @@ fn one_process_goes_on_with_what_several_saved() {
     let settings = flying(schemes::schemes().next().unwrap());
     let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
     let whole = body::<3>(-14.0, true);
-    let (saved, expected) = save_and_go_on((&grid(), &whole, settings), 3, None);
+    let (saved, expected) = save_and_go_on((&grid(), &whole, settings, law().into()), 3, None);
     let mut alone = Simulation::new(grid::<3>(), whole.clone(), law(), settings).unwrap();
     alone.take_up(saved).unwrap();
     fly(&mut alone, 8);
     assert_eq!(state(&mut alone), expected);
     // A part is missing, or is there twice.
-    let (saved, _) = save_and_go_on((&grid(), &whole, settings), 3, None);
+    let (saved, _) = save_and_go_on((&grid(), &whole, settings, law().into()), 3, None);
     assert_eq!(alone.take_up(saved[1..].to_vec()), Err(SavedStateError::Particles));
     let refused = in_process(2, |ranks| {
         let rank = ranks.rank();
@@ -519,7 +568,7 @@ fn bodies_that_turn_about_their_axis_have_the_bits_of_one_process() {
         let mut whole = revolving::body(&grid, 1.0);
         whole.particles.v.iter_mut().for_each(|v| v[2] += 40.0);
         let settings = Settings { time_step: 1.0 / 512.0, ..settings };
-        agrees_on((&grid, &whole), settings, &[1, 2, 3], 16);
+        agrees_on((&grid, &whole, law().into()), settings, &[1, 2, 3], 16);
     }
 }
 
@@ -528,12 +577,12 @@ fn polygons_have_the_bits_of_one_process() {
     for settings in polygon_settings() {
         let settings = Settings { time_step: 1.0 / 512.0, ..settings };
         let (grid, whole) = polygons::<2>(40.0);
-        agrees_on((&grid, &whole), settings, &[1, 2, 5], 16);
+        agrees_on((&grid, &whole, law().into()), settings, &[1, 2, 5], 16);
     }
     for settings in polygon_settings().step_by(5) {
         let settings = Settings { time_step: 1.0 / 512.0, ..settings };
         let (grid, whole) = polygons::<3>(70.0);
-        agrees_on((&grid, &whole), settings, &[3], 16);
+        agrees_on((&grid, &whole, law().into()), settings, &[3], 16);
     }
 }
 
@@ -545,7 +594,7 @@ fn polygons_that_turn_inside_out_are_told_alike_by_all() {
     for integrator in [Integrator::Usf, Integrator::Usl] {
         let settings = schemes::settings(Shape::Cpdi2, integrator, Transfer::Flip);
         let settings = Settings { time_step: 1.0 / 512.0, ..settings };
-        agrees_on((&grid, &whole), settings, &[2, 4], 40);
+        agrees_on((&grid, &whole, law().into()), settings, &[2, 4], 40);
     }
 }
 
@@ -553,15 +602,15 @@ fn polygons_that_turn_inside_out_are_told_alike_by_all() {
 fn polygons_that_any_number_of_processes_saved_any_other_goes_on_with() {
     for settings in polygon_settings().step_by(2) {
         let (grid, whole) = polygons::<2>(30.0);
-        let case = (&grid, &whole, settings);
+        let case = || (&grid, &whole, settings, law().into());
         let mut alone = Simulation::new(grid.clone(), whole.clone(), law(), settings).unwrap();
         fly(&mut alone, 7);
         let one: SavedState = alone.state().iter().map(|array| array.to_vec()).collect();
         fly(&mut alone, 8);
         let expected = state(&mut alone);
-        let (many, _) = save_and_go_on(case, 3, None);
+        let (many, _) = save_and_go_on(case(), 3, None);
         for (saved, count) in [(&vec![one], 3), (&many, 1), (&many, 2), (&many, 4)] {
-            let (_, found) = save_and_go_on(case, count, Some(saved));
+            let (_, found) = save_and_go_on(case(), count, Some(saved));
             let other = found.iter().zip(&expected).find(|(a, b)| a != b);
             let what = format!("{} to {count} processes, {settings:?}", saved.len());
             assert_eq!((found.len(), other), (expected.len(), None), "{what}");
