@@ -396,10 +396,17 @@ mod tests {
         spread.iter().find(|s| s.0 == node).map_or((0.0, 0.0), |s| (s.1, s.2))
     }
 
-    fn check<const W: usize>(w: &AxisWeights<f64, W>, xi: f64) -> Result<(), TestCaseError> {
+    /// Weights at a place, with the half-size by which differences are divided.
+    fn check<const W: usize>(
+        w: &AxisWeights<f64, W>,
+        xi: f64,
+        half_size: f64,
+    ) -> Result<(), TestCaseError> {
         let nodes = spread(w);
+        // Sums of weights are one but for rounding at both ends of the box.
+        let of_slopes = 1e-14_f64.max(8.0 * f64::EPSILON / half_size);
         prop_assert!((nodes.iter().map(|n| n.1).sum::<f64>() - 1.0).abs() < 1e-14);
-        prop_assert!(nodes.iter().map(|n| n.2).sum::<f64>().abs() < 1e-14);
+        prop_assert!(nodes.iter().map(|n| n.2).sum::<f64>().abs() < of_slopes);
         prop_assert!((nodes.iter().map(|n| n.0 * n.1).sum::<f64>() - xi).abs() < 1e-12);
         prop_assert!((nodes.iter().map(|n| n.0 * n.2).sum::<f64>() - 1.0).abs() < 1e-12);
         prop_assert!(nodes.iter().all(|n| n.1 >= 0.0));
@@ -458,13 +465,13 @@ mod tests {
     proptest! {
         #[test]
         fn linear_fields_are_reproduced(xi in 0.0..20.0_f64, l in 1e-3..0.5_f64, wide in 1e-2..2.0_f64) {
-            check(&hat(xi), xi)?;
-            check(&gimp_axis(xi, l), xi)?;
-            check(&quadratic(xi), xi)?;
-            check(&cubic(xi), xi)?;
-            check(&extended_axis(xi, wide), xi)?;
-            check(&mean(xi, l), xi)?;
-            check(&extended_mean(xi, 0.75 * wide), xi)?;
+            check(&hat(xi), xi, 0.5)?;
+            check(&gimp_axis(xi, l), xi, l)?;
+            check(&quadratic(xi), xi, 0.5)?;
+            check(&cubic(xi), xi, 0.5)?;
+            check(&extended_axis(xi, wide), xi, wide)?;
+            check(&mean(xi, l), xi, l)?;
+            check(&extended_mean(xi, 0.75 * wide), xi, 0.75 * wide)?;
         }
 
         /// Particles are sorted by the lower edges of their weights.
