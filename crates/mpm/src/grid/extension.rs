@@ -18,14 +18,14 @@ use std::ops::Range;
 
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_lanes::tensor::real;
-use mmsmith_ranks::Ranks;
 use mmsmith_rare_states::{RareState, met_if};
 use mmsmith_threads::parallel::*;
 
 use crate::grid::bins::{AddToBand, Bins};
 use crate::grid::geometry::Constants;
-use crate::grid::grid_update::{GridUpdate, NodeUpdate, receive_nodes, send_nodes};
+use crate::grid::grid_update::{GridUpdate, NodeUpdate};
 use crate::grid::node::Node;
+use crate::grid::rows_around::RowsAround;
 use crate::grid::{Layout, PAD_BELOW};
 use mmsmith_threads::each_chunk;
 
@@ -39,9 +39,6 @@ const LIGHT: f64 = 0.01;
 const NODES: usize = 4096;
 const ROWS: usize = 8;
 
-/// Rows of other processes that light nodes here may continue, or have in common with light nodes there; a layer of tiles has as many.
-const ROWS_AROUND: usize = 8;
-
 /// Offsets along an axis from a light node to the first node of a pair that it may continue.
 const OFFSETS: Range<isize> = -2..2;
 
@@ -52,8 +49,8 @@ pub(crate) struct Extension<T, const D: usize> {
     is_of_half_plane: bool,
     light: Vec<Light>,
     inner: Vec<Inner<T>>,
-    /// Several processes: the nodes here between some of other processes' rows.
-    padded: Vec<Node<T, D>>,
+    /// Rows of other processes that light nodes here may continue, or have in common with light nodes there.
+    around: RowsAround<T, D>,
 }
 
 /// A light node.
@@ -75,8 +72,8 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
     /// For cells of the mass `of_cell`; in the half plane of a body of revolution of that mass times their radius.
     pub(crate) fn new(of_cell: T, is_of_half_plane: bool) -> Self {
         let least_mass = of_cell * real(LIGHT);
-        let (light, inner, padded) = (Vec::new(), Vec::new(), Vec::new());
-        Self { least_mass, is_of_half_plane, light, inner, padded }
+        let (light, inner, around) = (Vec::new(), Vec::new(), RowsAround::default());
+        Self { least_mass, is_of_half_plane, light, inner, around }
     }
 
     /// Calls `add` for every tile, as [`GridUpdate::p2g`], and updates the nodes, light ones last.
@@ -88,19 +85,11 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
         add: &AddToBand<'_, Node<T, D>, D>,
     ) {
         grid.sums().p2g(bins, nodes, add);
-        let (layout, ranks) = (grid.layout, bins.ranks());
-        let Some(ranks) = ranks.as_deref() else {
-            return self.update(grid, layout.first_row, nodes);
-        };
-        let row = layout.row();
-        let shared = bins.shared_rows().map(|rows| rows.map(|rows| rows.len() * row));
-        let mut padded = std::mem::take(&mut self.padded);
-        let first_row = layout.first_row - if shared[0].is_some() { ROWS_AROUND } else { 0 };
-        pad((ranks, shared), (ROWS_AROUND * row, grid.c.sent), nodes, &mut padded);
-        self.update(grid, first_row, &mut padded);
-        let own = (layout.first_row - first_row) * row;
-        nodes.copy_from_slice(&padded[own..own + nodes.len()]);
-        self.padded = padded;
+        let mut around = std::mem::take(&mut self.around);
+        around.with((grid.c, grid.layout), bins, nodes, |first_row, nodes| {
+            self.update(grid, first_row, nodes);
+        });
+        self.around = around;
     }
 
     /// Updates nodes that have all sums, from row `first_row` of the grid on.
@@ -181,37 +170,6 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
             light.push(Light { node, inner: start..inner.len() });
         }
         met_if(RareState::LightNode, || !light.is_empty());
-    }
-}
-
-/// Puts `nodes` between `count` nodes of the processes below and above, where there are such, with which so many of the first and of the
-/// last nodes are `shared`; of these come the first `sent` numbers.
-pub(crate) fn pad<T: Lanes, const D: usize>(
-    (ranks, shared): (&dyn Ranks, [Option<usize>; 2]),
-    (count, sent): (usize, usize),
-    nodes: &[Node<T, D>],
-    padded: &mut Vec<Node<T, D>>,
-) {
-    let [below, above] = shared;
-    let [low, high] = shared.map(|shared| if shared.is_some() { count } else { 0 });
-    padded.clear();
-    padded.resize(low, Node::zero());
-    padded.extend_from_slice(nodes);
-    padded.resize(low + nodes.len() + high, Node::zero());
-    // Neighbours have the shared rows, too, so that what they lack comes next. A process has the rows of two layers at least.
-    let rank = ranks.rank();
-    if let Some(shared) = below {
-        send_nodes(ranks, rank - 1, sent, &nodes[shared..shared + count]);
-    }
-    if let Some(shared) = above {
-        let end = nodes.len() - shared;
-        send_nodes(ranks, rank + 1, sent, &nodes[end - count..end]);
-    }
-    if below.is_some() {
-        receive_nodes(ranks, rank - 1, sent, &mut padded[..low]);
-    }
-    if above.is_some() {
-        receive_nodes(ranks, rank + 1, sent, &mut padded[low + nodes.len()..]);
     }
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod extension;
 pub(crate) mod geometry;
 pub(crate) mod grid_update;
 pub(crate) mod node;
+pub(crate) mod rows_around;
 pub(crate) mod state;
 pub(crate) mod tiles;
 pub(crate) mod volume_rates;

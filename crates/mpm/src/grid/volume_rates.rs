@@ -29,10 +29,10 @@ use mmsmith_threads::each_chunk;
 use nalgebra::SMatrix;
 
 use crate::grid::bins::{AddToBand, Bins};
-use crate::grid::extension::pad;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
 use crate::grid::node::Node;
+use crate::grid::rows_around::RowsAround;
 use crate::grid::{Layout, NODES_AT_ONCE};
 
 /// The share of a whole cell's mass from which on a node does not lessen the weight of its cells.
@@ -40,10 +40,6 @@ const LEAST_SHARE: f64 = 0.25;
 
 /// The share of the differences to neighbouring nodes that `K` adds.
 const SHARPENING: f64 = 1.0 / 6.0;
-
-/// Rows of other processes that nodes here depend on: those of the cells at a node, of their neighbours, and of the nodes whose mirror image
-/// these are. A layer of tiles has as many.
-const ROWS_AROUND: usize = 8;
 
 /// Corners of a cell in space.
 const MOST_CORNERS: usize = 8;
@@ -64,8 +60,9 @@ pub(crate) struct VolumeRates<T, const D: usize> {
     cells: Vec<T>,
     /// A vector of each node, component by component.
     vectors: [Vec<T>; D],
-    /// Several processes: the nodes here between some of other processes' rows.
-    padded: Vec<Node<T, D>>,
+    /// Rows of other processes that nodes here depend on: those of the cells at a node, of their neighbours, and of the nodes whose mirror image
+    /// these are.
+    around: RowsAround<T, D>,
 }
 
 /// The grid as passes over its nodes see it.
@@ -84,8 +81,8 @@ impl<T: Lanes, const D: usize> VolumeRates<T, D> {
         let (weights, shares, inverse) = (none(), none(), none());
         let (plain, sharpened, cells) = (none(), none(), none());
         let vectors = std::array::from_fn(|_| Vec::new());
-        let padded = Vec::new();
-        Self { mass_of_cell, weights, shares, inverse, plain, sharpened, cells, vectors, padded }
+        let around = RowsAround::default();
+        Self { mass_of_cell, weights, shares, inverse, plain, sharpened, cells, vectors, around }
     }
 
     /// Calls `add` for every tile, as [`GridUpdate::p2g`], adds the forces of the mean stresses, which are in the nodes' scalars, and updates
@@ -151,19 +148,11 @@ impl<T: Lanes, const D: usize> VolumeRates<T, D> {
         nodes: &mut [Node<T, D>],
         work: impl FnOnce(&mut Self, Place<'_, T, D>, &mut [Node<T, D>]),
     ) {
-        let first_row = layout.first_row;
-        let Some(ranks) = bins.ranks() else {
-            return work(self, Place { c, layout, first_row }, nodes);
-        };
-        let row = layout.row();
-        let shared = bins.shared_rows().map(|rows| rows.map(|rows| rows.len() * row));
-        let mut padded = std::mem::take(&mut self.padded);
-        let first_row = first_row - if shared[0].is_some() { ROWS_AROUND } else { 0 };
-        pad((&*ranks, shared), (ROWS_AROUND * row, c.sent), nodes, &mut padded);
-        work(self, Place { c, layout, first_row }, &mut padded);
-        let own = (layout.first_row - first_row) * row;
-        nodes.copy_from_slice(&padded[own..own + nodes.len()]);
-        self.padded = padded;
+        let mut around = std::mem::take(&mut self.around);
+        around.with((c, layout), bins, nodes, |first_row, nodes| {
+            work(self, Place { c, layout, first_row }, nodes);
+        });
+        self.around = around;
     }
 
     /// Sets the weights of cells.
