@@ -193,10 +193,6 @@ fn every_scheme_has_the_bits_of_one_process() {
 #[test]
 fn projected_changes_of_volume_have_the_bits_of_one_process() {
     for (n, settings) in schemes::schemes().map(flying).enumerate() {
-        // Particles that share corners have a body of their own.
-        if settings.shape == Shape::Cpdi2 {
-            continue;
-        }
         let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
         agrees_on((&grid(), &whole, projected()), settings, &[2 + n % 3], 14);
         if n % 9 == 0 {
@@ -206,17 +202,27 @@ fn projected_changes_of_volume_have_the_bits_of_one_process() {
             agrees_on((&grid(), &whole, projected()), settings, &[3], 9);
         }
     }
+    for (n, settings) in polygon_settings().enumerate().step_by(2) {
+        let (grid, whole) = polygons::<2>(40.0);
+        agrees_on((&grid, &whole, projected()), settings, &[2 + n % 4], 16);
+    }
+    for settings in polygon_settings().step_by(7) {
+        let (grid, whole) = polygons::<3>(70.0);
+        agrees_on((&grid, &whole, projected()), settings, &[3], 16);
+    }
 }
 
 #[test]
 fn what_is_saved_of_projected_changes_of_volume_goes_on() {
-    for (n, settings) in schemes::schemes().map(flying).enumerate().step_by(5) {
-        if settings.shape == Shape::Cpdi2 {
-            continue;
-        }
+    let lattices = schemes::schemes().map(flying).step_by(5).map(|settings| {
         let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
-        let whole = body::<2>(14.0, settings.transfer == Transfer::Flip);
-        let grid = grid();
+        (grid(), body::<2>(14.0, settings.transfer == Transfer::Flip), settings)
+    });
+    let clipped = polygon_settings().step_by(4).map(|settings| {
+        let (grid, whole) = polygons::<2>(30.0);
+        (grid, whole, settings)
+    });
+    for (n, (grid, whole, settings)) in lattices.chain(clipped).enumerate() {
         let case = || (&grid, &whole, settings, projected());
         let (many, expected) = save_and_go_on(case(), 2 + n % 3, None);
         for count in [1, 5] {
