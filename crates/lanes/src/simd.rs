@@ -25,7 +25,7 @@ pub trait Loop {
 #[repr(C, align(32))]
 pub struct Lane4<T>(pub [T; 4]);
 
-/// Eight numbers in the lanes of one register in single precision, of two in double precision.
+/// Eight numbers in the lanes of one register in single precision, and in double precision where registers have 512 bits; of two registers elsewhere.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Lane8<T>(pub [T; 8]);
@@ -256,7 +256,7 @@ impl<T: Lanes, V: Vectors> Number for Eight<T, V> {
 /// The operations are functions of the number's type, not questions for it: a kernel calls them some thousand times, and each
 /// question would have to be answered for each call before anything else is compiled.
 #[cfg(target_arch = "x86_64")]
-pub trait Lanes: RealField + Pod + x86::Instructions {}
+pub trait Lanes: RealField + Pod + x86::WideInstructions {}
 
 /// A number that registers hold several of: `f64` or `f32`.
 #[cfg(not(target_arch = "x86_64"))]
@@ -269,8 +269,8 @@ impl Lanes for f32 {}
 mod x86 {
     use super::{Lane4, Lane8, Lanes, Vectors};
     use bytemuck::{bytes_of, must_cast, pod_read_unaligned};
-    use pulp::x86::V3;
-    use std::arch::x86_64::{__m128, __m256, __m256d, _MM_HINT_T0};
+    use pulp::x86::{V3, V4};
+    use std::arch::x86_64::{__m128, __m256, __m256d, __m512d, _MM_HINT_T0};
 
     /// Bytes that pass from memory at once.
     const CACHE_LINE: usize = 64;
@@ -281,10 +281,10 @@ mod x86 {
             $(fn $four:ident($vectors:ident, $($a:ident),*) { $double:expr, $single:expr })*
             eight:
             $(fn $eight:ident($vectors8:ident, $($a8:ident),*) {
-                each half $half:expr, $single8:expr
+                each half $half:expr, whole $whole:expr, $single8:expr
             })*
         ) => {
-            /// The operations of [`Vectors`] in registers of 256 bits.
+            /// The operations of [`Vectors`] in registers of up to 256 bits.
             pub trait Instructions: Sized {
                 $(fn $four(vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self>;)*
                 $(fn $eight(vectors: V3, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
@@ -292,6 +292,49 @@ mod x86 {
                 fn splat8(vectors: V3, value: Self) -> Lane8<Self>;
                 fn load(vectors: V3, values: &[Self; 4]) -> Lane4<Self>;
                 fn load8(vectors: V3, values: &[Self; 8]) -> Lane8<Self>;
+            }
+
+            /// The operations on eight numbers where registers have 512 bits.
+            pub trait WideInstructions: Instructions {
+                $(fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self>;
+                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self>;
+            }
+
+            impl WideInstructions for f64 {
+                $(#[inline(always)]
+                fn $eight($vectors8: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    $(let $a8: __m512d = must_cast($a8.0);)*
+                    Lane8(must_cast($whole))
+                })*
+
+                #[inline(always)]
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
+                    Lane8(must_cast(vectors.avx512f._mm512_set1_pd(value)))
+                }
+
+                #[inline(always)]
+                fn load8(_: V4, values: &[Self; 8]) -> Lane8<Self> {
+                    Lane8(must_cast(pod_read_unaligned::<__m512d>(bytes_of(values))))
+                }
+            }
+
+            /// Eight numbers in single precision have 256 bits.
+            impl WideInstructions for f32 {
+                $(#[inline(always)]
+                fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    <Self as Instructions>::$eight(*vectors, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
+                    <Self as Instructions>::splat8(*vectors, value)
+                }
+
+                #[inline(always)]
+                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self> {
+                    <Self as Instructions>::load8(*vectors, values)
+                }
             }
 
             impl Instructions for f64 {
@@ -370,6 +413,43 @@ mod x86 {
                 }
             }
 
+            impl Vectors for V4 {
+                $(#[inline(always)]
+                fn $four<T: Lanes>(self, $($a: Lane4<T>),*) -> Lane4<T> {
+                    <T as Instructions>::$four(*self, $($a),*)
+                })*
+
+                $(#[inline(always)]
+                fn $eight<T: Lanes>(self, $($a8: Lane8<T>),*) -> Lane8<T> {
+                    <T as WideInstructions>::$eight(self, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn splat<T: Lanes>(self, value: T) -> Lane4<T> {
+                    <T as Instructions>::splat(*self, value)
+                }
+
+                #[inline(always)]
+                fn splat8<T: Lanes>(self, value: T) -> Lane8<T> {
+                    <T as WideInstructions>::splat8(self, value)
+                }
+
+                #[inline(always)]
+                fn load<T: Lanes>(self, values: &[T; 4]) -> Lane4<T> {
+                    <T as Instructions>::load(*self, values)
+                }
+
+                #[inline(always)]
+                fn load8<T: Lanes>(self, values: &[T; 8]) -> Lane8<T> {
+                    <T as WideInstructions>::load8(self, values)
+                }
+
+                #[inline(always)]
+                fn prefetch<A>(self, value: &A) {
+                    (*self).prefetch(value);
+                }
+            }
+
             impl Vectors for V3 {
                 $(#[inline(always)]
                 fn $four<T: Lanes>(self, $($a: Lane4<T>),*) -> Lane4<T> {
@@ -441,30 +521,37 @@ mod x86 {
         eight:
         fn add8(vectors, a, b) {
             each half vectors.avx._mm256_add_pd(a, b),
+            whole vectors.avx512f._mm512_add_pd(a, b),
             vectors.avx._mm256_add_ps(a, b)
         }
         fn mul8(vectors, a, b) {
             each half vectors.avx._mm256_mul_pd(a, b),
+            whole vectors.avx512f._mm512_mul_pd(a, b),
             vectors.avx._mm256_mul_ps(a, b)
         }
         fn sub8(vectors, a, b) {
             each half vectors.avx._mm256_sub_pd(a, b),
+            whole vectors.avx512f._mm512_sub_pd(a, b),
             vectors.avx._mm256_sub_ps(a, b)
         }
         fn div8(vectors, a, b) {
             each half vectors.avx._mm256_div_pd(a, b),
+            whole vectors.avx512f._mm512_div_pd(a, b),
             vectors.avx._mm256_div_ps(a, b)
         }
         fn min8(vectors, a, b) {
             each half vectors.avx._mm256_min_pd(a, b),
+            whole vectors.avx512f._mm512_min_pd(a, b),
             vectors.avx._mm256_min_ps(a, b)
         }
         fn max8(vectors, a, b) {
             each half vectors.avx._mm256_max_pd(a, b),
+            whole vectors.avx512f._mm512_max_pd(a, b),
             vectors.avx._mm256_max_ps(a, b)
         }
         fn mul_add8(vectors, a, b, c) {
             each half vectors.fma._mm256_fmadd_pd(a, b, c),
+            whole vectors.avx512f._mm512_fmadd_pd(a, b, c),
             vectors.fma._mm256_fmadd_ps(a, b, c)
         }
     }
@@ -489,17 +576,24 @@ pub enum Registers {
     Scalar,
     /// Registers of four doubles (AVX2 with fused multiply-adds).
     Avx2,
+    /// Registers of eight doubles (AVX-512).
+    Avx512,
 }
 
 /// The widest registers that kernels may use.
-static WIDEST: AtomicU8 = AtomicU8::new(Registers::Avx2 as u8);
+static WIDEST: AtomicU8 = AtomicU8::new(Registers::WIDEST as u8);
 
 impl Registers {
+    /// The widest that kernels know.
+    pub const WIDEST: Self = Self::Avx512;
+
     /// The registers that this processor has.
     pub fn present() -> Vec<Self> {
         #[cfg(target_arch = "x86_64")]
-        if matches!(Arch::new(), Arch::V3(_) | Arch::V4(_)) {
-            return vec![Self::Scalar, Self::Avx2];
+        match Arch::new() {
+            Arch::V4(_) => return vec![Self::Scalar, Self::Avx2, Self::Avx512],
+            Arch::V3(_) => return vec![Self::Scalar, Self::Avx2],
+            _ => {}
         }
         vec![Self::Scalar]
     }
@@ -516,6 +610,11 @@ pub fn dispatch<L: Loop>(work: L) {
     #[cfg(target_arch = "x86_64")]
     {
         let (arch, widest) = (Arch::new(), WIDEST.load(Ordering::Relaxed));
+        if let Arch::V4(simd) = arch
+            && widest > Registers::Avx2 as u8
+        {
+            return Simd::vectorize(simd, Instance(work, simd));
+        }
         let avx2 = match arch {
             Arch::V4(simd) => Some(*simd),
             Arch::V3(simd) => Some(simd),
@@ -606,5 +705,6 @@ mod tests {
     #[test]
     fn instructions_do_what_is_written_out_for_processors_without_them() {
         pulp::x86::V3::try_new().into_iter().for_each(check);
+        pulp::x86::V4::try_new().into_iter().for_each(check);
     }
 }

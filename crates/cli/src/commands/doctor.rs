@@ -159,6 +159,7 @@ fn mpi() -> &'static str {
 /// The vector registers that kernels use here.
 fn registers() -> &'static str {
     match Registers::present().last() {
+        Some(Registers::Avx512) => "AVX-512",
         Some(Registers::Avx2) => "AVX2 with fused multiply-adds",
         _ if cfg!(target_arch = "x86_64") => "those of every x86-64 processor",
         _ => "those that the compiler takes for granted",
@@ -173,7 +174,7 @@ fn slow() -> Vec<String> {
             "this is a debug build; cargo build --release -p mmsmith-cli makes the fast one".into(),
         );
     }
-    if cfg!(target_arch = "x86_64") && Registers::present().last() != Some(&Registers::Avx2) {
+    if cfg!(target_arch = "x86_64") && Registers::present().last() == Some(&Registers::Scalar) {
         all.push(
             "the processor, or the virtual machine, has no AVX2 with fused multiply-adds; kernels take some five times as long"
                 .into(),

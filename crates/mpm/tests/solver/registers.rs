@@ -96,5 +96,5 @@ fn check_all(numbers: usize) {
     check::<f32, 1>(numbers);
     check::<f32, 2>(numbers);
     check::<f32, 3>(numbers);
-    Registers::Avx2.use_at_most();
+    Registers::WIDEST.use_at_most();
 }
