@@ -16,8 +16,16 @@ use crate::tensor::real;
 
 /// A loop for vector instructions. `run` and all functions that it calls have to be `#[inline(always)]`.
 pub trait Loop {
+    /// Whether there is an instance for registers of 512 bits, which takes time to compile.
+    const IS_WIDE: bool = false;
+
     /// The loop, with the operations of the registers.
     fn run<V: Vectors>(self, vectors: V);
+}
+
+/// Whether kernels for numbers of this type in so many dimensions have an instance for registers of 512 bits: those of long runs have.
+pub const fn is_wide<T, const D: usize>() -> bool {
+    size_of::<T>() == size_of::<f64>() && D > 1
 }
 
 /// Four numbers in the lanes of one register.
@@ -610,7 +618,8 @@ pub fn dispatch<L: Loop>(work: L) {
     #[cfg(target_arch = "x86_64")]
     {
         let (arch, widest) = (Arch::new(), WIDEST.load(Ordering::Relaxed));
-        if let Arch::V4(simd) = arch
+        if L::IS_WIDE
+            && let Arch::V4(simd) = arch
             && widest > Registers::Avx2 as u8
         {
             return Simd::vectorize(simd, Instance(work, simd));

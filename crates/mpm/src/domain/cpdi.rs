@@ -3,7 +3,7 @@
 use std::array;
 use std::sync::Arc;
 
-use mmsmith_lanes::simd::{Eight, Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Eight, Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::{product, real};
 use nalgebra::{SMatrix, SVector};
 
@@ -92,6 +92,8 @@ struct CheckParallelograms<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for CheckParallelograms<'_, '_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { of_block, half_edges, ids, all_valid } = self;

@@ -1,6 +1,6 @@
 //! Domains whose weights are products over the axes: points, boxes along the axes, and splines.
 
-use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::{determinant, real};
 use nalgebra::{SMatrix, SVector};
 
@@ -69,6 +69,8 @@ struct CheckBoxes<'a, 'b, T, const D: usize, const STRETCHING: bool> {
 impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
     for CheckBoxes<'_, '_, T, D, STRETCHING>
 {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;

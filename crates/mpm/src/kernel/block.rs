@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::product;
 use mmsmith_laws::{
     BlockOfStresses, BlockWithMemory, ConstitutiveLaw, InternalVariable, LawWithMemory, LibraryLaw,
@@ -266,6 +266,8 @@ struct Stress<'a, T, L, const D: usize> {
 }
 
 impl<T: Lanes, L: LibraryLaw<T>, const D: usize> Loop for Stress<'_, T, L, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { F, c, law, contributions } = self;

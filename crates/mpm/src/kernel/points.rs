@@ -1,6 +1,6 @@
 //! P2G and G2P of corners as points, by hat functions: values alone pass, and affine momenta.
 
-use mmsmith_lanes::simd::{Lane8, Lanes, Loop, Vectors};
+use mmsmith_lanes::simd::{Lane8, Lanes, Loop, Vectors, is_wide};
 use nalgebra::SVector;
 
 use crate::domain::corner_values::AlongAxes;
@@ -82,6 +82,8 @@ pub(crate) struct ToGrid<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { c, corners, sums, affine_sums, band, first, ids } = self;
@@ -197,6 +199,8 @@ pub(crate) struct FromGrid<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { c, corners, nodes, first, values, moments } = self;

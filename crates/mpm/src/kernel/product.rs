@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::real;
 use mmsmith_laws::fault::{Fault, Planted};
 use nalgebra::{SMatrix, SVector};
@@ -357,6 +357,8 @@ where
     T: Lanes,
     R: ShapeFunction<W>,
 {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { weights, c, kinematics, l: reference, .. } = self;
@@ -483,6 +485,8 @@ struct P2gOfBlock<'a, T, const D: usize> {
 impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     for P2g<'_, T, D, W, AFFINE>
 {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
@@ -533,6 +537,8 @@ where
     T: Lanes,
     A: Receive<T, D>,
 {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self(G2pOfBlock { weights, strides, nodes, count, mut receiver }) = self;

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::{determinant, real};
 use mmsmith_laws::fault::{Fault, Planted};
 use mmsmith_laws::{LawWithMemory, volume_root};
@@ -132,6 +132,8 @@ struct WithVolume<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for WithVolume<'_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { planted, theta, F } = self;

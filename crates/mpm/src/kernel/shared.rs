@@ -3,7 +3,7 @@
 //! Shares of cells are computed for eight particles at once, here and again where they are needed next: that takes less time than to
 //! read them from memory. Those of polygons, of which there are few, are stored.
 
-use mmsmith_lanes::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch};
+use mmsmith_lanes::simd::{Eight, Lane4, Lane8, Lanes, Loop, Number, Vectors, dispatch, is_wide};
 use mmsmith_particles::mesh::{CornerShare, Mesh};
 use nalgebra::{SMatrix, SVector};
 
@@ -90,6 +90,8 @@ struct MeasureNext<'a, 'b, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for MeasureNext<'_, '_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { corners, particles: (first, count), have_volume } = self;
@@ -229,6 +231,8 @@ impl<T: Lanes, const D: usize> ParticleFlux<T, D> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Adding<'_, '_, T, D, AFFINE> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let ToCorners { c, corners, at, shares, particles, contributions, sums, affine_sums } =
@@ -379,6 +383,8 @@ impl<T: Lanes, const D: usize> InterpolatedValue<T, D> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T, D, AFFINE> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let FromCorners { c, corners, shares, values, first, receiver } = self.0;

@@ -1,6 +1,6 @@
 //! G2P of CPDI: sums over the corners of each particle of the values that the grid has there.
 
-use mmsmith_lanes::simd::{Eight, Lane8, Lanes, Loop, Vectors};
+use mmsmith_lanes::simd::{Eight, Lane8, Lanes, Loop, Vectors, is_wide};
 use mmsmith_lanes::tensor::real;
 
 use crate::grid::node::Node;
@@ -22,6 +22,8 @@ pub(super) struct G2pOfBlock<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for G2p<'_, T, D, AFFINE> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let G2pOfBlock { own, strides, nodes, receiver } = self.0;

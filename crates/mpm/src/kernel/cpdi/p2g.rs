@@ -2,7 +2,7 @@
 
 use std::array;
 
-use mmsmith_lanes::simd::{Lane8, Lanes, Loop, Vectors};
+use mmsmith_lanes::simd::{Lane8, Lanes, Loop, Vectors, is_wide};
 use mmsmith_lanes::tensor::real;
 
 use crate::grid::node::Node;
@@ -134,6 +134,8 @@ pub(super) struct P2gOfBlock<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let P2gOfBlock { own, weights, strides, band, first, contributions, count } = self.0;

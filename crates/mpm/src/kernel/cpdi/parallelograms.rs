@@ -2,7 +2,7 @@
 
 use std::array;
 
-use mmsmith_lanes::simd::{Eight, Lane8, Lanes, Loop, Vectors};
+use mmsmith_lanes::simd::{Eight, Lane8, Lanes, Loop, Vectors, is_wide};
 use mmsmith_lanes::tensor::real;
 
 use crate::grid::geometry::Constants;
@@ -146,6 +146,8 @@ pub(super) struct Compute<'a, T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Loop for Compute<'_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
         let Self { own, c, half_edges, ids, kinematics } = self;
