@@ -53,7 +53,7 @@ pub use projected::{ProjectedVolume, Volume, projected_stress, volume_root};
 pub use tangent::{Differentiated, Tangent};
 
 use crate::fault::Planted;
-use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_lanes::tensor::{det_minus_one, determinant, product, real};
 
 /// Evaluates `$body` with `$law` bound to the law of a material, whichever it is.
@@ -266,6 +266,8 @@ struct SideBySide<'a, T, L, const D: usize> {
 }
 
 impl<T: RealField + Copy, L: LibraryLaw<T>, const D: usize> Loop for SideBySide<'_, T, L, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { law, F, P } = self;
