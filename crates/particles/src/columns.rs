@@ -6,7 +6,7 @@
 use bytemuck::{Pod, cast_slice};
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_ranks::Move;
-use mmsmith_threads::disjoint::{DisjointColumn, PartColumn, Partition, Run};
+use mmsmith_threads::disjoint::{DisjointColumn, PartColumn, Partition, Run, Runs};
 use nalgebra::{SMatrix, SVector};
 
 /// Work on a column, whatever its elements are.
@@ -192,8 +192,10 @@ macro_rules! columns {
 
             /// The elements of a part: once, then `None`, as for a part that does not exist.
             pub fn take(&self, part: usize) -> Option<PartMoving<'_, T, D>> {
+                let indices = self.partition.part(part)?;
                 Some(PartMoving {
-                    indices: self.partition.part(part)?,
+                    indices,
+                    runs: Runs::new(indices),
                     $($moving: self.$moving.take(part)?,)*
                 })
             }
@@ -202,6 +204,8 @@ macro_rules! columns {
         /// The columns that steps change, of the particles of a part.
         pub struct PartMoving<'a, T, const D: usize> {
             indices: &'a [u32],
+            /// Runs of the particles that were copied last.
+            runs: Runs<'a>,
             $($moving: PartColumn<'a, $Moving>,)*
         }
 
@@ -221,13 +225,14 @@ macro_rules! columns {
             /// Copies so many particles from a place on.
             #[inline(always)]
             pub fn gather(&mut self, place: usize, count: usize, copies: &mut MovingColumns<T, D>) {
-                $(self.$moving.gather(place, count, &mut copies.$moving);)*
+                self.runs.find(place, count);
+                $(self.$moving.gather(&self.runs, &mut copies.$moving);)*
             }
 
-            /// Copies them back.
+            /// Copies back those that were copied last.
             #[inline(always)]
-            pub fn scatter(&mut self, place: usize, count: usize, copies: &MovingColumns<T, D>) {
-                $(self.$moving.scatter(place, count, &copies.$moving);)*
+            pub fn scatter(&mut self, copies: &MovingColumns<T, D>) {
+                $(self.$moving.scatter(&self.runs, &copies.$moving);)*
             }
         }
     };

@@ -157,6 +157,40 @@ impl<'a> Run<'a> {
     }
 }
 
+/// The runs of some indices of a part, in their order.
+pub struct Runs<'a> {
+    indices: &'a [u32],
+    runs: Vec<Run<'a>>,
+}
+
+impl<'a> Runs<'a> {
+    /// None yet, of a part with these indices.
+    pub fn new(indices: &'a [u32]) -> Self {
+        Self { indices, runs: Vec::new() }
+    }
+
+    /// Finds those of the `count` indices from `place` on.
+    ///
+    /// # Panics
+    ///
+    /// Panics where the part has fewer.
+    #[inline(always)]
+    pub fn find(&mut self, place: usize, count: usize) {
+        let Self { indices, runs } = self;
+        runs.clear();
+        let mut run = Run { indices, first: 0, count: 0 };
+        for &index in &indices[place..place + count] {
+            if run.count > 0 && index == run.first.wrapping_add(run.count as u32) {
+                run.count += 1;
+            } else {
+                runs.extend((run.count > 0).then_some(run));
+                run = Run { first: index, count: 1, ..run };
+            }
+        }
+        runs.extend((run.count > 0).then_some(run));
+    }
+}
+
 impl<E> PartColumn<'_, E> {
     /// The elements of a run, which lie side by side: none where the run is one of another part.
     #[inline(always)]
@@ -190,29 +224,40 @@ impl<E> PartColumn<'_, E> {
 }
 
 impl<E: Copy> PartColumn<'_, E> {
-    /// Copies the elements of so many indices from a place on, and gives how many they are.
+    /// Copies the elements of runs, one after the other, and gives how many they are.
     #[inline(always)]
-    pub fn gather(&mut self, place: usize, count: usize, copies: &mut [E]) -> usize {
-        let share = self.share;
-        for k in 0..count {
-            match (share, copies.get_mut(k)) {
-                (1, Some(copy)) => *copy = self.get(place + k)[0],
-                _ => copies[k * share..(k + 1) * share].copy_from_slice(self.get(place + k)),
-            }
+    pub fn gather(&mut self, runs: &Runs<'_>, copies: &mut [E]) -> usize {
+        let mut copied = 0;
+        for run in &runs.runs {
+            let own = self.run(*run);
+            copy(&mut copies[copied..copied + own.len()], own);
+            copied += own.len();
         }
-        count * share
+        copied
     }
 
     /// Copies back what [`gather`](Self::gather) copied, changed.
     #[inline(always)]
-    pub fn scatter(&mut self, place: usize, count: usize, copies: &[E]) {
-        let share = self.share;
-        for k in 0..count {
-            match (share, copies.get(k)) {
-                (1, Some(copy)) => self.get(place + k)[0] = *copy,
-                _ => self.get(place + k).copy_from_slice(&copies[k * share..(k + 1) * share]),
-            }
+    pub fn scatter(&mut self, runs: &Runs<'_>, copies: &[E]) {
+        let mut copied = 0;
+        for run in &runs.runs {
+            let own = self.run(*run);
+            let end = copied + own.len();
+            copy(own, &copies[copied..end]);
+            copied = end;
         }
+    }
+}
+
+/// Copies elements; few of them in line, since a call would take longer.
+#[inline(always)]
+fn copy<E: Copy>(to: &mut [E], from: &[E]) {
+    if from.len() > 3 {
+        to.copy_from_slice(from);
+        return;
+    }
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
 
@@ -282,11 +327,21 @@ mod tests {
         assert!(Run::find(second.indices, 1, 2).is_none());
         assert!(Run::find(first.indices, 3, 2).is_none());
         assert!(Run::find(first.indices, 4, 1).is_none());
-        let mut copies = [0; 2];
-        assert_eq!(second.gather(1, 2, &mut copies), 2);
-        assert_eq!(copies, [5, 0]);
-        second.scatter(1, 2, &[7, 8]);
-        assert_eq!(one, [0, 4, 7, 1, 2, 3, 8]);
+        let mut copies = [0; 3];
+        let mut runs = Runs::new(second.indices);
+        runs.find(1, 2);
+        assert_eq!((runs.runs.len(), second.gather(&runs, &mut copies)), (2, 2));
+        assert_eq!(copies, [5, 0, 0]);
+        second.scatter(&runs, &[7, 8]);
+        let mut runs = Runs::new(first.indices);
+        runs.find(1, 3);
+        assert_eq!((runs.runs.len(), first.gather(&runs, &mut copies)), (2, 3));
+        assert_eq!(copies, [2, 3, 0]);
+        assert_eq!(second.gather(&runs, &mut copies), 0, "runs of another part");
+        first.scatter(&runs, &[2, 3, 9]);
+        runs.find(4, 0);
+        assert!(runs.runs.is_empty());
+        assert_eq!(one, [9, 4, 7, 1, 2, 3, 8]);
         assert_eq!(two[6..12], [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]);
     }
 

@@ -126,7 +126,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             let block = copies.first(BLOCK, &self.shares);
             let found = self.advance_block(&mut buffers, (&mut band, c), ids, block);
             outcome = outcome.merge(found);
-            particles.scatter(place, ids.len(), copies);
+            particles.scatter(copies);
         }
         self.buffers.give_back(buffers);
         outcome
