@@ -8,6 +8,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::{Pod, cast_slice, cast_slice_mut};
+use mmsmith_lanes::simd::{Lanes, Loop, Vectors, dispatch, is_wide};
 use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
@@ -253,7 +254,7 @@ impl Edge {
 
 impl<'a, T, S, const D: usize> GridUpdate<'a, T, S, D>
 where
-    T: RealField + Copy + Pod,
+    T: Lanes,
     S: NodeUpdate<T, D>,
 {
     pub(crate) fn new(layout: &'a Layout<D>, c: &'a Constants<T, D>, update: S) -> Self {
@@ -305,16 +306,7 @@ where
             |nodes: &mut [_], first| self.rows(nodes, first),
         );
         let zero = Node::zero();
-        let sum = |nodes: &mut [Node<T, D>], others: &mut [Node<T, D>]| {
-            // Particles reach half the lines of a window, or fewer.
-            if others.iter().all(Node::is_zero) {
-                return;
-            }
-            for (node, other) in nodes.iter_mut().zip(others) {
-                node.add(other);
-                *other = zero;
-            }
-        };
+        let sum = |nodes: &mut [_], others: &mut [_]| dispatch(AddLine { nodes, others });
         let hooks = NodeHooks { before: &before, after: &after, zero, add: &sum, halo: None };
         let Some(ranks) = ranks else {
             add(nodes, hooks);
@@ -417,6 +409,29 @@ where
         let &Self { layout, c, update, .. } = self;
         layout.on_walls(first, nodes, |node, held| update.on_wall(c, node, held));
         layout.unfold_rows(nodes, &|node: Node<T, D>, flip| update.flipped(node, flip));
+    }
+}
+
+/// Adds nodes of a window to those of the grid, and clears them.
+struct AddLine<'a, T, const D: usize> {
+    nodes: &'a mut [Node<T, D>],
+    others: &'a mut [Node<T, D>],
+}
+
+impl<T: Lanes, const D: usize> Loop for AddLine<'_, T, D> {
+    const IS_WIDE: bool = is_wide::<T, D>();
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { nodes, others } = self;
+        // Particles reach half the lines of a window, or fewer.
+        if others.iter().all(Node::is_zero) {
+            return;
+        }
+        for (Node { values }, other) in nodes.iter_mut().zip(others) {
+            *values = vectors.add8(vectors.load8(values), vectors.load8(&other.values)).0;
+            *other = Node::zero();
+        }
     }
 }
 
