@@ -66,6 +66,39 @@ struct CheckBoxes<'a, 'b, T, const D: usize, const STRETCHING: bool> {
     all_valid: &'b mut bool,
 }
 
+/// The boxes of a block. Functions and no closures, which would be compiled without the registers of the loop.
+struct Boxes<'a, T, const D: usize, const STRETCHING: bool> {
+    c: &'a Constants<T, D>,
+    kinematics: Kinematics<'a, T, D>,
+    /// Half-sizes in the reference configuration.
+    l: &'a SVector<T, D>,
+    /// By how much the support exceeds a box.
+    beyond: T,
+    /// By how many nodes an extended support exceeds another.
+    more_nodes: T,
+}
+
+impl<T: Lanes, const D: usize, const STRETCHING: bool> Boxes<'_, T, D, STRETCHING> {
+    #[inline(always)]
+    fn half_size(&self, k: usize, a: usize) -> T {
+        half_size::<_, STRETCHING>(self.l[a], self.kinematics.F[k][(a, a)]) + self.beyond
+    }
+
+    /// Whether a box is in a tile with these edges: by its lower edge, and by the same where that would be for the last node of a box with extended
+    /// support.
+    #[inline(always)]
+    fn is_inside(&self, k: usize, range: &[(f64, f64); D], is_extended: bool) -> bool {
+        let Self { c, kinematics: Kinematics { x, .. }, .. } = self;
+        let mut is_inside = true;
+        for a in first_cut_axis::<D>()..D {
+            let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - self.half_size(k, a);
+            let last = if is_extended { edge + self.more_nodes } else { edge };
+            is_inside &= (edge >= real(range[a].0)) & (last < real(range[a].1));
+        }
+        is_inside
+    }
+}
+
 impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
     for CheckBoxes<'_, '_, T, D, STRETCHING>
 {
@@ -74,21 +107,15 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
         let Self { of_block, shape, all_valid } = self;
-        let OfBlock { c, ids, tiles, kinematics: Kinematics { x, F } } = of_block;
+        let OfBlock { c, ids, tiles, kinematics } = of_block;
+        let Kinematics { x, F } = kinematics;
         let (width, above) = (shape.width(), shape.extended_above());
-        let more_nodes: T = real((EXTENDED - width) as f64);
-        let beyond: T = real(shape.on_axis().beyond_box());
-        let half_size =
-            |k: usize, a: usize| half_size::<_, STRETCHING>(shape.l[a], F[k][(a, a)]) + beyond;
-        // By the lower edges, and the same where they would be for the last node of a box with extended support.
-        let is_inside = |k: usize, range: &[(f64, f64); D], is_extended: bool| {
-            let mut is_inside = true;
-            for a in first_cut_axis::<D>()..D {
-                let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - half_size(k, a);
-                let last = if is_extended { edge + more_nodes } else { edge };
-                is_inside &= (edge >= real(range[a].0)) & (last < real(range[a].1));
-            }
-            is_inside
+        let boxes = Boxes::<_, D, STRETCHING> {
+            c,
+            kinematics,
+            l: &shape.l,
+            beyond: real(shape.on_axis().beyond_box()),
+            more_nodes: real((EXTENDED - width) as f64),
         };
         let tiles = &tiles[..ids.len().min(BLOCK)];
         let Some((&tile, others)) = tiles.split_first() else { return };
@@ -98,18 +125,18 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Loop
             let mut valid = determinant(&F[k]) > T::zero();
             let mut is_extended = false;
             for a in 0..D {
-                let (x, l) = (x[k][a], half_size(k, a));
+                let (x, l) = (x[k][a], boxes.half_size(k, a));
                 valid &= (x >= c.lower[a]) & (x <= c.upper[a]) & (l <= real(HALF_SIZE_LIMIT));
                 is_extended |= l > above;
             }
             all &= valid;
-            all_inside &= is_inside(k, &range, is_extended);
+            all_inside &= boxes.is_inside(k, &range, is_extended);
         }
         // Blocks with particles of several tiles are rare.
         if others.iter().any(|other| *other != tile) {
             all_inside = tiles.iter().enumerate().all(|(k, &tile)| {
-                let is_extended = (0..D).any(|a| half_size(k, a) > above);
-                is_inside(k, &c.tiles.range(tile, width), is_extended)
+                let is_extended = (0..D).any(|a| boxes.half_size(k, a) > above);
+                boxes.is_inside(k, &c.tiles.range(tile, width), is_extended)
             });
         }
         *all_valid = all && all_inside;
