@@ -302,12 +302,26 @@ mod x86 {
                 fn load8(vectors: V3, values: &[Self; 8]) -> Lane8<Self>;
             }
 
-            /// The operations on eight numbers where registers have 512 bits.
+            /// The operations on eight numbers where registers have 512 bits. Default: those of narrower registers, which hold eight numbers in
+            /// single precision.
             pub trait WideInstructions: Instructions {
-                $(fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
-                fn splat8(vectors: V4, value: Self) -> Lane8<Self>;
-                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self>;
+                $(#[inline(always)]
+                fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
+                    <Self as Instructions>::$eight(*vectors, $($a8),*)
+                })*
+
+                #[inline(always)]
+                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
+                    <Self as Instructions>::splat8(*vectors, value)
+                }
+
+                #[inline(always)]
+                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self> {
+                    <Self as Instructions>::load8(*vectors, values)
+                }
             }
+
+            impl WideInstructions for f32 {}
 
             impl WideInstructions for f64 {
                 $(#[inline(always)]
@@ -324,24 +338,6 @@ mod x86 {
                 #[inline(always)]
                 fn load8(_: V4, values: &[Self; 8]) -> Lane8<Self> {
                     Lane8(must_cast(pod_read_unaligned::<__m512d>(bytes_of(values))))
-                }
-            }
-
-            /// Eight numbers in single precision have 256 bits.
-            impl WideInstructions for f32 {
-                $(#[inline(always)]
-                fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
-                    <Self as Instructions>::$eight(*vectors, $($a8),*)
-                })*
-
-                #[inline(always)]
-                fn splat8(vectors: V4, value: Self) -> Lane8<Self> {
-                    <Self as Instructions>::splat8(*vectors, value)
-                }
-
-                #[inline(always)]
-                fn load8(vectors: V4, values: &[Self; 8]) -> Lane8<Self> {
-                    <Self as Instructions>::load8(*vectors, values)
                 }
             }
 
@@ -589,7 +585,7 @@ pub enum Registers {
 }
 
 /// The widest registers that kernels may use.
-static WIDEST: AtomicU8 = AtomicU8::new(Registers::WIDEST as u8);
+static ALLOWED: AtomicU8 = AtomicU8::new(Registers::WIDEST as u8);
 
 impl Registers {
     /// The widest that kernels know.
@@ -608,7 +604,7 @@ impl Registers {
 
     /// Keeps all kernels of this process from wider registers than these. No result depends on it.
     pub fn use_at_most(self) {
-        WIDEST.store(self as u8, Ordering::Relaxed);
+        ALLOWED.store(self as u8, Ordering::Relaxed);
     }
 }
 
@@ -617,10 +613,10 @@ impl Registers {
 pub fn dispatch<L: Loop>(work: L) {
     #[cfg(target_arch = "x86_64")]
     {
-        let (arch, widest) = (Arch::new(), WIDEST.load(Ordering::Relaxed));
+        let (arch, allowed) = (Arch::new(), ALLOWED.load(Ordering::Relaxed));
         if L::IS_WIDE
             && let Arch::V4(simd) = arch
-            && widest > Registers::Avx2 as u8
+            && allowed > Registers::Avx2 as u8
         {
             return Simd::vectorize(simd, Instance(work, simd));
         }
@@ -629,7 +625,7 @@ pub fn dispatch<L: Loop>(work: L) {
             Arch::V3(simd) => Some(simd),
             _ => None,
         };
-        match avx2.filter(|_| widest > Registers::Scalar as u8) {
+        match avx2.filter(|_| allowed > Registers::Scalar as u8) {
             Some(simd) => Simd::vectorize(simd, Instance(work, simd)),
             None => Scalar::new().vectorize(Instance(work, Scalar::new())),
         }
