@@ -199,27 +199,14 @@ impl<E> PartColumn<'_, E> {
             return &mut [];
         }
         let Run { first, count, .. } = run;
-        // SAFETY: the elements are those of `count` indices of this part, for each of which the argument in `get` holds, and
-        // lie one after the other.
+        // SAFETY: a run has successive indices of this part. `Partition::whole` saw that every index is below the number of indices, of each of
+        // which the column has `share` elements, which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well,
+        // so that nothing of this changes. `take` hands a part out once, so that this value alone reaches its elements, and `&mut self` lets
+        // those of one run at a time be reached.
         unsafe {
             let first = self.first.add(first as usize * self.share);
             slice::from_raw_parts_mut(first, count * self.share)
         }
-    }
-
-    /// The elements of the index at a place of the part.
-    ///
-    /// # Panics
-    ///
-    /// Panics where the part has no such place.
-    #[inline(always)]
-    pub fn get(&mut self, place: usize) -> &mut [E] {
-        let index = self.indices[place] as usize;
-        // SAFETY: `Partition::whole` saw that every index is below the number of indices, of each of which the column has
-        // `share` elements, which stay borrowed for 'a, and that none is in two parts; the partition is borrowed as well, so
-        // that nothing of this changes. `take` hands a part out once, so that this value alone reaches its elements, and
-        // `&mut self` lets those of one of them at a time be reached.
-        unsafe { slice::from_raw_parts_mut(self.first.add(index * self.share), self.share) }
     }
 }
 
@@ -292,8 +279,9 @@ mod tests {
                         assert!(of_none.take(number).unwrap().indices.iter().len() != 1);
                         for place in 0..one.indices.len() {
                             let index = one.indices[place];
-                            one.get(place)[0] += 10 * number as u32 + index;
-                            let [a, b] = two.get(place) else { panic!("two each") };
+                            let run = Run::find(one.indices, place, 1).unwrap();
+                            one.run(run)[0] += 10 * number as u32 + index;
+                            let [a, b] = two.run(run) else { panic!("two each") };
                             a.push_str(&index.to_string());
                             b.push('b');
                         }
