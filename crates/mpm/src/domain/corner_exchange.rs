@@ -16,7 +16,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::domain::corner_values::{AlongAxes, CornerValues};
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::domain::shared_corners::{CHUNK, Chunk, SharedCorners};
-use crate::grid::bins::{Band, Bins};
+use crate::grid::bins::{Bins, Window};
 use crate::grid::extension::Extension;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
@@ -138,8 +138,8 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         nodes: &mut [Node<T, D>],
     ) {
         let mut extension = self.extension.take();
-        let add = |band: Band<'_, _, D>, ids: &[u32]| {
-            self.to_grid(&update.c.in_band(&band), corners, (band.nodes, band.first), ids);
+        let add = |window: Window<'_, _, D>, ids: &[u32]| {
+            self.to_grid(&update.c.in_window(&window), corners, window.nodes, ids);
         };
         match &mut extension {
             Some(extension) => extension.p2g(update, bins, nodes, &add),
@@ -148,18 +148,18 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         self.extension = extension;
     }
 
-    /// Adds the sums at the corners `ids` to the band of nodes that starts at node `first`.
+    /// Adds the sums at the corners `ids` to the nodes of a window.
     fn to_grid(
         &self,
         c: &Constants<T, D>,
         corners: &SharedCorners<T, D>,
-        (band, first): (&mut [Node<T, D>], usize),
+        window: &mut [Node<T, D>],
         ids: &[u32],
     ) {
         let Self { sums, is_affine, .. } = self;
         let affine_sums = if *is_affine { &self.affine_sums[..] } else { &[] };
         if corners.at_corner.on_axis == OnAxis::Hat {
-            return dispatch(ToGrid { c, corners, sums, affine_sums, band, first, ids });
+            return dispatch(ToGrid { c, corners, sums, affine_sums, window, ids });
         }
         let mut copies = Copies::new();
         let mut buffers = self.buffers.take(&corners.at_corner, *is_affine);
@@ -179,7 +179,7 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
                 }
             }
             weights.compute(c, ids, copies.kinematics());
-            weights.p2g(&c.strides, band, first, contributions, ids.len());
+            weights.p2g(&c.strides, window, contributions, ids.len());
         }
         self.buffers.give_back(buffers);
     }

@@ -9,7 +9,6 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
-use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::cpdi::ParallelogramWeights;
@@ -155,7 +154,7 @@ fn are_valid<T: Lanes, V: Vectors, const D: usize>(
             (tile, range) = (Some(tiles[k]), c.tiles.range(tiles[k], REACHED));
         }
         let mut is_valid = (J.0[n] > T::zero()) & (slack.0[n] >= T::zero());
-        for a in first_cut_axis::<D>()..D {
+        for a in 0..D {
             let (low, high) = (low[a].lanes.0[n], high[a].lanes.0[n]);
             let nodes = node_below(high).0 - node_below(low).0;
             is_valid &= (nodes <= (REACHED - 2) as f64)

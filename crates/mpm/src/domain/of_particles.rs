@@ -10,7 +10,6 @@ use mmsmith_lanes::tensor::real;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::grid::geometry::Constants;
-use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::shape::cells::REACHED;
@@ -114,7 +113,7 @@ pub(crate) trait Domain<T: Lanes, const D: usize>: fmt::Debug + Send + Sync {
     ) -> bool {
         let l = self.half_size(c, p, F);
         let reached = self.reached(c, p, x, F, &l);
-        (first_cut_axis::<D>()..D).all(|a| {
+        (0..D).all(|a| {
             let Reached { edge, width } = reached[a];
             let (first, end) = c.tiles.range(tile, width)[a];
             edge >= real(first) && edge < real(end)

@@ -6,7 +6,6 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::domain::of_particles::{Domain, OfBlock, Reached};
 use crate::grid::geometry::Constants;
-use crate::grid::tiles::first_cut_axis;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::product::ProductWeights;
@@ -90,7 +89,7 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Boxes<'_, T, D, STRETCHIN
     fn is_inside(&self, k: usize, range: &[(f64, f64); D], is_extended: bool) -> bool {
         let Self { c, kinematics: Kinematics { x, .. }, .. } = self;
         let mut is_inside = true;
-        for a in first_cut_axis::<D>()..D {
+        for a in 0..D {
             let edge = (x[k][a] - c.lower[a]) * c.inverse_spacing - self.half_size(k, a);
             let last = if is_extended { edge + self.more_nodes } else { edge };
             is_inside &= (edge >= real(range[a].0)) & (last < real(range[a].1));

@@ -1,62 +1,53 @@
 //! Particles sorted by tiles: P2G in parallel with sums in a fixed order.
 //!
 //! A row is all nodes that share an index along the last axis. Layers of [tiles](crate::grid::tiles) divide the rows. Each particle belongs
-//! to one tile, and particles of a tile come in a fixed order. No sum depends on the number of threads.
-//!
-//! On a line and in the plane a layer is one tile, which adds to its band: its own rows and the rows of the next layer. Only the bands of
-//! neighbours overlap, and a two-colour schedule keeps those apart in time ([`coloring`](mmsmith_threads::coloring)). The grid update of a row
-//! follows its last contribution, while the row lies in the cache. In space a tile sums in a buffer of its own, which is added to the grid
-//! in its turn ([`windows`](mmsmith_threads::windows)), so that many more threads find work; the rows are updated when all is added.
+//! to one tile, and particles of a tile come in a fixed order. No sum depends on the number of threads: a tile sums in a buffer of its own, which is
+//! added to the grid in its turn ([`windows`](mmsmith_threads::windows)). The grid update of a row follows its last contribution, while
+//! the row lies in the cache.
 //!
 //! Particles may drift for some steps before the next sort. The order of the last sort decides the order of all sums. It follows from the
 //! tile that each particle was in then, which belongs to the state of a run: a run that continues to the same bits restores it.
 
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use mmsmith_particles::Division;
 use mmsmith_ranks::Ranks;
 use mmsmith_threads::parallel::*;
 
 use crate::every_scheme::{Beyond, beyond};
+use crate::grid::Layout;
 use crate::grid::division::division;
 use crate::grid::tiles::Tiles;
-use crate::grid::{Layout, NODES_AT_ONCE};
-use mmsmith_threads::coloring::{ColoredBands, Held, Schedule, Shared};
+use crate::kernel::copies::BLOCK;
 use mmsmith_threads::disjoint::Partition;
-use mmsmith_threads::windows::{AddLine, TileBuffers, TileLattice, TileSums};
-use mmsmith_threads::{each_chunk, on_all_threads};
+use mmsmith_threads::held::Held;
+use mmsmith_threads::lattice::TileLattice;
+use mmsmith_threads::windows::{Hooks, TileBuffers, TiledArray, sum_tiles};
 
-/// Particles sorted by tile, within each tile by id.
+/// Particles sorted by tile, within each tile by id, but for those that follow no whole block.
 ///
 /// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
-/// kernels use them in place.
+/// kernels use whole blocks in place. Particles that are left between whole blocks come last in a tile.
 pub(crate) struct Bins<N, const D: usize> {
     tiles: Tiles<D>,
-    /// The layers of tiles that this process holds.
-    held: Held,
-    /// The windows of these tiles, where they sum in buffers.
-    lattice: Option<TileLattice<D>>,
-    /// These buffers, between passes.
+    /// The tiles of the layers that this process holds.
+    lattice: TileLattice<D>,
+    /// Their buffers, between passes.
     buffers: TileBuffers<N>,
     /// The processes that hold all of them, where those are several.
     ranks: Option<Beyond<Arc<dyn Ranks>>>,
     /// Particle numbers, tile after tile.
     order: Partition,
-    /// Buffer of the two-colour schedule.
-    schedule: Schedule,
     /// Buffer of the sort: particles in each tile, later the place of the next of them.
     counts: Vec<u32>,
     /// Tile of every particle at the last sort, among those of the whole grid.
     keys: Vec<u32>,
 }
 
-/// Nodes to which the particles of a tile add.
-pub(crate) struct Band<'a, N, const D: usize> {
+/// Nodes to which the particles of a tile add: those of its window.
+pub(crate) struct Window<'a, N, const D: usize> {
     pub(crate) nodes: &'a mut [N],
-    /// The index of the first of these nodes.
-    pub(crate) first: usize,
     /// The tile, among those of the whole grid.
     pub(crate) tile: u32,
     /// Distance between neighbouring nodes along each axis, and the nodes of the grid before the one of index zero, a whole number.
@@ -64,58 +55,28 @@ pub(crate) struct Band<'a, N, const D: usize> {
     pub(crate) nodes_before: f64,
 }
 
-/// Adds the particles of a tile to nodes: `add(band, ids)`, with the particles in order.
-pub(crate) type AddToBand<'a, N, const D: usize> = dyn Fn(Band<'_, N, D>, &[u32]) + Sync + 'a;
+/// Adds the particles of a tile to nodes: `add(window, ids)`, with the particles in order.
+pub(crate) type AddToWindow<'a, N, const D: usize> = dyn Fn(Window<'_, N, D>, &[u32]) + Sync + 'a;
 
-/// As [`AddToBand`] for kernels that change particles: `add(band, divided, part)`, with the particles divided among tiles, and the part that
+/// As [`AddToWindow`] for kernels that change particles: `add(window, divided, part)`, with the particles divided among tiles, and the part that
 /// is this tile's.
 pub(crate) type UpdateAndAdd<'a, N, P, const D: usize> =
-    dyn Fn(Band<'_, N, D>, &P, usize) + Sync + 'a;
-
-/// Calls for each node, some rows at a time: before the first contribution to it and after the last one.
-#[derive(Clone, Copy)]
-pub(crate) struct NodeHooks<'a, N> {
-    /// Before the first contribution.
-    pub(crate) before: &'a (dyn Fn(&mut [N]) + Sync),
-    /// After the last contribution; the second argument is the index of the first node.
-    pub(crate) after: &'a (dyn Fn(&mut [N], usize) + Sync),
-    /// A node without contributions, and the sum of nodes and others, which are cleared.
-    pub(crate) zero: N,
-    pub(crate) add: &'a AddLine<'a, N>,
-    /// The exchange with processes that hold other tiles, where there are such.
-    pub(crate) halo: Option<Halo<'a, N>>,
-}
-
-/// Messages with the processes of the layers below and above.
-#[derive(Clone, Copy)]
-pub(crate) struct Halo<'a, N> {
-    /// Sends the nodes of a segment that is shared.
-    pub(crate) send: &'a (dyn Fn(Shared, &[N]) + Sync),
-    /// Receives them.
-    pub(crate) receive: &'a (dyn Fn(Shared, &mut [N]) + Sync),
-    /// Whether that would not wait.
-    pub(crate) has_arrived: &'a (dyn Fn(Shared) -> bool + Sync),
-    /// Whether these rows of the grid are updated right after their last contribution.
-    pub(crate) is_updated: &'a (dyn Fn(Range<usize>) -> bool + Sync),
-    /// Between the last contribution of all and the last messages.
-    pub(crate) finish: &'a (dyn Fn(&mut [N]) + Sync),
-}
+    dyn Fn(Window<'_, N, D>, &P, usize) + Sync + 'a;
 
 impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
     /// Allocates for `particles` particles on the grid; `sort_as` has to follow.
     pub(crate) fn new(tiles: Tiles<D>, particles: usize) -> Self {
+        let held = Held::whole(tiles.layers());
         let mut own = Self {
             tiles,
-            held: Held::default(),
-            lattice: None,
+            lattice: tiles.lattice(&held),
             buffers: TileBuffers::default(),
             ranks: None,
             order: Partition::new(0, 0),
-            schedule: Schedule::default(),
             counts: Vec::new(),
             keys: vec![0; particles],
         };
-        own.hold(Held::whole(tiles.layers()), particles);
+        own.hold(held, particles);
         own
     }
 
@@ -126,13 +87,12 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
 
     /// Makes room for so many particles in the layers `held`; `sort_as` has to follow.
     pub(crate) fn hold(&mut self, held: Held, particles: usize) {
-        let tiles = held.bands.len() * self.tiles.in_a_layer();
-        self.counts.resize(tiles + 1, 0);
-        self.order = Partition::new(particles, tiles);
-        if held != self.held {
+        if held != *self.lattice.held() {
             self.lattice = self.tiles.lattice(&held);
         }
-        self.held = held;
+        let tiles = self.lattice.count();
+        self.counts.resize(tiles + 1, 0);
+        self.order = Partition::new(particles, tiles);
     }
 
     /// Shares the layers out among processes; [`hold`](Self::hold) has to follow.
@@ -147,12 +107,11 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
 
     /// The rows that other processes hold as well, at the lower and at the upper end of those here.
     pub(crate) fn shared_rows(&self) -> [Option<Range<usize>>; 2] {
-        let segments = self.held.segments();
-        let rows = |segment| self.tiles.first_row(segment)..self.tiles.first_row(segment + 1);
-        [
-            (segments.start > 0).then(|| rows(segments.start)),
-            (segments.end < self.held.all).then(|| rows(segments.end - 1)),
-        ]
+        let of = |is_below: bool| {
+            let shared = self.lattice.held().shared().find(|shared| shared.is_below == is_below);
+            shared.map(|shared| self.lattice.segment(shared.segment))
+        };
+        [of(true), of(false)]
     }
 
     /// The result of the last sort: the tile of every particle.
@@ -179,11 +138,12 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
 
     /// The number of the first tile here.
     fn first_tile(&self) -> usize {
-        self.held.bands.start * self.tiles.in_a_layer()
+        self.lattice.held().layers.start * self.tiles.in_a_layer()
     }
 
-    /// Sorts all particles by their tiles, of layers that are held here.
-    pub(crate) fn sort_as(&mut self, keys: Vec<u32>) {
+    /// Sorts all particles by their tiles, of layers that are held here; `id(p)` is the number of particle p in the whole body, so that the order is
+    /// the same for any number of processes.
+    pub(crate) fn sort_as(&mut self, keys: Vec<u32>, id: &dyn Fn(usize) -> u64) {
         self.keys = keys;
         let first = self.first_tile();
         self.counts.fill(0);
@@ -202,6 +162,10 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
             order[*place as usize] = p as u32;
             *place += 1;
         }
+        let mut others = Vec::new();
+        for tile in starts.windows(2) {
+            whole_blocks_first(&mut order[tile[0]..tile[1]], &mut others, id);
+        }
     }
 
     /// Calls `add` for every tile here, in parallel.
@@ -209,81 +173,39 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
         &mut self,
         layout: &Layout<D>,
         nodes: &mut [N],
-        hooks: NodeHooks<'_, N>,
-        add: &AddToBand<'_, N, D>,
+        hooks: Hooks<'_, N>,
+        add: &AddToWindow<'_, N, D>,
     ) {
         self.for_each_mut(
             layout,
             nodes,
             hooks,
             |order| &*order,
-            &|band, order: &&Partition, part| {
+            &|window, order: &&Partition, part| {
                 if let Some(particles) = order.part(part) {
-                    add(band, particles);
+                    add(window, particles);
                 }
             },
         );
     }
 
     /// As [`for_each`](Self::for_each) for kernels that change the tile's particles: `divide(partition)` divides them among tiles, and
-    /// `add(band, divided, part)` finds those of the tile there.
+    /// `add(window, divided, part)` finds those of the tile there.
     pub(crate) fn for_each_mut<'a, P: Sync>(
         &'a mut self,
         layout: &Layout<D>,
-        nodes: &mut [N],
-        hooks: NodeHooks<'_, N>,
+        elements: &mut [N],
+        hooks: Hooks<'_, N>,
         divide: impl FnOnce(&'a mut Partition) -> P,
         add: &UpdateAndAdd<'_, N, P, D>,
     ) {
         let first_tile = self.first_tile();
-        let Self { tiles, held, order, schedule, lattice, buffers, .. } = self;
-        let grid = Sums { tiles, held, layout, hooks };
-        let tiles_here = lattice.as_ref().map_or(0, TileLattice::count);
+        let Self { order, lattice, buffers, .. } = self;
         let has_particles: Vec<bool> =
-            (0..tiles_here).map(|part| order.part(part) != Some(&[])).collect();
+            (0..lattice.count()).map(|part| order.part(part) != Some(&[])).collect();
         let divided = divide(order);
-        let add = |band: Band<'_, N, D>, part: usize| add(band, &divided, part);
-        match lattice {
-            Some(lattice) => {
-                grid.in_windows((lattice, buffers), first_tile, nodes, &has_particles, &add);
-            }
-            None => grid.in_bands(schedule, nodes, &add),
-        }
-    }
-}
-
-/// The nodes to which tiles add.
-struct Sums<'a, N, const D: usize> {
-    tiles: &'a Tiles<D>,
-    held: &'a Held,
-    layout: &'a Layout<D>,
-    hooks: NodeHooks<'a, N>,
-}
-
-impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
-    /// The nodes of a segment, the rows of a layer, by their indices here.
-    fn of_segment(&self, segment: usize) -> Range<usize> {
-        let index = |row: usize| (row - self.layout.first_row) * self.layout.row();
-        index(self.tiles.first_row(segment))..index(self.tiles.first_row(segment + 1))
-    }
-
-    /// Calls `add(band, part)` for each tile here, which sums in a buffer, and the hooks around it.
-    fn in_windows(
-        &self,
-        (lattice, buffers): (&TileLattice<D>, &TileBuffers<N>),
-        first_tile: usize,
-        nodes: &mut [N],
-        has_particles: &[bool],
-        add: &(dyn Fn(Band<'_, N, D>, usize) + Sync),
-    ) {
-        let Self { held, layout, hooks, .. } = self;
-        let row = layout.row();
-        let rows = layout.rows_at_once() * row;
-        each_chunk(nodes, NODES_AT_ONCE, &|_, nodes| (hooks.before)(nodes));
-        let place = (layout.strides, layout.first_row * row);
-        let mut sums = TileSums::new(nodes, place, lattice, buffers);
-        let fill = |tile: usize, nodes: &mut [N]| {
-            let window = lattice.window(tile);
+        let fill = |part: usize, nodes: &mut [N]| {
+            let window = lattice.window(part);
             let (mut strides, mut before) = ([1; D], 0);
             for a in 0..D {
                 if a > 0 {
@@ -291,124 +213,28 @@ impl<N: Copy + Send + Sync, const D: usize> Sums<'_, N, D> {
                 }
                 before += window[a].start * strides[a];
             }
-            let (number, nodes_before) = ((first_tile + tile) as u32, before as f64);
-            add(Band { nodes, first: 0, tile: number, strides, nodes_before }, tile);
+            let (tile, nodes_before) = ((first_tile + part) as u32, before as f64);
+            add(Window { nodes, tile, strides, nodes_before }, &divided, part);
         };
-        sums.fill_and_add(hooks.zero, has_particles, &fill, hooks.add);
-        // A segment that two processes share is completed by the one whose turn comes last.
-        let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
-            held.shared().partition(|shared| shared.is_first_here);
-        if let Some(Halo { send, receive, .. }) = hooks.halo {
-            for &shared in &lent {
-                send(shared, &sums.all()[self.of_segment(shared.segment)]);
-            }
-            for &shared in &borrowed {
-                receive(shared, &mut sums.all()[self.of_segment(shared.segment)]);
-            }
-            sums.add_rest(hooks.add);
-        }
-        let mut segments = held.segments();
-        for &shared in &lent {
-            match shared.is_below {
-                true => segments.start += 1,
-                false => segments.end -= 1,
-            }
-        }
-        let first = self.of_segment(segments.start).start;
-        let end = self.of_segment(segments.end - 1).end;
-        each_chunk(&mut nodes[first..end], rows, &|number, nodes| {
-            (hooks.after)(nodes, first + number * rows);
-        });
-        if let Some(Halo { send, receive, finish, .. }) = hooks.halo {
-            finish(nodes);
-            for &shared in &borrowed {
-                send(shared, &nodes[self.of_segment(shared.segment)]);
-            }
-            for &shared in &lent {
-                receive(shared, &mut nodes[self.of_segment(shared.segment)]);
-            }
-        }
+        let array = TiledArray { elements, strides: layout.strides, first_row: layout.first_row };
+        sum_tiles(array, lattice, buffers, &has_particles, &fill, hooks);
     }
+}
 
-    /// Calls `add(band, part)` for each layer here, which is one tile, and the hooks around it.
-    ///
-    /// A segment that two processes share belongs to the first band of one of them. That process sends its sums, which the other one adds to as soon as they
-    /// have come, and gets the updated nodes back.
-    fn in_bands(
-        &self,
-        schedule: &mut Schedule,
-        nodes: &mut [N],
-        add: &(dyn Fn(Band<'_, N, D>, usize) + Sync),
-    ) {
-        let Self { tiles, held, layout, hooks } = self;
-        let segments = held.segments();
-        let start = |segment: usize| self.of_segment(segment).start;
-        let starts = segments.clone().map(start).chain([nodes.len()]).collect();
-        let mut bands = ColoredBands::new(nodes, starts, (*held).clone(), schedule);
-        let nodes_before = (layout.first_row * layout.row()) as f64;
-        let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
-            bands.shared().partition(|shared| shared.is_first_here);
-        let returned: Vec<AtomicBool> = borrowed.iter().map(|_| AtomicBool::new(false)).collect();
-        // What a band that is done sends at once.
-        let send = |Halo { send, is_updated, .. }: &Halo<'_, N>, segment: usize, nodes: &[N]| {
-            for shared in lent.iter().filter(|shared| shared.segment == segment) {
-                send(*shared, nodes);
-            }
-            for (shared, is_returned) in borrowed.iter().zip(&returned) {
-                let rows = tiles.first_row(segment)..tiles.first_row(segment + 1);
-                if shared.segment == segment && is_updated(rows) {
-                    send(*shared, nodes);
-                    is_returned.store(true, Ordering::Relaxed);
-                }
-            }
-        };
-        let pass = |bands: &ColoredBands<'_, N>| {
-            on_all_threads(&|thread| {
-                loop {
-                    for &shared in &borrowed {
-                        if let Some(Halo { receive, has_arrived, .. }) = &hooks.halo
-                            && bands.is_awaited(shared)
-                            && has_arrived(shared)
-                        {
-                            bands.fill(shared, |nodes| receive(shared, nodes));
-                        }
-                    }
-                    let Some(mut band) = bands.take(thread) else { break };
-                    (hooks.before)(band.first_touched().0);
-                    let (layer, strides) = (band.segment(), layout.strides);
-                    let (nodes, first) = band.elements();
-                    let tile = layer as u32;
-                    add(
-                        Band { nodes, first, tile, strides, nodes_before },
-                        layer - held.bands.start,
-                    );
-                    let (completed, first) = band.completed();
-                    if !completed.is_empty() {
-                        (hooks.after)(completed, first);
-                    }
-                    if let Some(halo) = &hooks.halo {
-                        band.segments().for_each(|(segment, nodes)| send(halo, segment, nodes));
-                    }
-                }
-            });
-        };
-        pass(&bands);
-        let Some(Halo { send, receive, finish, .. }) = &hooks.halo else { return };
-        let filled =
-            borrowed.iter().map(|&shared| bands.fill(shared, |nodes| receive(shared, nodes)));
-        if filled.fold(false, |any, filled| any | filled) {
-            pass(&bands);
-        }
-        finish(bands.all());
-        for (&shared, is_returned) in borrowed.iter().zip(&returned) {
-            if !is_returned.load(Ordering::Relaxed) {
-                send(shared, bands.of_shared(shared));
-            }
-        }
-        for &shared in &lent {
-            receive(shared, bands.of_shared(shared));
-        }
+/// Puts first the particles of a tile that come in whole blocks of successive ids. `others` is a buffer.
+fn whole_blocks_first(particles: &mut [u32], others: &mut Vec<u32>, id: &dyn Fn(usize) -> u64) {
+    others.clear();
+    let (mut place, mut end) = (0, 0);
+    while place < particles.len() {
+        let run = &particles[place..];
+        let is_next = |pair: &&[u32]| id(pair[1] as usize) == id(pair[0] as usize) + 1;
+        let length = run.windows(2).take_while(is_next).count() + 1;
+        let whole = length / BLOCK * BLOCK;
+        others.extend_from_slice(&run[whole..length]);
+        particles.copy_within(place..place + whole, end);
+        (place, end) = (place + length, end + whole);
     }
+    particles[end..].copy_from_slice(others);
 }
 
 #[cfg(test)]
@@ -445,7 +271,7 @@ mod tests {
             let edges = edges(cells);
             let (_, mut bins) = bins(cells, edges.len());
             assert!(edges.is_empty() || !bins.order.is_whole());
-            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]));
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), &|p| p as u64);
             assert!(bins.order.is_whole());
             let mut met = vec![0; edges.len()];
             let count = bins.tiles.layers() * bins.tiles.in_a_layer();
@@ -472,9 +298,9 @@ mod tests {
         fn check<const D: usize>(cells: [usize; D]) {
             let edges = edges(cells);
             let (layout, mut bins) = bins(cells, edges.len());
-            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]));
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), &|p| p as u64);
             let row = layout.row();
-            let hooks = NodeHooks {
+            let hooks = Hooks {
                 before: &|nodes: &mut [i64]| nodes.fill(0),
                 after: &|nodes: &mut [i64], first| {
                     assert_eq!(first % row, 0);
@@ -488,16 +314,16 @@ mod tests {
                 },
                 halo: None,
             };
-            // The first node of each particle, by indices as they are in its band.
-            let add = |band: Band<'_, i64, D>, ids: &[u32]| {
+            // The first node of each particle, by indices as they are in its window.
+            let add = |window: Window<'_, i64, D>, ids: &[u32]| {
                 for &p in ids {
                     let first: usize = (0..D)
                         .map(|a| {
                             let place = edges[p as usize][a].floor() as usize + PAD_BELOW;
-                            place * band.strides[a]
+                            place * window.strides[a]
                         })
                         .sum();
-                    band.nodes[first - band.nodes_before as usize - band.first] += 1;
+                    window.nodes[first - window.nodes_before as usize] += 1;
                 }
             };
             let mut nodes = vec![9; layout.nodes];
@@ -512,8 +338,8 @@ mod tests {
             let divide = |order: &mut Partition| {
                 (0..).map_while(|part| order.part(part).map(<[u32]>::to_vec)).collect::<Vec<_>>()
             };
-            bins.for_each_mut(&layout, &mut seen, hooks, divide, &|band, divided, part| {
-                add(band, &divided[part]);
+            bins.for_each_mut(&layout, &mut seen, hooks, divide, &|window, divided, part| {
+                add(window, &divided[part]);
             });
             assert_eq!(seen, nodes);
         }

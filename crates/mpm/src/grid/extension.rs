@@ -21,7 +21,7 @@ use mmsmith_lanes::tensor::real;
 use mmsmith_rare_states::{RareState, met_if};
 use mmsmith_threads::parallel::*;
 
-use crate::grid::bins::{AddToBand, Bins};
+use crate::grid::bins::{AddToWindow, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
 use crate::grid::node::Node;
@@ -82,7 +82,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
         grid: &GridUpdate<'_, T, S, D>,
         bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
-        add: &AddToBand<'_, Node<T, D>, D>,
+        add: &AddToWindow<'_, Node<T, D>, D>,
     ) {
         grid.sums().p2g(bins, nodes, add);
         let mut around = std::mem::take(&mut self.around);

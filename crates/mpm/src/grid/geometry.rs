@@ -8,7 +8,7 @@ use mmsmith_particles::Grid;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::grid::Layout;
-use crate::grid::bins::Band;
+use crate::grid::bins::Window;
 use crate::grid::node::{Components, Node};
 use crate::grid::tiles::Tiles;
 use crate::shape::one_axis::HALF_SIZE_LIMIT;
@@ -58,9 +58,9 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
         }
     }
 
-    /// These constants with the indices of nodes as they are in a band.
-    pub(crate) fn in_band<N>(&self, band: &Band<'_, N, D>) -> Self {
-        Self { strides: band.strides, nodes_before: band.nodes_before, ..*self }
+    /// These constants with the indices of nodes as they are in a window.
+    pub(crate) fn in_window<N>(&self, window: &Window<'_, N, D>) -> Self {
+        Self { strides: window.strides, nodes_before: window.nodes_before, ..*self }
     }
 
     /// These constants for the half plane of a body of revolution, of the first axis and the last.

@@ -13,13 +13,14 @@ use mmsmith_ranks::Ranks;
 use nalgebra::RealField;
 
 use crate::grid::Layout;
-use crate::grid::bins::{AddToBand, Bins, Halo, NodeHooks, UpdateAndAdd};
+use crate::grid::bins::{AddToWindow, Bins, UpdateAndAdd};
 use crate::grid::geometry::Constants;
 use crate::grid::node::{Components, Node};
 use crate::scheme::{Transfer, VelocityUpdate};
-use mmsmith_threads::coloring::Shared;
 use mmsmith_threads::disjoint::Partition;
 use mmsmith_threads::each_chunk;
+use mmsmith_threads::held::Shared;
+use mmsmith_threads::windows::{Halo, Hooks};
 
 /// How the grid is updated after P2G.
 pub(crate) trait NodeUpdate<T: RealField + Copy, const D: usize>: Copy + Sync {
@@ -272,7 +273,7 @@ where
         &self,
         bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
-        add: &AddToBand<'_, Node<T, D>, D>,
+        add: &AddToWindow<'_, Node<T, D>, D>,
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
@@ -299,7 +300,7 @@ where
         &self,
         ranks: Option<&dyn Ranks>,
         nodes: &mut [Node<T, D>],
-        add: impl FnOnce(&mut [Node<T, D>], NodeHooks<'_, Node<T, D>>),
+        add: impl FnOnce(&mut [Node<T, D>], Hooks<'_, Node<T, D>>),
     ) {
         let (before, after) = (
             |nodes: &mut [_]| self.update.clear(nodes),
@@ -307,7 +308,7 @@ where
         );
         let zero = Node::zero();
         let sum = |nodes: &mut [_], others: &mut [_]| dispatch(AddLine { nodes, others });
-        let hooks = NodeHooks { before: &before, after: &after, zero, add: &sum, halo: None };
+        let hooks = Hooks { before: &before, after: &after, zero, add: &sum, halo: None };
         let Some(ranks) = ranks else {
             add(nodes, hooks);
             self.finish(nodes);
@@ -332,10 +333,10 @@ where
             send: &send,
             receive: &receive,
             has_arrived: &has_arrived,
-            is_updated: &is_updated,
+            is_complete: &is_updated,
             finish: &finish,
         });
-        add(nodes, NodeHooks { halo, ..hooks });
+        add(nodes, Hooks { halo, ..hooks });
     }
 
     /// Updates whole rows, from the node of index `first` on, after their last contribution; rows of an edge only where all

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use mmsmith_lanes::simd::Lanes;
-use mmsmith_threads::coloring::Held;
+use mmsmith_threads::held::Held;
 use nalgebra::SVector;
 
 use crate::every_scheme::Beyond;
@@ -39,7 +39,7 @@ impl<T: Lanes, const D: usize> GridState<T, D> {
     /// Makes room for the layers of tiles `own`, with so many particles or corners, and for the rows that those reach.
     pub(crate) fn hold(&mut self, own: Range<usize>, points: usize) {
         let Self { constants, layout, bins, .. } = self;
-        let held = Held { bands: own, all: bins.tiles().layers() };
+        let held = Held { layers: own, all: bins.tiles().layers() };
         let rows: Range<usize> = bins.tiles().rows_of(&held);
         bins.hold(held, points);
         if rows == layout.rows() {

@@ -1,26 +1,32 @@
 //! Tiles: pieces of the grid, by which particles are sorted and sums go.
 //!
-//! Along the last axis the grid is cut into layers; in space each layer is cut along the other axes as well. The cuts depend on the numbers
+//! Along the last axis the grid is cut into layers, each layer along the other axes. The cuts depend on the numbers
 //! of cells alone, and all pieces of an axis have the same length, which need not be a whole number of cells. A particle belongs to the tile
 //! of the lower corner of its box at the last sort. It reaches nodes of the tile's window, which leaves it some room to drift.
 
 use std::ops::Range;
 
-use mmsmith_threads::coloring::Held;
-use mmsmith_threads::windows::TileLattice;
+use mmsmith_threads::held::Held;
+use mmsmith_threads::lattice::{Elements, TileLattice};
 
-use crate::grid::{Layout, PAD_BELOW};
+use crate::grid::{Layout, NODES_AT_ONCE, PAD_BELOW};
 
 /// Least length of a layer, in cells: in one dimension, where a row is one node, and in more. A stencil of six nodes with its lower edge in
 /// a layer of eight cells ends within the next one.
 pub(crate) const LAYER_OF_NODES: usize = 256;
 const LAYER: usize = 8;
 
-/// Least lengths of the pieces of a layer in space along axes 0 and 1, in cells. Particles that follow each other along axis 0 lie side by
-/// side in memory, hence the length.
-const PIECES: [usize; 2] = [128, 4];
+/// Least length of the pieces of a layer along an axis, in cells: in the plane, where a layer has few particles, and in space. Particles that follow
+/// each other along axis 0 lie side by side in memory, hence the length.
+const fn least_piece<const D: usize>(axis: usize) -> usize {
+    match (D, axis) {
+        (2, _) => 64,
+        (_, 0) => 128,
+        _ => 4,
+    }
+}
 
-/// Nodes that a layer has below the lower edges of its particles, and cells that these may sink before the next sort.
+/// Nodes that a layer has below the lower edges of its particles, and cells by which these may sink or rise before the next sort.
 const BELOW_LAYER: usize = 2;
 /// Nodes that a piece of a layer has below the lower edges of its particles, and cells by which these may rise.
 const AROUND_PIECE: usize = 1;
@@ -38,8 +44,9 @@ struct Pieces {
 /// How far the window of a piece reaches above it.
 #[derive(Clone, Copy, Debug)]
 enum Reach {
-    /// As far as that of the next piece, less the nodes that the one after it has.
-    NextPiece,
+    /// As far as that of the next piece, less the nodes that the one after it has, and no farther than stencils of so many nodes do whose lower edges
+    /// rise two cells.
+    NextPiece(usize),
     /// As far as stencils of so many nodes do whose lower edges rise a cell.
     Stencil(usize),
 }
@@ -54,7 +61,7 @@ impl Pieces {
     /// The first node of a piece's window.
     fn first(self, piece: usize) -> usize {
         let below = match self.reach {
-            Reach::NextPiece => BELOW_LAYER,
+            Reach::NextPiece(_) => BELOW_LAYER,
             Reach::Stencil(_) => AROUND_PIECE,
         };
         if piece == 0 { 0 } else { piece * self.cells / self.count + PAD_BELOW - below }
@@ -62,14 +69,20 @@ impl Pieces {
 
     /// The nodes of a piece's window.
     fn window(self, piece: usize) -> Range<usize> {
-        let end = match self.reach {
-            Reach::NextPiece if piece + 2 < self.count => self.first(piece + 2),
-            Reach::Stencil(width) if piece + 1 < self.count => {
-                // The first node of a stencil is the one at its lower edge or below.
-                let last = ((piece + 1) * self.cells).div_ceil(self.count) + AROUND_PIECE - 1;
+        // The first node of a stencil is the one at its lower edge or below.
+        let of_stencils = |rise: usize, width: usize| match piece + 1 < self.count {
+            true => {
+                let last = ((piece + 1) * self.cells).div_ceil(self.count) + rise - 1;
                 self.nodes.min(last + PAD_BELOW + width)
             }
-            _ => self.nodes,
+            false => self.nodes,
+        };
+        let end = match self.reach {
+            Reach::NextPiece(width) if piece + 2 < self.count => {
+                self.first(piece + 2).min(of_stencils(BELOW_LAYER, width))
+            }
+            Reach::NextPiece(width) => of_stencils(BELOW_LAYER, width),
+            Reach::Stencil(width) => of_stencils(AROUND_PIECE, width),
         };
         self.first(piece)..end
     }
@@ -92,31 +105,26 @@ impl Pieces {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiles<const D: usize> {
     axes: [Pieces; D],
-}
-
-/// The first axis along which grids of so many axes are cut; all after it are cut, too.
-pub(crate) const fn first_cut_axis<const D: usize>() -> usize {
-    if D == 3 { 0 } else { D - 1 }
+    elements: Elements,
 }
 
 impl<const D: usize> Tiles<D> {
     /// Tiles of a grid on which stencils have `width` nodes along an axis at most.
     pub(crate) fn new(layout: &Layout<D>, cells: &[usize; D], width: usize) -> Self {
         let axes = std::array::from_fn(|a| {
-            let (least, reach) = match a {
-                _ if a < first_cut_axis::<D>() => (usize::MAX, Reach::NextPiece),
-                _ if a + 1 < D => (PIECES[a], Reach::Stencil(width)),
-                _ => (if D == 1 { LAYER_OF_NODES } else { LAYER }, Reach::NextPiece),
+            let (least, reach) = match a + 1 < D {
+                true => (least_piece::<D>(a), Reach::Stencil(width)),
+                false => (if D == 1 { LAYER_OF_NODES } else { LAYER }, Reach::NextPiece(width)),
             };
             let count = (cells[a] / least).max(1);
             Pieces { count, cells: cells[a], nodes: layout.dims[a], reach }
         });
-        Self { axes }
+        Self { axes, elements: Elements { row: layout.row(), at_once: NODES_AT_ONCE } }
     }
 
     /// Their cuts along the first axis and the last.
     pub(crate) fn half_plane(&self) -> Tiles<2> {
-        Tiles { axes: [self.axes[0], self.axes[D - 1]] }
+        Tiles { axes: [self.axes[0], self.axes[D - 1]], elements: self.elements }
     }
 
     /// Number of layers.
@@ -175,20 +183,18 @@ impl<const D: usize> Tiles<D> {
     #[inline(always)]
     pub(crate) fn range(&self, tile: u32, width: usize) -> [(f64, f64); D] {
         let mut rest = tile as usize;
-        let mut range = [(f64::NEG_INFINITY, f64::INFINITY); D];
-        for a in first_cut_axis::<D>()..D {
+        std::array::from_fn(|a| {
             let pieces = self.axes[a];
             let piece = if a + 1 < D { rest % pieces.count } else { rest };
             rest /= pieces.count;
-            range[a] = pieces.range(piece, width);
-        }
-        range
+            pieces.range(piece, width)
+        })
     }
 
-    /// The windows of the tiles of the layers `held`, where layers are cut.
-    pub(crate) fn lattice(&self, held: &Held) -> Option<TileLattice<D>> {
+    /// The windows of the tiles of the layers `held`.
+    pub(crate) fn lattice(&self, held: &Held) -> TileLattice<D> {
         let windows = |pieces: &Pieces| (0..pieces.count).map(|p| pieces.window(p)).collect();
-        (D == 3).then(|| TileLattice::new(self.axes.each_ref().map(windows), held.clone()))
+        TileLattice::new(self.axes.each_ref().map(windows), held.clone(), self.elements)
     }
 }
 
@@ -219,20 +225,13 @@ mod tests {
         let tile = tiles.tile_of(&edges);
         prop_assert!(tiles.has(tile));
         let ranges = tiles.range(tile, width);
-        for a in first_cut_axis::<D>()..D {
+        for a in 0..D {
             let (first, end) = ranges[a];
             prop_assert!(first <= edges[a] && edges[a] < end, "{:?} {} {:?}", edges, a, ranges);
             if width < EXTENDED {
                 prop_assert!(first <= (edges[a] - 1.0).max(-2.0) && edges[a] + 1.0 <= end);
             }
-            let window = match &lattice {
-                Some(lattice) => lattice.window(tile as usize)[a].clone(),
-                None => {
-                    let held =
-                        Held { bands: tile as usize..tile as usize + 1, all: tiles.layers() };
-                    tiles.rows_of(&held)
-                }
-            };
+            let window = lattice.window(tile as usize)[a].clone();
             // The lowest and the highest stencil.
             prop_assert!(first.floor() + PAD_BELOW as f64 >= window.start as f64);
             let last =

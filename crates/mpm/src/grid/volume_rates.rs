@@ -28,7 +28,7 @@ use mmsmith_lanes::tensor::{determinant, real};
 use mmsmith_threads::each_chunk;
 use nalgebra::SMatrix;
 
-use crate::grid::bins::{AddToBand, Bins};
+use crate::grid::bins::{AddToWindow, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
 use crate::grid::node::Node;
@@ -92,7 +92,7 @@ impl<T: Lanes, const D: usize> VolumeRates<T, D> {
         grid: &GridUpdate<'_, T, S, D>,
         bins: &mut Bins<Node<T, D>, D>,
         nodes: &mut [Node<T, D>],
-        add: &AddToBand<'_, Node<T, D>, D>,
+        add: &AddToWindow<'_, Node<T, D>, D>,
     ) {
         grid.sums().p2g(bins, nodes, add);
         self.update(grid, bins, nodes);

@@ -331,40 +331,39 @@ fn contributions_to_row<T: Lanes, const A: usize, const C: usize>(
     [to_value, to_slope]
 }
 
-/// P2G of particle `k`: adds its contribution to the band of nodes that starts at node `first`.
+/// P2G of particle `k`: adds its contribution to the nodes of a window.
 #[inline(always)]
 pub(crate) fn p2g<T, L, const D: usize, const W: usize, const N: usize>(
     weights: &L,
     strides: &[usize; D],
-    band: &mut [Node<T, D>],
-    first: usize,
+    window: &mut [Node<T, D>],
     (given, k): (&Contributions<T, D, N>, usize),
 ) where
     T: Lanes,
     L: Weights<T, D, W>,
 {
     let slope = given.slope_factors(k, L::AFFINE);
-    add_values(weights, strides, (band, first), &given.value[k].values, &slope);
+    let nodes = (window, weights.first_node());
+    add_values(weights, strides, nodes, &given.value[k].values, &slope);
 }
 
-/// P2G of values and slopes, `value[q]` and `slope[axis][q]`, with weights of `A` axes, to nodes of vectors with `C` components.
+/// P2G of values and slopes, `value[q]` and `slope[axis][q]`, with weights of `A` axes, to nodes of vectors with `C` components, from place `start` on.
 #[inline(always)]
 pub(crate) fn add_values<T, L, const A: usize, const C: usize, const W: usize>(
     weights: &L,
     strides: &[usize; A],
-    (band, first): (&mut [Node<T, C>], usize),
+    (nodes, start): (&mut [Node<T, C>], usize),
     value: &[T; LANES],
     slope: &[[T; LANES]; A],
 ) where
     T: Lanes,
     L: Weights<T, A, W>,
 {
-    let start = weights.first_node() - first;
     for index in 0..rows::<A, W>() {
         let row = row(weights, start, strides, index);
         let [to_value, to_slope] = contributions_to_row::<T, A, C>(value, slope, &row, L::AFFINE);
-        let Some(nodes) = band.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
-            beyond("a stencil beyond its band")
+        let Some(nodes) = nodes.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
+            beyond("a stencil beyond its window")
         };
         for (i, Node { values }) in nodes.iter_mut().enumerate() {
             let factors = Factors::of(weights, 0, i);

@@ -117,12 +117,11 @@ pub(crate) trait BlockWeights<T: Lanes, const D: usize>: Send {
     /// Computes the weights of the particles `ids`.
     fn compute(&mut self, c: &Constants<T, D>, ids: &[u32], kinematics: Kinematics<'_, T, D>);
 
-    /// P2G of the first `count` particles, to the band of nodes that starts at node `first`.
+    /// P2G of the first `count` particles, to the nodes of a window.
     fn p2g(
         &mut self,
         strides: &[usize; D],
-        band: &mut [Node<T, D>],
-        first: usize,
+        window: &mut [Node<T, D>],
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     );
@@ -155,7 +154,7 @@ pub(crate) trait BlockWeights<T: Lanes, const D: usize>: Send {
     fn p2g_scalars(
         &mut self,
         _strides: &[usize; D],
-        _band: (&mut [Node<T, D>], usize),
+        _window: &mut [Node<T, D>],
         _contributions: &Contributions<T, D, BLOCK>,
         _count: usize,
     ) {

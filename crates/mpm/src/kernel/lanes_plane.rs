@@ -101,8 +101,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
     vectors: V,
     weights: impl Fn(usize) -> L,
     strides: &[usize; D],
-    band: &mut [Node<T, D>],
-    first: usize,
+    window: &mut [Node<T, D>],
     contributions: &Contributions<T, D, N>,
     count: usize,
 ) where
@@ -160,9 +159,9 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                 sums[W / 2] = vectors.sub(vectors.sub(sums[W / 2], outer.0), outer.1);
                 masses.0[W / 2] = masses.0[W / 2] - masses.0[0] - masses.0[W - 1];
             }
-            let place = row_start(start - first, strides, j);
-            let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                beyond("a stencil beyond its band")
+            let place = row_start(start, strides, j);
+            let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
+                beyond("a stencil beyond its window")
             };
             for i in 0..W {
                 let Node { values } = &mut nodes[i];
@@ -470,16 +469,16 @@ mod tests {
         let mut one_by_one = nodes.clone();
         let first = SIDE.pow(D as u32 - 1);
         let vectors = Scalar::new();
-        let band = &mut nodes[first..];
+        let window = &mut nodes[first..];
         if D < 3 {
-            p2g_in_plane(vectors, |k| &weights[k], &strides, band, first, &contributions, COUNT);
+            p2g_in_plane(vectors, |k| &weights[k], &strides, window, &contributions, COUNT);
         } else {
             for k in 0..COUNT {
-                p2g_in_space(vectors, &&weights[k], &strides, band, first, (&contributions, k));
+                p2g_in_space(vectors, &&weights[k], &strides, window, (&contributions, k));
             }
         }
         for k in 0..COUNT {
-            p2g(&&weights[k], &strides, &mut one_by_one[first..], first, (&contributions, k));
+            p2g(&&weights[k], &strides, &mut one_by_one[first..], (&contributions, k));
         }
         for (a, b) in nodes.iter().zip(&one_by_one) {
             for (a, b) in a.values.iter().zip(&b.values) {

@@ -62,15 +62,14 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
     vectors: V,
     weights: &L,
     strides: &[usize; D],
-    band: &mut [Node<T, D>],
-    first: usize,
+    window: &mut [Node<T, D>],
     (contributions, k): (&Contributions<T, D, N>, usize),
 ) where
     T: Lanes,
     V: Vectors,
     L: Weights<T, D, W>,
 {
-    let start = weights.first_node() - first;
+    let start = weights.first_node();
     let value = vectors.load8(&contributions.value[k].values);
     let slope = |axis: usize| contributions.slope_lanes(k, axis, L::AFFINE);
     let (along, across, up) = (slope(0), slope(1), slope(D - 1));
@@ -89,8 +88,8 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
             let to_value = vectors.mul_add8(to_across, G_across[row], with_value);
             let to_along = vectors.mul8(to_along, S_across[row]);
             let place = start + row * strides[1] + plane * strides[D - 1];
-            let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                beyond("a stencil beyond its band")
+            let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
+                beyond("a stencil beyond its window")
             };
             for (i, Node { values }) in nodes.iter_mut().enumerate() {
                 let with_slope = vectors.mul_add8(to_along, G[i], vectors.load8(values));

@@ -69,15 +69,14 @@ pub(crate) fn start_of_row<const D: usize>(
     start
 }
 
-/// P2G of the sums at corners, to the band of nodes that starts at node `first`.
+/// P2G of the sums at corners, to the nodes of a window.
 pub(crate) struct ToGrid<'a, T, const D: usize> {
     pub(crate) c: &'a Constants<T, D>,
     pub(crate) corners: &'a SharedCorners<T, D>,
     pub(crate) sums: &'a [Node<T, D>],
     /// Empty where there are no affine momenta.
     pub(crate) affine_sums: &'a [AlongAxes<T, D>],
-    pub(crate) band: &'a mut [Node<T, D>],
-    pub(crate) first: usize,
+    pub(crate) window: &'a mut [Node<T, D>],
     pub(crate) ids: &'a [u32],
 }
 
@@ -86,17 +85,17 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { c, corners, sums, affine_sums, band, first, ids } = self;
+        let Self { c, corners, sums, affine_sums, window, ids } = self;
         let is_affine = !affine_sums.is_empty();
         // Successive corners mostly have the same nodes. Their sums stay in registers: they would wait for them to pass through memory.
         let mut kept = [[Lane8::zero(); 2]; MOST_ROWS];
         let mut kept_at = None;
         for &corner in ids {
             let around = HatStencil::new(c, &corners.at(corner as usize));
-            let own_at = around.first.wrapping_sub(first);
+            let own_at = around.first;
             if kept_at != Some(own_at) {
                 if let Some(at) = kept_at {
-                    put(vectors, c, (band, at), &kept);
+                    put(vectors, c, (window, at), &kept);
                 }
                 kept = [[Lane8::zero(); 2]; MOST_ROWS];
                 kept_at = Some(own_at);
@@ -131,7 +130,7 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
             }
         }
         if let Some(at) = kept_at {
-            put(vectors, c, (band, at), &kept);
+            put(vectors, c, (window, at), &kept);
         }
     }
 }
@@ -139,18 +138,18 @@ impl<T: Lanes, const D: usize> Loop for ToGrid<'_, T, D> {
 /// Most rows of nodes around a point.
 const MOST_ROWS: usize = 4;
 
-/// Adds the sums of the nodes from place `first` of a band on.
+/// Adds the sums of the nodes from place `first` of a window on.
 #[inline(always)]
 fn put<T: Lanes, V: Vectors, const D: usize>(
     vectors: V,
     c: &Constants<T, D>,
-    (band, first): (&mut [Node<T, D>], usize),
+    (window, first): (&mut [Node<T, D>], usize),
     sums: &[[Lane8<T>; 2]; MOST_ROWS],
 ) {
     for (row, sums) in sums.iter().enumerate().take(1 << (D - 1)) {
         let start = start_of_row(&c.strides, first, row);
-        let nodes = band.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
-        let Some(nodes) = nodes else { beyond("a corner beyond its band") };
+        let nodes = window.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
+        let Some(nodes) = nodes else { beyond("a corner beyond its window") };
         for (Node { values }, sum) in nodes.iter_mut().zip(sums) {
             *values = vectors.add8(vectors.load8(values), *sum).0;
         }

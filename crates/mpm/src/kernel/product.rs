@@ -175,12 +175,11 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
     fn p2g(
         &mut self,
         strides: &[usize; D],
-        band: &mut [Node<T, D>],
-        first: usize,
+        window: &mut [Node<T, D>],
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
-        let of_block = P2gOfBlock { weights: self, strides, band, first, contributions, count };
+        let of_block = P2gOfBlock { weights: self, strides, window, contributions, count };
         dispatch_by_width!(self.width, self.is_affine, P2g<_, D>, of_block);
     }
 
@@ -215,7 +214,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
     fn p2g_scalars(
         &mut self,
         strides: &[usize; D],
-        band: (&mut [Node<T, D>], usize),
+        window: &mut [Node<T, D>],
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
@@ -223,7 +222,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
         if D != 2 || self.any_extended {
             return;
         }
-        let of_block = ScalarsToNodes { weights: self, strides, band, contributions, count };
+        let of_block = ScalarsToNodes { weights: self, strides, window, contributions, count };
         dispatch_by_width!(self.width, false, ToNodes<_, D>, of_block);
     }
 
@@ -476,8 +475,7 @@ struct P2g<'a, T, const D: usize, const W: usize, const AFFINE: bool>(P2gOfBlock
 struct P2gOfBlock<'a, T, const D: usize> {
     weights: &'a ProductWeights<T, D>,
     strides: &'a [usize; D],
-    band: &'a mut [Node<T, D>],
-    first: usize,
+    window: &'a mut [Node<T, D>],
     contributions: &'a Contributions<T, D, BLOCK>,
     count: usize,
 }
@@ -489,22 +487,22 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
+        let Self(P2gOfBlock { weights, strides, window, contributions, count }) = self;
         let count = count.min(BLOCK);
         let of_particle = |k| ParticleWeights::<T, D, W, AFFINE> { weights, k };
         if D <= 2 && !weights.any_extended {
-            p2g_in_plane(vectors, of_particle, strides, band, first, contributions, count);
+            p2g_in_plane(vectors, of_particle, strides, window, contributions, count);
             return;
         }
         for k in 0..count {
             let given = (contributions, k);
             if let Some(extended) = weights.extended(k) {
                 let strides = (strides, weights.nodes_before);
-                p2g_extended::<T, D, AFFINE>(&extended, strides, band, first, given);
+                p2g_extended::<T, D, AFFINE>(&extended, strides, window, given);
             } else if D == 3 {
-                p2g_in_space(vectors, &of_particle(k), strides, band, first, given);
+                p2g_in_space(vectors, &of_particle(k), strides, window, given);
             } else {
-                p2g(&of_particle(k), strides, band, first, given);
+                p2g(&of_particle(k), strides, window, given);
             }
         }
     }
@@ -514,12 +512,11 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     extended: &Extended<T, D>,
     (strides, nodes_before): (&[usize; D], usize),
-    band: &mut [Node<T, D>],
-    first: usize,
+    window: &mut [Node<T, D>],
     contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
     let weights = extended.weights::<AFFINE>((strides, nodes_before));
-    p2g(&weights, strides, band, first, contribution);
+    p2g(&weights, strides, window, contribution);
 }
 
 struct G2p<'a, T, A, const D: usize, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T, A, D>);
@@ -582,7 +579,7 @@ struct ToNodes<'a, T, const D: usize, const W: usize, const AFFINE: bool>(Scalar
 struct ScalarsToNodes<'a, T, const D: usize> {
     weights: &'a ProductWeights<T, D>,
     strides: &'a [usize; D],
-    band: (&'a mut [Node<T, D>], usize),
+    window: &'a mut [Node<T, D>],
     contributions: &'a Contributions<T, D, BLOCK>,
     count: usize,
 }
@@ -592,8 +589,7 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
 {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self(ScalarsToNodes { weights, strides, band: (band, first), contributions, count }) =
-            self;
+        let Self(ScalarsToNodes { weights, strides, window, contributions, count }) = self;
         let mut k = 0;
         while k < count {
             // Successive particles with the same nodes.
@@ -611,10 +607,10 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
                 k += 1;
             }
             for (j, sums) in sums.into_iter().enumerate() {
-                let place = start - first + j * strides[D - 1];
-                let Some(nodes) = band.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>())
+                let place = start + j * strides[D - 1];
+                let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>())
                 else {
-                    beyond("a stencil beyond its band")
+                    beyond("a stencil beyond its window")
                 };
                 for (node, sum) in nodes.iter_mut().zip(sums) {
                     *node.scalar_mut() += sum;

@@ -250,13 +250,12 @@ impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
     fn p2g(
         &mut self,
         strides: &[usize; 3],
-        band: &mut [Node<T, 3>],
-        first: usize,
+        window: &mut [Node<T, 3>],
         contributions: &Contributions<T, 3, BLOCK>,
         count: usize,
     ) {
         let (weights, strides) = (&*self, in_plane(strides));
-        let of_block = P2gOfBlock { weights, strides, band, first, contributions, count };
+        let of_block = P2gOfBlock { weights, strides, window, contributions, count };
         dispatch_by_width!(self.product.width, self.product.is_affine, P2g<_>, of_block);
     }
 
@@ -274,8 +273,7 @@ impl<T: Lanes> BlockWeights<T, 3> for RevolvingWeights<T> {
 struct P2gOfBlock<'a, T> {
     weights: &'a RevolvingWeights<T>,
     strides: [usize; 2],
-    band: &'a mut [Node<T, 3>],
-    first: usize,
+    window: &'a mut [Node<T, 3>],
     contributions: &'a Contributions<T, 3, BLOCK>,
     count: usize,
 }
@@ -285,12 +283,12 @@ struct P2g<'a, T, const W: usize, const AFFINE: bool>(P2gOfBlock<'a, T>);
 impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for P2g<'_, T, W, AFFINE> {
     #[inline(always)]
     fn run<V: Vectors>(self, _: V) {
-        let Self(P2gOfBlock { weights, strides, band, first, contributions, count }) = self;
+        let Self(P2gOfBlock { weights, strides, window, contributions, count }) = self;
         let RevolvingWeights { product, planted, .. } = weights;
         for k in 0..count.min(BLOCK) {
             let frame = &weights.frames[k];
             let given = frame.given(contributions, k, (AFFINE, *planted));
-            let nodes = (&mut *band, first, product.nodes_before);
+            let nodes = (&mut *window, product.nodes_before);
             match product.extended(k) {
                 Some(extended) => {
                     let weights = extended.weights::<AFFINE>((&strides, product.nodes_before));
@@ -305,32 +303,32 @@ impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for P2g<'_, T, W, AFFINE
     }
 }
 
-/// Adds a particle to the nodes of a band, and next to the axis its image.
+/// Adds a particle to the nodes of a window, and next to the axis its image.
 #[inline(always)]
 fn add<T: Lanes, L: Weights<T, 2, W>, const W: usize>(
     frame: &Frame<T>,
     weights: &L,
     strides: &[usize; 2],
-    (band, first, nodes_before): (&mut [Node<T, 3>], usize, usize),
+    (window, nodes_before): (&mut [Node<T, 3>], usize),
     (value, slope): &([T; LANES], [[T; LANES]; 2]),
 ) {
+    let start = weights.first_node();
     if !frame.is_next_to_axis {
-        add_values(weights, strides, (band, first), value, slope);
+        add_values(weights, strides, (window, start), value, slope);
         return;
     }
     let mut own = [Node::zero(); EXTENDED * EXTENDED];
     let own = &mut own[..W * W];
-    add_values(weights, &[1, W], (own, weights.first_node()), value, slope);
-    let start = weights.first_node() - first;
+    add_values(weights, &[1, W], (own, 0), value, slope);
     // The number of the first node along the radius; the axis has the number `PAD_BELOW`.
-    let along = (weights.first_node() + nodes_before) % strides[1];
+    let along = (start + nodes_before) % strides[1];
     for (index, node) in own.iter().enumerate() {
         let place = start + index % W * strides[0] + index / W * strides[1];
-        band[place].add(node);
+        window[place].add(node);
         let number = along + index % W;
         if number <= 2 * PAD_BELOW {
             let image = place + 2 * PAD_BELOW * strides[0] - 2 * number * strides[0];
-            band[image].add(&node.flipped(ACROSS_AXIS));
+            window[image].add(&node.flipped(ACROSS_AXIS));
         }
     }
 }

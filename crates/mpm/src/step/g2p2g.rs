@@ -15,7 +15,7 @@ use mmsmith_particles::columns::{
 
 use crate::domain::of_particles::{Domain, OfBlock};
 use crate::every_scheme::EVERY_SCHEME;
-use crate::grid::bins::Band;
+use crate::grid::bins::Window;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
 use crate::grid::node::Node;
@@ -62,9 +62,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let divide = |partition| {
             DisjointMoving::new(partition, moving).expect("each particle is in one tile")
         };
-        let add = |band: Band<'_, _, D>, divided: &DisjointMoving<'_, T, D>, part| {
+        let add = |window: Window<'_, _, D>, divided: &DisjointMoving<'_, T, D>, part| {
             if let Some(particles) = divided.take(part) {
-                found.add(step.advance_tile(band, particles));
+                found.add(step.advance_tile(window, particles));
             }
         };
         match rates {
@@ -101,11 +101,11 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     /// Advances the particles of a tile, then adds their contributions to its nodes of the next step's grid.
     fn advance_tile(
         &self,
-        mut band: Band<'_, Node<T, D>, D>,
+        mut window: Window<'_, Node<T, D>, D>,
         mut particles: PartMoving<'_, T, D>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        let c = &self.c.in_band(&band);
+        let c = &self.c.in_window(&window);
         let mut buffers = self.buffers.take(self.domain, self.transfer.is_affine());
         if let Some((mass, volume)) = self.uniform {
             buffers.contributions.set_uniform(mass, volume);
@@ -113,18 +113,21 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         let mut copies = None;
         for (index, ids) in particles.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
+            // Rows of a tile lie apart in memory.
+            let next = particles.indices().get(place + BLOCK);
+            let ahead = next.map_or(BLOCK, |next| (*next as usize).wrapping_sub(ids[0] as usize));
             if self.uniform.is_none() {
                 buffers.contributions.take(ids, self.fixed.mass, self.fixed.volume);
             }
             if let Some(block) = particles.contiguous(place, BLOCK) {
-                let found = self.advance_block(&mut buffers, (&mut band, c), ids, block);
+                let found = self.advance_block(&mut buffers, (&mut window, c), (ids, ahead), block);
                 outcome = outcome.merge(found);
                 continue;
             }
             let copies = copies.get_or_insert_with(|| MovingColumns::at_rest(BLOCK, &self.shares));
             particles.gather(place, ids.len(), copies);
             let block = copies.first(BLOCK, &self.shares);
-            let found = self.advance_block(&mut buffers, (&mut band, c), ids, block);
+            let found = self.advance_block(&mut buffers, (&mut window, c), (ids, ahead), block);
             outcome = outcome.merge(found);
             particles.scatter(copies);
         }
@@ -136,8 +139,8 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
     fn advance_block(
         &self,
         Buffers { weights, contributions, interpolated, growth, .. }: &mut Buffers<T, D>,
-        (band, in_band): (&mut Band<'_, Node<T, D>, D>, &Constants<T, D>),
-        ids: &[u32],
+        (window, in_window): (&mut Window<'_, Node<T, D>, D>, &Constants<T, D>),
+        (ids, ahead): (&[u32], usize),
         mut particles: Moving<'_, T, D>,
     ) -> Outcome {
         let Moving { x, v, F, .. } = &mut particles;
@@ -177,6 +180,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 F,
                 contributions,
                 growth,
+                ahead,
             };
             weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
             if self.follows_grid {
@@ -189,15 +193,15 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         }
         let Moving { x, F, internal, .. } = particles;
         let (x, F) = (whole(x), whole(F));
-        weights.compute(in_band, ids, Kinematics { x, F });
-        let (tiles, kinematics) = (&[band.tile; BLOCK], Kinematics { x, F });
+        weights.compute(in_window, ids, Kinematics { x, F });
+        let (tiles, kinematics) = (&[window.tile; BLOCK], Kinematics { x, F });
         let of_block = OfBlock { c, ids, tiles, kinematics };
         if !domain.are_valid(of_block) {
             let mut outcome = Outcome::default();
             for (k, &p) in ids.iter().enumerate() {
-                outcome = outcome.merge(domain.diagnose(c, p as usize, band.tile, &x[k], &F[k]));
+                outcome = outcome.merge(domain.diagnose(c, p as usize, window.tile, &x[k], &F[k]));
             }
-            // A particle outside its tile would write to nodes beyond the band.
+            // A particle outside its tile would write to nodes beyond the window.
             if !outcome.is_clean() {
                 return outcome;
             }
@@ -208,10 +212,9 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         if !has_stress {
             law.stress(c, F, internal, contributions);
         }
-        weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
+        weights.p2g(&window.strides, window.nodes, contributions, ids.len());
         if self.follows_grid {
-            let band_nodes = (&mut *band.nodes, band.first);
-            weights.p2g_scalars(&band.strides, band_nodes, contributions, ids.len());
+            weights.p2g_scalars(&window.strides, window.nodes, contributions, ids.len());
         }
         Outcome::default()
     }

@@ -16,7 +16,7 @@ use crate::domain::corners::Corners;
 use crate::domain::of_particles::Domain;
 use crate::domain::shared_corners::{Chunk, SharedCorners};
 use crate::every_scheme::Beyond;
-use crate::grid::bins::{Band, Bins};
+use crate::grid::bins::{Bins, Window};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{
     Acceleration, GridUpdate, NodeUpdate, NodeVectors, Reprojection, Velocity,
@@ -231,7 +231,7 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
         let Some((corners, exchange)) = stages else {
-            update.p2g(bins, nodes, &|band, ids| self.tile(band, ids, set));
+            update.p2g(bins, nodes, &|window, ids| self.tile(window, ids, set));
             return;
         };
         self.to_corners(corners, exchange, set);
@@ -248,7 +248,7 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
         set: &(impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]) + Sync),
     ) {
         let own = Self { has_mean_stress: true, ..self };
-        rates.p2g(update, bins, nodes, &|band, ids| own.tile(band, ids, set));
+        rates.p2g(update, bins, nodes, &|window, ids| own.tile(window, ids, set));
     }
 
     /// Sums what `set` says of each particle at its corners, chunk by chunk.
@@ -291,35 +291,32 @@ impl<'a, T: Lanes, const D: usize> P2g<'a, T, D> {
     /// `set(buffers, copies, ids)` sets the contributions of a block.
     fn tile(
         &self,
-        band: Band<'_, Node<T, D>, D>,
+        window: Window<'_, Node<T, D>, D>,
         ids: &[u32],
         set: &impl Fn(&mut Buffers<T, D>, &mut Copies<T, D>, &[u32]),
     ) {
         let &Self { c, domain, buffers: pool, is_affine, reads_grid, has_mean_stress, x, F } = self;
-        let in_band = c.in_band(&band);
-        // In a window the nodes have other numbers, which its strides need not show: a body may be wide along one axis alone.
-        let is_window = band.strides != c.strides || band.nodes_before != c.nodes_before;
-        let set_first = reads_grid && is_window;
+        let in_window = c.in_window(&window);
         let mut copies = Copies::new();
         let mut buffers = pool.take(domain, is_affine);
         for ids in ids.chunks(BLOCK) {
             copies.pick(ids, x, F);
-            if set_first {
+            if reads_grid {
+                // Nodes of a window have other numbers than those of the grid.
                 buffers.weights.compute(c, ids, copies.kinematics());
                 set(&mut buffers, &mut copies, ids);
             }
-            buffers.weights.compute(&in_band, ids, copies.kinematics());
+            buffers.weights.compute(&in_window, ids, copies.kinematics());
             if c.planted.is(Fault::LastNodeSkipped) {
                 buffers.weights.skip_last_node(c, &copies.x);
             }
-            if !set_first {
+            if !reads_grid {
                 set(&mut buffers, &mut copies, ids);
             }
             let Buffers { weights, contributions, .. } = &mut *buffers;
-            weights.p2g(&band.strides, band.nodes, band.first, contributions, ids.len());
+            weights.p2g(&window.strides, window.nodes, contributions, ids.len());
             if has_mean_stress {
-                let nodes = (&mut *band.nodes, band.first);
-                weights.p2g_scalars(&band.strides, nodes, contributions, ids.len());
+                weights.p2g_scalars(&window.strides, window.nodes, contributions, ids.len());
             }
         }
         pool.give_back(buffers);

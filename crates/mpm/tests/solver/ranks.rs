@@ -289,7 +289,7 @@ proptest! {
         steps in 14..20_usize,
     ) {
         let settings = flying(schemes::schemes().nth(scheme).unwrap());
-        // Particles have at most five rows left to the end of their band: six and more flown, they are sorted once more.
+        // Particles have at most five rows left to the end of their window: six and more flown, they are sorted once more.
         let speed = speed + 14.0 * speed.signum();
         agrees::<2>(settings, &[count], speed, steps);
     }

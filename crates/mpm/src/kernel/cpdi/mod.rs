@@ -53,13 +53,12 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ParallelogramWeights<T, D>
     fn p2g(
         &mut self,
         strides: &[usize; D],
-        band: &mut [Node<T, D>],
-        first: usize,
+        window: &mut [Node<T, D>],
         contributions: &Contributions<T, D, BLOCK>,
         count: usize,
     ) {
         let Self { own, of_group: weights, .. } = self;
-        let of_block = P2gOfBlock { own, weights, strides, band, first, contributions, count };
+        let of_block = P2gOfBlock { own, weights, strides, window, contributions, count };
         if of_block.own.is_affine {
             dispatch(P2g::<_, D, true>(of_block));
         } else {

@@ -127,8 +127,7 @@ pub(super) struct P2gOfBlock<'a, T, const D: usize> {
     pub(super) own: &'a Parallelograms<T, D>,
     pub(super) weights: &'a mut GroupWeights<T, D>,
     pub(super) strides: &'a [usize; D],
-    pub(super) band: &'a mut [Node<T, D>],
-    pub(super) first: usize,
+    pub(super) window: &'a mut [Node<T, D>],
     pub(super) contributions: &'a Contributions<T, D, BLOCK>,
     pub(super) count: usize,
 }
@@ -138,14 +137,14 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let P2gOfBlock { own, weights, strides, band, first, contributions, count } = self.0;
+        let P2gOfBlock { own, weights, strides, window, contributions, count } = self.0;
         let count = count.min(BLOCK);
         for group in 0..count.div_ceil(GROUP) {
             weights.compute(vectors, own, strides, group);
             for n in 0..GROUP.min(count - group * GROUP) {
                 let k = group * GROUP + n;
                 if !own.is_small[k] {
-                    p2g_from_corners::<T, D, AFFINE>(own, strides, band, first, (contributions, k));
+                    p2g_from_corners::<T, D, AFFINE>(own, strides, window, (contributions, k));
                     continue;
                 }
                 let value = vectors.load8(&contributions.value[k].values);
@@ -167,12 +166,12 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                         }
                     }
                 }
-                let start = own.first_node[k] - first;
+                let start = own.first_node[k];
                 for row in 0..weights.row_count {
                     let NodeRow { start: from_first, place } = weights.rows[row];
-                    let nodes = band.get_mut(start + from_first..);
+                    let nodes = window.get_mut(start + from_first..);
                     let Some(nodes) = nodes.and_then(|n| n.first_chunk_mut::<REACHED>()) else {
-                        beyond("a domain beyond its band")
+                        beyond("a domain beyond its window")
                     };
                     let mut of_row = value;
                     if AFFINE {
@@ -246,17 +245,16 @@ impl<T: Lanes, const D: usize> Parallelograms<T, D> {
 fn p2g_from_corners<T: Lanes, const D: usize, const AFFINE: bool>(
     own: &Parallelograms<T, D>,
     strides: &[usize; D],
-    band: &mut [Node<T, D>],
-    first: usize,
+    window: &mut [Node<T, D>],
     (contributions, k): (&Contributions<T, D, BLOCK>, usize),
 ) {
-    let start = own.first_node[k] - first;
+    let start = own.first_node[k];
     let value = contributions.value[k].values;
     let fluxes: [_; D] = array::from_fn(|a| contributions.slope_lanes(k, a, false).0);
     let affine: [_; D] = array::from_fn(|a| contributions.affine_lanes(k, a).0);
     own.for_nodes(strides, k, |NodeTerm { corner, node, hat, arm }| {
-        let Some(Node { values }) = band.get_mut(start + node) else {
-            beyond("a corner beyond its band")
+        let Some(Node { values }) = window.get_mut(start + node) else {
+            beyond("a corner beyond its window")
         };
         let w = hat * real(1.0 / f64::from(1 << D));
         for (q, sum) in values.iter_mut().enumerate() {

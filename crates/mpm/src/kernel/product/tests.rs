@@ -56,9 +56,9 @@ fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extend
 
                 let mut sums = vec![Node::zero(); nodes];
                 let mut one_by_one = sums.clone();
-                block.p2g(&c.strides, &mut sums, 0, &contributions, count);
+                block.p2g(&c.strides, &mut sums, &contributions, count);
                 for k in 0..count {
-                    p2g(&exact(k), &c.strides, &mut one_by_one, 0, (&contributions, k));
+                    p2g(&exact(k), &c.strides, &mut one_by_one, (&contributions, k));
                 }
                 for (a, b) in sums.iter().zip(&one_by_one) {
                     for (a, b) in a.values.iter().zip(&b.values) {

@@ -23,7 +23,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
                 None => self.give_to_layers(keys),
             };
         }
-        self.grid.bins.sort_as(keys);
+        match (&self.part, &self.corners) {
+            (Some(part), None) => self.grid.bins.sort_as(keys, &|p| part.ids[p]),
+            // Kernels copy corners one by one.
+            (_, Some(_)) => self.grid.bins.sort_as(keys, &|_| 0),
+            (None, None) => self.grid.bins.sort_as(keys, &|p| p as u64),
+        }
     }
 
     /// Gives every particle to the process of its tile. Gives the tiles of those that are here then.
