@@ -43,8 +43,8 @@ pub(crate) struct Owned {
     pub(crate) ids: Arc<Vec<u64>>,
 }
 
-/// A cut is moved where a process has more particles than this share of the mean.
-pub(crate) const UNEVEN: f64 = 1.1;
+/// Cuts are moved where a process has more particles than this many times those that it must have.
+pub(crate) const UNEVEN: f64 = 1.05;
 
 impl LocalBody {
     pub(crate) fn new(Share { ranks, ids }: Share) -> Self {
@@ -64,10 +64,10 @@ impl LocalBody {
         add_to_first(&**ranks, &mut counts);
         let mut new: Vec<u64> = vec![0; ranks.count() + 1];
         if ranks.rank() == 0 {
-            let cuts = match known.as_slice() {
-                [_, ..] if unevenness(&counts, known) <= UNEVEN => known.clone(),
-                _ => cuts(&counts, ranks.count()),
-            };
+            let best = cuts(&counts, ranks.count());
+            let limit = UNEVEN * unevenness(&counts, &best);
+            let is_known_kept = !known.is_empty() && unevenness(&counts, known) <= limit;
+            let cuts = if is_known_kept { known.clone() } else { best };
             if !known.is_empty() && *known != cuts {
                 met(RareState::CutMoved);
             }
@@ -135,28 +135,42 @@ pub(crate) fn most_ranks<const D: usize>(layout: &Layout<D>, tiles: &Tiles<D>) -
     if low.end > tiles.first_row(1) { 1 } else { tiles.layers().saturating_sub(1).max(1) }
 }
 
-/// The first layer of each of `ranks` processes, and the number of layers: each has one at least, the last one two, and otherwise as
-/// many particles as the others.
+/// The first layer of each of `ranks` processes, and the number of layers: each has one at least, the last one two. Of all such cuts these leave
+/// the fewest particles to the process that has most.
 pub(crate) fn cuts(particles: &[u64], ranks: usize) -> Vec<usize> {
+    let mut most = particles.iter().sum();
+    let mut found = cuts_within(particles, ranks, most);
+    let mut too_few = 0;
+    while too_few < most {
+        let middle = too_few + (most - too_few) / 2;
+        match cuts_within(particles, ranks, middle) {
+            Some(cuts) => (most, found) = (middle, Some(cuts)),
+            None => too_few = middle + 1,
+        }
+    }
+    // With all particles as a limit there are cuts.
+    found.unwrap_or_default()
+}
+
+/// Cuts as [`cuts`] where no process has more than `most` particles, if there are any.
+fn cuts_within(particles: &[u64], ranks: usize, most: u64) -> Option<Vec<usize>> {
     let layers = particles.len();
-    let total: u64 = particles.iter().sum();
-    let mut cuts = vec![0];
-    let (mut layer, mut before) = (0, 0);
-    for rank in 1..ranks {
-        let least = cuts[rank - 1] + 1;
-        // The processes from this one on need a layer each, and the last one more.
-        let most = layers - (ranks - rank) - 1;
-        let wanted = total as f64 * rank as f64 / ranks as f64;
-        while layer < most
-            && (layer < least || before as f64 + 0.5 * particles[layer] as f64 <= wanted)
-        {
-            before += particles[layer];
+    let (mut cuts, mut layer) = (vec![0], 0);
+    for rank in 1..=ranks {
+        // The processes after this one need a layer each, and the last one more.
+        let end = if rank == ranks { layers } else { layers - (ranks - rank) - 1 };
+        let least = layer + 1;
+        let mut own = 0;
+        while layer < end && (layer < least || own + particles[layer] <= most) {
+            own += particles[layer];
             layer += 1;
+        }
+        if own > most || (rank == ranks && layer < layers) {
+            return None;
         }
         cuts.push(layer);
     }
-    cuts.push(layers);
-    cuts
+    Some(cuts)
 }
 
 /// The most particles of a process over their mean.
@@ -193,6 +207,18 @@ mod tests {
             prop_assert_eq!((cuts.len(), cuts[0], cuts[ranks]), (ranks + 1, 0, particles.len()));
             prop_assert!(cuts.windows(2).all(|cut| cut[0] < cut[1]));
             prop_assert!(cuts[ranks] - cuts[ranks - 1] >= 2);
+            // Of all cuts none is better: tried where they are few.
+            if particles.len() <= 8 {
+                let inner = particles.len() - 1;
+                for chosen in 0..1_usize << inner {
+                    let places = (0..inner).filter(|place| chosen >> place & 1 == 1);
+                    let other: Vec<usize> =
+                        [0].into_iter().chain(places.map(|place| place + 1)).chain([inner + 1]).collect();
+                    if other.len() == ranks + 1 && other[ranks] - other[ranks - 1] >= 2 {
+                        prop_assert!(unevenness(&particles, &cuts) <= unevenness(&particles, &other));
+                    }
+                }
+            }
             if particles.len() >= 2 * ranks && particles.iter().all(|&count| count == particles[0]) {
                 prop_assert!(unevenness(&particles, &cuts) <= 1.0 + ranks as f64 * 2.0 / particles.len() as f64);
             }
