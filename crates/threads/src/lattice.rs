@@ -21,8 +21,8 @@ pub struct TileLattice<const D: usize> {
     pub(crate) awaited: usize,
     pub(crate) chunks: Vec<Chunk>,
     elements: Elements,
-    /// How many pieces of so many elements all chunks have.
-    pub(crate) pieces: usize,
+    /// How many strips all chunks have.
+    pub(crate) strips: usize,
 }
 
 /// Some successive rows of a segment, which are completed together.
@@ -32,10 +32,10 @@ pub(crate) struct Chunk {
     pub(crate) rows: Range<usize>,
     /// How many tiles here have windows that reach into the segment.
     pub(crate) tiles: usize,
-    /// The number of its first piece, among those of all chunks.
-    first_piece: usize,
-    /// How many pieces it has, which are cleared one by one: more than one where it is one long row.
-    pieces: usize,
+    /// The number of its first strip, among those of all chunks.
+    first_strip: usize,
+    /// How many strips it has, which are cleared one by one: more than one where it is one long row.
+    strips: usize,
 }
 
 /// How many elements there are to work on.
@@ -81,7 +81,7 @@ impl<const D: usize> TileLattice<D> {
             awaited: 0,
             chunks: Vec::new(),
             elements,
-            pieces: 0,
+            strips: 0,
         };
         own.predecessors = (0..own.count())
             .map(|tile| {
@@ -102,10 +102,10 @@ impl<const D: usize> TileLattice<D> {
             let all = own.segment(segment);
             for first in all.clone().step_by(elements.rows()) {
                 let rows = first..all.end.min(first + elements.rows());
-                let pieces = (rows.len() * elements.row).div_ceil(elements.at_once);
-                let first_piece = own.pieces;
-                own.chunks.push(Chunk { segment, rows, tiles: 0, first_piece, pieces });
-                own.pieces += pieces;
+                let strips = (rows.len() * elements.row).div_ceil(elements.at_once);
+                let first_strip = own.strips;
+                own.chunks.push(Chunk { segment, rows, tiles: 0, first_strip, strips });
+                own.strips += strips;
             }
         }
         for tile in 0..own.count() {
@@ -137,26 +137,26 @@ impl<const D: usize> TileLattice<D> {
         start..self.chunks.partition_point(|chunk| chunk.segment <= layer + 1)
     }
 
-    /// The pieces of a chunk, each with its number and its elements from the beginning of the chunk on; of a tile those alone where its window has
+    /// The strips of a chunk, each with its number and its elements from the beginning of the chunk on; of a tile those alone where its window has
     /// elements of the chunk.
-    pub(crate) fn pieces_of(
+    pub(crate) fn strips_of(
         &self,
         chunk: &Chunk,
         strides: &[usize; D],
         tile: Option<usize>,
     ) -> impl Iterator<Item = (usize, Range<usize>)> + use<D> {
-        let (at_once, first) = (self.elements.at_once, chunk.first_piece);
+        let (at_once, first) = (self.elements.at_once, chunk.first_strip);
         let end = chunk.rows.len() * strides[D - 1];
-        // A chunk of several rows is one piece.
+        // A chunk of several rows is one strip.
         let window = match tile.map(|tile| self.window(tile)) {
-            Some(window) if D > 1 && chunk.pieces > 1 => {
+            Some(window) if D > 1 && chunk.strips > 1 => {
                 let along = &window[D - 2];
                 along.start * strides[D - 2]..along.end * strides[D - 2]
             }
             _ => 0..end,
         };
-        (window.start / at_once..window.end.div_ceil(at_once).min(chunk.pieces))
-            .map(move |piece| (first + piece, piece * at_once..end.min((piece + 1) * at_once)))
+        (window.start / at_once..window.end.div_ceil(at_once).min(chunk.strips))
+            .map(move |strip| (first + strip, strip * at_once..end.min((strip + 1) * at_once)))
     }
 
     /// Number of tiles here.

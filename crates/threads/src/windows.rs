@@ -162,7 +162,7 @@ struct Pass<'a, N, const D: usize> {
     buffers: &'a TileBuffers<N>,
     hooks: Hooks<'a, N>,
     progress: Mutex<Progress<N>>,
-    /// For each piece of a chunk whether its elements are those that sums begin with.
+    /// For each strip of a chunk whether its elements are those that sums begin with.
     begun: Vec<Once>,
     /// For each chunk the number of tiles that are not added yet.
     left: Vec<AtomicUsize>,
@@ -214,7 +214,7 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
             buffers,
             hooks,
             progress: Mutex::new(progress),
-            begun: (0..lattice.pieces).map(|_| Once::new()).collect(),
+            begun: (0..lattice.strips).map(|_| Once::new()).collect(),
             left: lattice.chunks.iter().map(|chunk| AtomicUsize::new(chunk.tiles)).collect(),
             left_of_segment: segments
                 .map(|segment| AtomicUsize::new(of_segment(segment)))
@@ -235,11 +235,11 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     ///
     /// No other slice of these elements may be in use. Threads keep to that as follows.
     ///
-    /// - *A line of a tile* (`add`) is part of the window of this tile, and of pieces that have begun. A tile is added once, by the thread that
+    /// - *A line of a tile* (`add`) is part of the window of this tile, and of strips that have begun. A tile is added once, by the thread that
     ///   took it from `ready`, where it is put when all tiles before it with overlapping windows are added (`pending`). Tiles of
     ///   the same turn do not overlap: along some axis their pieces are a multiple of `reach + 1` apart. Of two tiles with overlapping
     ///   windows one comes before the other, as their pieces lie within `reach` along each axis (`neighbours`) and their turns differ.
-    /// - *A piece of a chunk before its sums* is changed within its `Once`, which each tile passes before it adds to it (`add`), and the last one
+    /// - *A strip of a chunk before its sums* is changed within its `Once`, which each tile passes before it adds to it (`add`), and the last one
     ///   before it completes the chunk. Where another process begins the sums, those tiles wait for it (`pending`), and none is added before
     ///   (`begin_with_sums`).
     /// - *A chunk after its sums* is changed by the thread that counts its last tile down (`left`), and no other tile has rows of it. The rows of
@@ -327,11 +327,11 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
             return false;
         }
         let rows = self.of_rows(self.lattice.segment(shared.segment));
-        // SAFETY: pieces before their sums (see `elements`); this is reached once (`has_come`), and `begun` is set below.
+        // SAFETY: strips before their sums (see `elements`); this is reached once (`has_come`), and `begun` is set below.
         (halo.receive)(shared, unsafe { self.elements(rows) });
         for chunk in self.lattice.chunks.iter().filter(|chunk| chunk.segment == shared.segment) {
-            for (piece, _) in self.lattice.pieces_of(chunk, &self.strides, None) {
-                self.begun[piece].call_once(|| {});
+            for (strip, _) in self.lattice.strips_of(chunk, &self.strides, None) {
+                self.begun[strip].call_once(|| {});
             }
         }
         let mut progress = self.progress();
@@ -364,9 +364,9 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     /// Sees to it that a chunk has the elements that sums begin with: all, or those in the window of a tile.
     fn begin(&self, chunk: &Chunk, tile: Option<usize>) {
         let first = self.of_rows(chunk.rows.clone()).start;
-        for (piece, range) in self.lattice.pieces_of(chunk, &self.strides, tile) {
-            self.begun[piece].call_once(|| {
-                // SAFETY: a piece before its sums (see `elements`).
+        for (strip, range) in self.lattice.strips_of(chunk, &self.strides, tile) {
+            self.begun[strip].call_once(|| {
+                // SAFETY: a strip before its sums (see `elements`).
                 (self.hooks.before)(unsafe {
                     self.elements(first + range.start..first + range.end)
                 });
