@@ -8,15 +8,19 @@
 //! 3. A particle lies at the centroid of its parts. Its mass is that of its part of the body, with what lies between chords and arcs: the
 //!    mass of the body is exact.
 
+mod boxes;
 mod plane;
 mod space;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_particles::{Body, Grid, Mesh, Particles, SetupError};
+use mmsmith_particles::{Body, Grid, Interpolation, Mesh, Numbers, Particles, SetupError};
 use mmsmith_rare_states::{RareState, met};
 use nalgebra::{RealField, SMatrix, SVector};
+
+use crate::boxes::Groups;
 
 /// A clipped box with less than this share of its whole volume is a sliver.
 const SLIVER: f64 = 0.2;
@@ -114,6 +118,8 @@ pub struct Facet<const D: usize> {
     pub side: usize,
     /// Its corners.
     pub corners: [u32; D],
+    /// Its number among those of the whole body: they ascend, with gaps.
+    pub number: u64,
 }
 
 /// A lattice of boxes and the body that it is clipped with.
@@ -127,69 +133,125 @@ pub struct Clip<const D: usize> {
     pub offset: f64,
 }
 
-/// The corners of boxes.
-struct Lattice<const D: usize> {
-    /// Where it begins, in the axes of the grid.
-    origin: SVector<f64, D>,
-    /// The distance of particles.
-    spacing: f64,
-    turn: [f64; 2],
-}
-
-impl<const D: usize> Lattice<D> {
-    /// A corner in the axes of the body.
-    fn place(&self, index: [i64; D]) -> SVector<f64, D> {
-        let at = self.origin + SVector::from_fn(|a, _| index[a] as f64) * self.spacing;
-        let [cos, sin] = self.turn;
-        SVector::from_fn(|a, _| match a {
-            0 => cos * at[0] - sin * at[1],
-            1 => sin * at[0] + cos * at[1],
-            _ => at[a],
-        })
-    }
-}
-
-/// The boundary that two clipped boxes share.
+/// The boundary that a clipped box shares with another box.
 struct Contact {
-    with: usize,
+    /// The number of the other box.
+    with: u64,
     /// A length or an area.
     measure: f64,
 }
 
-/// Joins slivers to the neighbours with which they have most in common: the members of each particle, parts of boxes by number, where
-/// `volumes` are those of the parts and `whole` that of a box.
-fn join(volumes: &[f64], whole: f64, contacts: impl Fn(usize) -> Vec<Contact>) -> Vec<Vec<usize>> {
-    struct Group {
-        members: Vec<usize>,
-        volume: f64,
-    }
-    let mut group_of: Vec<usize> = (0..volumes.len()).collect();
-    let of_one = |(index, &volume)| Group { members: vec![index], volume };
-    let mut groups: Vec<Group> = volumes.iter().enumerate().map(of_one).collect();
+/// Joins slivers to the neighbours with which they have most in common. `volumes` are those of the clipped boxes, by number, and `whole` that of other
+/// boxes.
+fn join(volumes: &[(u64, f64)], whole: f64, contacts: impl Fn(u64) -> Vec<Contact>) -> Groups {
+    let mut group_of: BTreeMap<u64, u64> = BTreeMap::new();
+    let mut members: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
+    let mut volume_of: BTreeMap<u64, f64> = volumes.iter().copied().collect();
     let is_sliver = |volume: f64| volume < SLIVER * whole;
-    let mut slivers: Vec<_> = (0..volumes.len()).filter(|k| is_sliver(volumes[*k])).collect();
-    slivers.sort_by(|a, b| volumes[*a].total_cmp(&volumes[*b]).then(a.cmp(b)));
-    for sliver in slivers {
-        let own = group_of[sliver];
-        if !is_sliver(groups[own].volume) {
+    let mut slivers: Vec<_> =
+        volumes.iter().copied().filter(|(_, volume)| is_sliver(*volume)).collect();
+    slivers.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    for (sliver, _) in slivers {
+        let own = group_of.get(&sliver).copied().unwrap_or(sliver);
+        let volume = volume_of.get(&own).copied().unwrap_or(whole);
+        if !is_sliver(volume) {
             continue;
         }
-        let mut common: BTreeMap<usize, f64> = BTreeMap::new();
-        for Contact { with, measure } in groups[own].members.iter().flat_map(|k| contacts(*k)) {
-            if group_of[with] != own {
-                *common.entry(group_of[with]).or_insert(0.0) += measure;
+        let of_group = members.get(&own).cloned().unwrap_or_else(|| vec![own]);
+        let mut common: BTreeMap<u64, f64> = BTreeMap::new();
+        for Contact { with, measure } in of_group.iter().flat_map(|number| contacts(*number)) {
+            let with = group_of.get(&with).copied().unwrap_or(with);
+            if with != own {
+                *common.entry(with).or_insert(0.0) += measure;
             }
         }
         let most = common.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)));
         let Some((&to, _)) = most else { continue };
         met(RareState::SliverJoined);
-        let Group { members, volume } =
-            std::mem::replace(&mut groups[own], Group { members: Vec::new(), volume: 0.0 });
-        members.iter().for_each(|member| group_of[*member] = to);
-        groups[to].members.extend(members);
-        groups[to].volume += volume;
+        group_of.extend(of_group.iter().map(|member| (*member, to)));
+        members.remove(&own);
+        members.entry(to).or_insert_with(|| vec![to]).extend(of_group);
+        *volume_of.entry(to).or_insert(whole) += volume;
     }
-    groups.into_iter().map(|group| group.members).filter(|members| !members.is_empty()).collect()
+    Groups { joined: group_of.into_keys().collect(), members }
+}
+
+/// Some particles of a body, whose corners have the numbers of a clip.
+struct Made<T, const D: usize> {
+    /// Without places of corners, whose numbers are those of the clip.
+    mesh: Mesh<T, D>,
+    X: Vec<SVector<T, D>>,
+    volume: Vec<T>,
+    mass: Vec<T>,
+    boundary: Vec<Facet<D>>,
+    /// For each corner of the clip that was met its number in the whole body: its first particle and its place there.
+    numbers: HashMap<u32, u64>,
+}
+
+/// Numbers of corners and facets have the particle in the bits from this one on.
+const PARTICLE: u32 = 16;
+
+impl<T: RealField + Copy, const D: usize> Made<T, D> {
+    fn new(turn: [f64; 2]) -> Self {
+        Self {
+            mesh: Mesh::empty(Interpolation::Triangles, turn_of(turn)),
+            X: Vec::new(),
+            volume: Vec::new(),
+            mass: Vec::new(),
+            boundary: Vec::new(),
+            numbers: HashMap::new(),
+        }
+    }
+
+    /// Meets the corners of a particle, in order.
+    fn meet(&mut self, particle: usize, corners: impl Iterator<Item = u32>) {
+        for (place, corner) in corners.enumerate() {
+            let number = (particle as u64) << PARTICLE | place as u64;
+            self.numbers.entry(corner).or_insert(number);
+        }
+    }
+
+    /// A facet of a particle, with the number that follows on that of its last one.
+    fn add_facet(&mut self, particle: usize, side: usize, corners: [u32; D]) {
+        let first = (particle as u64) << PARTICLE;
+        let number = self.boundary.last().map_or(first, |last| first.max(last.number + 1));
+        self.boundary.push(Facet { side, corners, number });
+    }
+
+    /// The body at rest, with corners in the order of their numbers, which lie at `at(corner)`; and its boundary.
+    fn at_rest(
+        self,
+        spacing: f64,
+        at: impl Fn(u32) -> SVector<T, D>,
+    ) -> (Body<T, D>, Vec<Facet<D>>) {
+        let Self { mut mesh, X, volume, mass, mut boundary, numbers } = self;
+        let mut met: Vec<(u64, u32)> =
+            mesh.corners.iter().map(|corner| (numbers[corner], *corner)).collect();
+        met.sort_unstable();
+        met.dedup();
+        let known: HashMap<u32, u32> = met.iter().map(|(_, corner)| *corner).zip(0..).collect();
+        mesh.corners.iter_mut().for_each(|corner| *corner = known[corner]);
+        for facet in &mut boundary {
+            facet.corners = facet.corners.map(|corner| known[&corner]);
+        }
+        mesh.X = met.iter().map(|(_, corner)| at(*corner)).collect();
+        mesh.x.clone_from(&mesh.X);
+        let corners = met.into_iter().map(|(number, _)| number).collect();
+        mesh.numbers = Some(Numbers { corners, loads: Vec::new() });
+        let count = X.len();
+        let particles = Particles {
+            x: X.clone(),
+            X,
+            v: vec![SVector::zeros(); count],
+            F: vec![SMatrix::identity(); count],
+            mass,
+            volume,
+            half_size: SVector::repeat(real(0.5 * spacing)),
+            ..Particles::default()
+        };
+        let body = Body { half_edges: Vec::new(), mesh: Some(mesh), ..particles.into() };
+        (body, boundary)
+    }
 }
 
 /// From the axes of the body to those of the grid; none where they are the same.
@@ -206,29 +268,6 @@ fn turn_of<T: RealField + Copy, const D: usize>([cos, sin]: [f64; 2]) -> Option<
     ([cos, sin] != [1.0, 0.0]).then_some(turned)
 }
 
-/// A body of particles at rest, with their centroids, volumes and masses.
-fn at_rest<T: RealField + Copy, const D: usize>(
-    mut mesh: Mesh<T, D>,
-    X: Vec<SVector<T, D>>,
-    volume: Vec<T>,
-    mass: Vec<T>,
-    spacing: f64,
-) -> Body<T, D> {
-    mesh.x.clone_from(&mesh.X);
-    let count = X.len();
-    let particles = Particles {
-        x: X.clone(),
-        X,
-        v: vec![SVector::zeros(); count],
-        F: vec![SMatrix::identity(); count],
-        mass,
-        volume,
-        half_size: SVector::repeat(real(0.5 * spacing)),
-        ..Particles::default()
-    };
-    Body { half_edges: Vec::new(), mesh: Some(mesh), ..particles.into() }
-}
-
 /// A body in the plane or in space at rest, of the boxes of a lattice with `per_cell` of them in a cell of the grid and direction,
 /// clipped with its sides; and its boundary, facet by facet, but for facets on the walls of the grid. `grid` is in its own axes.
 ///
@@ -241,9 +280,30 @@ pub fn body<T: RealField + Copy, const D: usize>(
     density: f64,
     clip: &Clip<D>,
 ) -> Result<(Body<T, D>, Vec<Facet<D>>), SetupError> {
+    let (mut body, boundary) = part(grid, per_cell, density, clip, &|count| 0..count)?;
+    if let Some(mesh) = &mut body.mesh {
+        mesh.numbers = None;
+    }
+    Ok((body, boundary))
+}
+
+/// As [`body`] some successive particles alone, `own(count)` of that many in all, with their corners and the facets of their surfaces.
+///
+/// Memory is taken for these particles, and for the boxes along the sides of the whole body.
+///
+/// # Errors
+///
+/// As [`body`].
+pub fn part<T: RealField + Copy, const D: usize>(
+    grid: &Grid<f64, D>,
+    per_cell: usize,
+    density: f64,
+    clip: &Clip<D>,
+    own: &dyn Fn(usize) -> Range<usize>,
+) -> Result<(Body<T, D>, Vec<Facet<D>>), SetupError> {
     match D {
-        2 => Ok(plane::body(grid, per_cell.max(1), density, clip)),
-        3 => Ok(space::body(grid, per_cell.max(1), density, clip)),
+        2 => Ok(plane::part(grid, per_cell.max(1), density, clip, own)),
+        3 => Ok(space::part(grid, per_cell.max(1), density, clip, own)),
         _ => Err(SetupError::PolygonDimension { dimension: D }),
     }
 }
@@ -252,6 +312,91 @@ pub fn body<T: RealField + Copy, const D: usize>(
 mod tests {
     use super::*;
     use nalgebra::vector;
+    use std::f64::consts::PI;
+
+    /// Parts of a body, made each for itself, against those of the whole.
+    fn check_parts<const D: usize>(cells: usize, sides: &[Side<D>], turn: f64, offset: f64) {
+        let grid = Grid {
+            lower: SVector::repeat(-1.0),
+            spacing: 2.0 / cells as f64,
+            cells: [cells; D],
+            walls: [[false; 2]; D],
+        };
+        let clip = Clip { sides: sides.to_vec(), turn: [turn.cos(), turn.sin()], offset };
+        let (whole, boundary) = body::<f64, D>(&grid, 2, 3.0, &clip).unwrap();
+        let mesh = whole.mesh.as_ref().unwrap();
+        let count = whole.particles.len();
+        assert!(count > 20, "{count}");
+        let at = |mesh: &Mesh<f64, D>, facet: &Facet<D>| {
+            (facet.side, facet.corners.map(|corner| mesh.X[corner as usize]))
+        };
+        for parts in [2, 3, 7] {
+            let (mut numbers, mut facets, mut last) = (BTreeMap::new(), Vec::new(), None);
+            for own in (0..parts).map(|k| count * k / parts..count * (k + 1) / parts) {
+                let found = part::<f64, D>(&grid, 2, 3.0, &clip, &|all| {
+                    assert_eq!(all, count);
+                    own.clone()
+                });
+                let (mut found, boundary) = found.unwrap();
+                let of_part = found.mesh.as_mut().unwrap();
+                for facet in &boundary {
+                    assert!(last < Some(facet.number), "numbers of facets ascend");
+                    last = Some(facet.number);
+                    facets.push(at(of_part, facet));
+                }
+                // Numbers have gaps, and the order of those of the whole.
+                let mut expected = whole.part(&own);
+                let of_whole = expected.mesh.as_mut().unwrap().numbers.take().unwrap().corners;
+                let own_numbers = of_part.numbers.take().unwrap().corners;
+                assert_eq!(found, expected, "{parts} {own:?}");
+                for (of_whole, number) in of_whole.into_iter().zip(own_numbers) {
+                    assert_eq!(*numbers.entry(of_whole).or_insert(number), number);
+                }
+            }
+            assert_eq!(numbers.len(), mesh.X.len());
+            assert!(numbers.values().is_sorted_by(|a, b| a < b));
+            let expected: Vec<_> = boundary.iter().map(|facet| at(mesh, facet)).collect();
+            assert_eq!(facets, expected);
+        }
+    }
+
+    #[test]
+    fn parts_of_a_body_are_those_of_the_whole() {
+        let around = [Side::Inner { radius: 0.35 }, Side::Outer { radius: 0.8 }];
+        let straight =
+            |angle: f64, distance| Side::Straight { normal: [angle.cos(), angle.sin()], distance };
+        let wedge = [straight(0.3, 0.6), straight(1.9, 0.55), straight(4.0, 0.7)];
+        // Slivers all along two sides, which join the boxes beside them.
+        let block = [
+            straight(0.0, 0.51),
+            straight(0.5 * PI, 0.26),
+            straight(PI, 0.74),
+            straight(1.5 * PI, 0.88),
+        ];
+        for (k, offset) in [0.0, 0.2, -0.37, 0.5].into_iter().enumerate() {
+            let turn = 0.3 * k as f64;
+            check_parts::<2>(16, &around, turn, offset);
+            check_parts::<2>(16, &wedge, turn, offset);
+            check_parts::<2>(16, &block, 0.0, offset);
+        }
+        let flat = |axis: usize, sign: f64, distance| {
+            let mut normal = [0.0; 3];
+            normal[axis] = sign;
+            Side::Straight { normal, distance }
+        };
+        let around = [Side::Inner { radius: 0.35 }, Side::Outer { radius: 0.8 }];
+        let plate = [
+            flat(0, 1.0, 0.62),
+            flat(0, -1.0, 0.51),
+            flat(2, 1.0, 0.27),
+            flat(2, -1.0, 0.3),
+            Side::Outer { radius: 0.85 },
+        ];
+        for (turn, offset) in [(0.0, 0.0), (0.4, 0.2), (0.0, -0.37)] {
+            check_parts::<3>(8, &around, turn, offset);
+            check_parts::<3>(8, &plate, turn, offset);
+        }
+    }
 
     /// Also where the segment first goes on in the direction from which it comes back.
     #[test]

@@ -2,12 +2,14 @@
 
 use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::HashMap;
+use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_particles::{Body, Grid, Interpolation, Mesh};
+use mmsmith_particles::{Body, Grid};
 use nalgebra::{Matrix2, RealField, SVector, Vector2, vector};
 
-use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
+use super::boxes::{Division, Lattice, Survey};
+use super::{Clip, Contact, Facet, Made, ON, Side, join};
 
 /// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,7 +33,10 @@ enum Line {
     Side(usize),
 }
 
-/// The corners of all polygons.
+/// Corners and the lines of the edges that begin there, counter-clockwise.
+type Polygon = Vec<(u32, Line)>;
+
+/// The corners of polygons.
 struct Corners<'a> {
     sides: &'a [Side<2>],
     lattice: Lattice<2>,
@@ -101,8 +106,8 @@ impl Corners<'_> {
         }
     }
 
-    /// The polygon that is left of a box inside the sides: corners and the lines of the edges that begin there, counter-clockwise.
-    fn clipped(&mut self, of_box: [i64; 2]) -> Vec<(u32, Line)> {
+    /// A whole box: corners and the lines of the edges that begin there, counter-clockwise.
+    fn whole(&mut self, of_box: [i64; 2]) -> Polygon {
         let [i, j] = of_box;
         let around = [
             ([i, j], Line::Lattice { from: [i, j], axis: 0 }),
@@ -110,17 +115,15 @@ impl Corners<'_> {
             ([i + 1, j + 1], Line::Lattice { from: [i, j + 1], axis: 0 }),
             ([i, j + 1], Line::Lattice { from: [i, j], axis: 1 }),
         ];
-        // Most boxes are whole or none, which needs no corners.
-        let places = around.map(|(index, _)| self.lattice.place(index));
-        for side in self.sides {
-            if places.iter().all(|X| side.distance(X) < ON * self.lattice.spacing) {
-                return Vec::new();
-            }
-        }
         let polygon = around.map(|(index, line)| {
             (self.corner(Key::Lattice(index), &[], |corners| corners.lattice.place(index)), line)
         });
-        let mut polygon = polygon.to_vec();
+        polygon.to_vec()
+    }
+
+    /// The polygon that is left of a box inside the sides.
+    fn clipped(&mut self, of_box: [i64; 2]) -> Option<Polygon> {
+        let mut polygon = self.whole(of_box);
         for side in 0..self.sides.len() {
             let outside = |corners: &Self, corner: u32| corners.distance(corner, side) < 0.0;
             if !polygon.iter().any(|(corner, _)| outside(self, *corner)) {
@@ -151,7 +154,7 @@ impl Corners<'_> {
         polygon.retain(|_| !next.next().copied().unwrap_or(false));
         corners.sort_unstable();
         corners.dedup();
-        if corners.len() < 3 { Vec::new() } else { polygon }
+        (corners.len() >= 3).then_some(polygon)
     }
 
     /// Twice the area of a polygon, and six times its first moment.
@@ -187,31 +190,13 @@ fn segment(side: Side<2>, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
     sign * radius * radius * area
 }
 
-/// Edges of the polygons, and the polygons on either side of each.
-struct Neighbours<'a> {
-    corners: &'a Corners<'a>,
-    polygons: &'a [Vec<(u32, Line)>],
-    on_edge: HashMap<[u32; 2], Vec<usize>>,
-}
-
-impl<'a> Neighbours<'a> {
-    fn new(corners: &'a Corners<'a>, polygons: &'a [Vec<(u32, Line)>]) -> Self {
-        let mut on_edge: HashMap<_, Vec<usize>> = HashMap::new();
-        for (index, polygon) in polygons.iter().enumerate() {
-            for edge in edges(polygon) {
-                on_edge.entry(edge).or_default().push(index);
-            }
-        }
-        Self { corners, polygons, on_edge }
-    }
-
-    fn contacts(&self, polygon: usize) -> Vec<Contact> {
-        let of_edge = |edge: [u32; 2]| {
-            let measure = (self.corners.at(edge[0]) - self.corners.at(edge[1])).norm();
-            let others = self.on_edge[&edge].iter().filter(move |other| **other != polygon);
-            others.map(move |&with| Contact { with, measure })
-        };
-        edges(&self.polygons[polygon]).flat_map(of_edge).collect()
+impl Line {
+    /// The box on the other side of a line of the lattice than a box with an edge there.
+    fn other_box(self, of_box: [i64; 2]) -> Option<[i64; 2]> {
+        let Self::Lattice { from, axis } = self else { return None };
+        let mut below = from;
+        below[1 - axis] -= 1;
+        Some(if of_box == from { below } else { from })
     }
 }
 
@@ -223,79 +208,72 @@ fn edges(polygon: &[(u32, Line)]) -> impl Iterator<Item = [u32; 2]> {
     })
 }
 
-/// The body, and its boundary.
-pub(super) fn body<T: RealField + Copy, const D: usize>(
+/// The particles `own(count)` of a body, and their boundary.
+pub(super) fn part<T: RealField + Copy, const D: usize>(
     grid: &Grid<f64, D>,
     per_cell: usize,
     density: f64,
     clip: &Clip<D>,
+    own: &dyn Fn(usize) -> Range<usize>,
 ) -> (Body<T, D>, Vec<Facet<D>>) {
     let spacing = grid.spacing / per_cell as f64;
     let lower = vector![grid.lower[0], grid.lower[D - 1]];
     let sides: Vec<Side<2>> = clip.sides.iter().map(|side| side.carried()).collect();
-    let mut corners = Corners {
-        sides: &sides,
-        lattice: Lattice {
-            origin: lower.add_scalar(clip.offset * spacing),
-            spacing,
-            turn: clip.turn,
-        },
-        known: HashMap::new(),
-        X: Vec::new(),
-        distances: Vec::new(),
+    let lattice = Lattice {
+        origin: lower.add_scalar(clip.offset * spacing),
+        spacing,
+        turn: clip.turn,
+        in_cell: per_cell as i64,
+        // A shifted lattice begins in the cell beside the grid.
+        first_cell: -1,
+        cells: [0, D - 1].map(|a| grid.cells[a] as i64 + 2),
     };
-    let mut polygons = Vec::new();
-    let in_cell = per_cell as i64;
-    // A shifted lattice begins in the cell beside the grid.
-    let range = |axis: usize| -1..=grid.cells[axis] as i64;
-    for cell_j in range(D - 1) {
-        for cell_i in range(0) {
-            for j in cell_j * in_cell..(cell_j + 1) * in_cell {
-                for i in cell_i * in_cell..(cell_i + 1) * in_cell {
-                    let polygon = corners.clipped([i, j]);
-                    if !polygon.is_empty() {
-                        polygons.push(polygon);
-                    }
-                }
-            }
-        }
+    let (known, X, distances) = (HashMap::new(), Vec::new(), Vec::new());
+    let mut corners = Corners { sides: &sides, lattice, known, X, distances };
+    let survey = Survey::new(&lattice, &sides, &mut |_, of_box| corners.clipped(of_box));
+    let areas: Vec<(u64, f64)> =
+        survey.cut.iter().map(|(number, own)| (*number, 0.5 * corners.moments(own).0)).collect();
+    // The cut boxes at each edge; beside them there may be a whole one.
+    let mut on_edge: HashMap<[u32; 2], Vec<u64>> = HashMap::new();
+    for (number, polygon) in &survey.cut {
+        edges(polygon).for_each(|edge| on_edge.entry(edge).or_default().push(*number));
     }
-    let areas: Vec<f64> = polygons.iter().map(|own| 0.5 * corners.moments(own).0).collect();
-    let neighbours = Neighbours::new(&corners, &polygons);
-    let particles = join(&areas, spacing * spacing, |polygon| neighbours.contacts(polygon));
-    assemble(density, &neighbours, &particles)
-}
-
-/// The body of particles with these members.
-fn assemble<T: RealField + Copy, const D: usize>(
-    density: f64,
-    neighbours: &Neighbours<'_>,
-    particles: &[Vec<usize>],
-) -> (Body<T, D>, Vec<Facet<D>>) {
-    let Neighbours { corners, polygons, on_edge } = neighbours;
-    let Corners { sides, lattice: Lattice { spacing, turn, .. }, .. } = corners;
-    let vector = |X: Vector2<f64>| SVector::<T, D>::from_fn(|a, _| real(X[a]));
-    const NONE: u32 = u32::MAX;
-    let mut renumbered = vec![NONE; corners.X.len()];
-    let mut own = Mesh::empty(Interpolation::Triangles, turn_of(*turn));
-    let mut boundary = Vec::new();
-    let (mut X, mut volume, mut mass) = (Vec::new(), Vec::new(), Vec::new());
-    for members in particles {
+    let groups = join(&areas, spacing * spacing, |number| {
+        let (of_box, Some(polygon)) = (lattice.at(number), survey.of(number)) else {
+            return Vec::new();
+        };
+        let of_edge = |(edge, &(_, line)): ([u32; 2], &(u32, Line))| {
+            let measure = (corners.at(edge[0]) - corners.at(edge[1])).norm();
+            let others = on_edge[&edge].iter().copied().filter(move |other| *other != number);
+            let whole = line.other_box(of_box).filter(|other| lattice.is_whole(&sides, *other));
+            let whole = whole.and_then(|other| lattice.number(other));
+            others.chain(whole).map(move |with| Contact { with, measure })
+        };
+        edges(polygon).zip(polygon).flat_map(of_edge).collect()
+    });
+    let division = Division { lattice, sides: &sides, survey: &survey, groups };
+    let own = own(division.particles());
+    let mut made = Made::new(clip.turn);
+    division.each(&own, &mut |particle, boxes| {
+        let is_own = own.contains(&particle);
+        let mut of_particle = Vec::new();
         let (mut area, mut moment, mut segments) = (0.0, Vector2::zeros(), 0.0);
-        for &member in members {
-            let polygon = &polygons[member];
-            let (twice, six_fold) = corners.moments(polygon);
+        for &(number, of_box) in boxes {
+            let polygon = survey.of(number).cloned().unwrap_or_else(|| corners.whole(of_box));
+            of_particle.extend(polygon.iter().map(|(corner, _)| *corner));
+            if !is_own {
+                continue;
+            }
+            let (twice, six_fold) = corners.moments(&polygon);
             area += 0.5 * twice;
             moment += six_fold / 6.0;
             for (k, &(corner, line)) in polygon.iter().enumerate() {
-                let new = &mut renumbered[corner as usize];
-                if *new == NONE {
-                    *new = own.X.len() as u32;
-                    own.X.push(vector(corners.at(corner)));
-                }
-                own.corners.push(*new);
+                made.mesh.corners.push(corner);
                 let next = polygon[(k + 1) % polygon.len()].0;
-                if on_edge[&[corner.min(next), corner.max(next)]].len() > 1 {
+                let at_edge = on_edge.get(&[corner.min(next), corner.max(next)]);
+                let is_between = at_edge.is_some_and(|at| at.iter().any(|other| *other != number))
+                    || line.other_box(of_box).is_some_and(|other| lattice.is_whole(&sides, other));
+                if is_between {
                     continue;
                 }
                 let on_both = |side: &usize| {
@@ -305,21 +283,25 @@ fn assemble<T: RealField + Copy, const D: usize>(
                     Line::Side(side) => Some(side),
                     Line::Lattice { .. } => (0..sides.len()).find(on_both),
                 };
-                // What has no side lies where the grid ends.
+                // Edges without a side lie where the grid ends.
                 let Some(side) = side else { continue };
                 segments += segment(sides[side], &corners.at(corner), &corners.at(next));
                 let ends = std::array::from_fn(|k| [corner, next][k.min(1)]);
-                boundary.push(Facet { side, corners: ends });
+                made.add_facet(particle, side, ends);
             }
-            own.ends.push(own.corners.len() as u32);
+            made.mesh.ends.push(made.mesh.corners.len() as u32);
         }
-        own.of_particles.push(own.ends.len() as u32);
-        X.push(vector(moment / area));
-        volume.push(real(area));
-        mass.push(real(density * (area + segments)));
-    }
-    for edge in &mut boundary {
-        edge.corners = edge.corners.map(|corner| renumbered[corner as usize]);
-    }
-    (at_rest(own, X, volume, mass, *spacing), boundary)
+        made.meet(particle, of_particle.into_iter());
+        if is_own {
+            made.mesh.of_particles.push(made.mesh.ends.len() as u32);
+            made.X.push(vector_of(moment / area));
+            made.volume.push(real(area));
+            made.mass.push(real(density * (area + segments)));
+        }
+    });
+    made.at_rest(spacing, |corner| vector_of(corners.at(corner)))
+}
+
+fn vector_of<T: RealField + Copy, const D: usize>(X: Vector2<f64>) -> SVector<T, D> {
+    SVector::from_fn(|a, _| real(X[a]))
 }

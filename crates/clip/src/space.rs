@@ -5,34 +5,37 @@
 
 use mmsmith_scalar_functions::ScalarFunctions;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ops::Range;
 
 use mmsmith_lanes::tensor::real;
-use mmsmith_particles::{Body, Grid, Interpolation, Mesh};
+use mmsmith_particles::{Body, Grid};
 use nalgebra::{RealField, SVector, Vector3};
 
-use super::{Clip, Contact, Facet, Lattice, ON, Side, at_rest, join, turn_of};
+use super::boxes::{Division, Lattice, Left, Survey};
+use super::{Clip, Contact, Facet, Made, ON, Side, join};
 
 /// The key by which corners are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     /// A corner of boxes.
     Lattice([i64; 3]),
-    /// A side cuts the edge between two corners, the lower one first.
+    /// A side cuts the edge between two corners, the one with the lower rank first.
     Cut { ends: [u32; 2], side: usize },
 }
 
-/// The plane or surface on which a face lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// The plane or surface on which a face of a box lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Plane {
-    /// The face between boxes from a corner of the lattice on, with its normal along an axis.
+    /// Between this box and the one below it along an axis, or above it.
     Lattice {
-        from: [i64; 3],
-        axis: usize,
+        axis: u8,
+        is_upper: bool,
     },
-    Side(usize),
+    Side(u32),
 }
 
 /// A face, its corners counter-clockwise as seen from outside.
+#[derive(Clone)]
 struct Face {
     plane: Plane,
     corners: Vec<u32>,
@@ -49,7 +52,14 @@ struct Corners<'a> {
     X: Vec<Vector3<f64>>,
     /// Distances from all sides, corner after corner; zero on a side.
     distances: Vec<f64>,
+    /// The ranks of corners, once they are known.
+    ranks: Vec<Option<u64>>,
+    /// The box that is being clipped, and how many corners it has brought.
+    brought: (u64, u64),
 }
+
+/// Ranks have the box of a corner in the bits from this one on, and begin with its own corners.
+const BOX: u32 = 16;
 
 impl Corners<'_> {
     /// The corner of this key, on a side if that is told, however it is rounded.
@@ -70,8 +80,32 @@ impl Corners<'_> {
             self.distances.push(if is_on { 0.0 } else { distance });
         }
         self.X.push(X);
+        self.ranks.push(None);
         self.known.insert(key, corner);
         corner
+    }
+
+    /// The corner of boxes of an index.
+    fn of_lattice(&mut self, index: [i64; 3]) -> u32 {
+        self.corner(Key::Lattice(index), None, |corners| corners.lattice.place(index))
+    }
+
+    /// The place of a corner in the order in which boxes would bring corners, if all were clipped in the order of their numbers: by it, and not by the number here,
+    /// corners are told apart where their order shows in roundings, so that a part of a body has those of the whole.
+    fn rank(&mut self, corner: u32, index: impl FnOnce() -> [i64; 3]) -> u64 {
+        if let Some(rank) = self.ranks[corner as usize] {
+            return rank;
+        }
+        let index = index();
+        let of_box = |bits: usize| {
+            let of_box = std::array::from_fn(|a| index[a] - (bits >> a & 1) as i64);
+            let number = self.lattice.number(of_box)?;
+            let is_met = !matches!(self.lattice.left(self.sides, of_box), Left::Nothing);
+            is_met.then_some(number << BOX | bits as u64)
+        };
+        let rank = (0..8).filter_map(of_box).min().unwrap_or(0);
+        self.ranks[corner as usize] = Some(rank);
+        rank
     }
 
     fn distance(&self, corner: u32, side: usize) -> f64 {
@@ -84,44 +118,51 @@ impl Corners<'_> {
 
     /// Where a side cuts the edge between two corners on either side of it.
     fn cut(&mut self, from: u32, to: u32, side: usize) -> u32 {
-        let ends = [from.min(to), from.max(to)];
-        self.corner(Key::Cut { ends, side }, Some(side), |corners| {
+        let is_lower = self.ranks[from as usize] < self.ranks[to as usize];
+        let ends = if is_lower { [from, to] } else { [to, from] };
+        let cut = self.corner(Key::Cut { ends, side }, Some(side), |corners| {
             let [a, b] = ends.map(|end| (corners.at(end), corners.distance(end, side)));
             corners.sides[side].crossing(a, b)
-        })
+        });
+        let (of_box, brought) = &mut self.brought;
+        *brought += 1;
+        self.ranks[cut as usize].get_or_insert(*of_box << BOX | *brought);
+        cut
     }
 
-    /// The polyhedron that is left of a box inside the sides; nothing where the box lies outside.
-    fn clipped(&mut self, of_box: [i64; 3]) -> Polyhedron {
-        let index = |bits: usize| std::array::from_fn(|a| of_box[a] + (bits >> a & 1) as i64);
-        // Most boxes are whole or none, which needs no corners.
-        let places: [_; 8] = std::array::from_fn(|bits| self.lattice.place(index(bits)));
-        for side in self.sides {
-            if places.iter().all(|X| side.distance(X) < ON * self.lattice.spacing) {
-                return Vec::new();
-            }
-        }
-        let corners: [u32; 8] = std::array::from_fn(|bits| {
-            let index = index(bits);
-            self.corner(Key::Lattice(index), None, |corners| corners.lattice.place(index))
-        });
+    /// A whole box.
+    fn whole(&mut self, of_box: [i64; 3]) -> Polyhedron {
+        let index = |bits: usize| Lattice::corner(of_box, bits);
+        let corners: [u32; 8] = std::array::from_fn(|bits| self.of_lattice(index(bits)));
         let mut faces = Vec::with_capacity(7);
         for axis in 0..3 {
             let (along, b, c) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
             for (upper, around) in [(0, [0, c, b + c, b]), (along, [0, b, b + c, c])] {
-                let plane = Plane::Lattice { from: index(upper), axis };
+                let plane = Plane::Lattice { axis: axis as u8, is_upper: upper > 0 };
                 let corners = around.map(|bits| corners[upper + bits]).to_vec();
                 faces.push(Face { plane, corners });
             }
         }
+        faces
+    }
+
+    /// The polyhedron that is left of a box inside the sides.
+    fn clipped(&mut self, number: u64, of_box: [i64; 3]) -> Option<Polyhedron> {
+        let mut faces = self.whole(of_box);
+        for bits in 0..8 {
+            let index = Lattice::corner(of_box, bits);
+            let corner = self.of_lattice(index);
+            self.rank(corner, || index);
+        }
+        self.brought = (number, 8);
         for side in 0..self.sides.len() {
             let is_outside = |corner: &u32| self.distance(*corner, side) < 0.0;
             if faces.iter().any(|face| face.corners.iter().any(is_outside)) {
                 faces = faces.into_iter().filter_map(|face| self.clip(face, side)).collect();
-                close(&mut faces, side);
+                close(&mut faces, side, &self.ranks);
             }
         }
-        if faces.len() < 4 { Vec::new() } else { faces }
+        (faces.len() >= 4).then_some(faces)
     }
 
     /// The part of a face inside a side.
@@ -173,7 +214,7 @@ impl Corners<'_> {
 }
 
 /// Adds the faces on a side where it has cut a polyhedron open.
-fn close(faces: &mut Polyhedron, side: usize) {
+fn close(faces: &mut Polyhedron, side: usize, ranks: &[Option<u64>]) {
     let mut edges = HashSet::new();
     for Face { corners, .. } in &*faces {
         for (k, &from) in corners.iter().enumerate() {
@@ -182,17 +223,18 @@ fn close(faces: &mut Polyhedron, side: usize) {
     }
     // From each open end back along the edge.
     let is_open = |[from, to]: &&[u32; 2]| !edges.contains(&[*to, *from]);
-    let mut next: BTreeMap<u32, u32> =
-        edges.iter().filter(is_open).map(|&[from, to]| (to, from)).collect();
-    while let Some((first, mut corner)) = next.pop_first() {
+    let by_rank = |corner: u32| (ranks[corner as usize], corner);
+    let mut next: BTreeMap<_, u32> =
+        edges.iter().filter(is_open).map(|&[from, to]| (by_rank(to), from)).collect();
+    while let Some(((_, first), mut corner)) = next.pop_first() {
         let mut corners = vec![first];
         while corner != first {
             corners.push(corner);
-            let Some(following) = next.remove(&corner) else { break };
+            let Some(following) = next.remove(&by_rank(corner)) else { break };
             corner = following;
         }
         if corners.len() >= 3 {
-            faces.push(Face { plane: Plane::Side(side), corners });
+            faces.push(Face { plane: Plane::Side(side as u32), corners });
         }
     }
 }
@@ -213,61 +255,55 @@ fn segment(side: Side<3>, [a, b, c]: [Vector3<f64>; 3]) -> f64 {
     radius.powi(3) * (angle / 3.0 - product / 6.0)
 }
 
-/// The body, and its boundary.
-pub(super) fn body<T: RealField + Copy, const D: usize>(
-    grid: &Grid<f64, D>,
-    per_cell: usize,
-    density: f64,
-    clip: &Clip<D>,
-) -> (Body<T, D>, Vec<Facet<D>>) {
-    let spacing = grid.spacing / per_cell as f64;
-    let lower = Vector3::from_fn(|a, _| grid.lower[a.min(D - 1)]);
-    let sides: Vec<Side<3>> = clip.sides.iter().map(|side| side.carried()).collect();
-    let mut corners = Corners {
-        sides: &sides,
-        lattice: Lattice {
-            origin: lower.add_scalar(clip.offset * spacing),
-            spacing,
-            turn: clip.turn,
-        },
-        known: HashMap::new(),
-        X: Vec::new(),
-        distances: Vec::new(),
-    };
-    let mut polyhedra = Vec::new();
-    let boxes = |axis: usize| {
-        let in_cell = per_cell as i64;
-        // A shifted lattice begins in the cell beside the grid.
-        -in_cell..(grid.cells[axis.min(D - 1)] as i64 + 1) * in_cell
-    };
-    for k in boxes(2) {
-        for j in boxes(1) {
-            for i in boxes(0) {
-                let polyhedron = corners.clipped([i, j, k]);
-                if !polyhedron.is_empty() {
-                    polyhedra.push(polyhedron);
-                }
-            }
-        }
+/// The faces of boxes that sides cut, beside which there may be whole ones.
+struct Between<'a> {
+    lattice: Lattice<3>,
+    sides: &'a [Side<3>],
+    /// For each cut box its number, and a bit for each face on the lattice that it has.
+    cut: Vec<(u64, u8)>,
+}
+
+/// The bit of a face of a box.
+fn bit(axis: u8, is_upper: bool) -> u8 {
+    1 << (2 * axis + u8::from(is_upper))
+}
+
+impl<'a> Between<'a> {
+    fn new(lattice: Lattice<3>, sides: &'a [Side<3>], cut: &[(u64, Polyhedron)]) -> Self {
+        let bits = |own: &Polyhedron| {
+            own.iter().fold(0, |bits, face| match face.plane {
+                Plane::Lattice { axis, is_upper } => bits | bit(axis, is_upper),
+                Plane::Side(_) => bits,
+            })
+        };
+        Self { lattice, sides, cut: cut.iter().map(|(number, own)| (*number, bits(own))).collect() }
     }
-    let mut between: HashMap<Plane, Vec<usize>> = HashMap::new();
-    for (index, polyhedron) in polyhedra.iter().enumerate() {
-        for face in polyhedron {
-            if let Plane::Lattice { .. } = face.plane {
-                between.entry(face.plane).or_default().push(index);
-            }
-        }
+
+    /// The box on the other side of a face of a box, by number, if it has something of the body there.
+    fn other(&self, of_box: [i64; 3], plane: Plane) -> Option<u64> {
+        let Plane::Lattice { axis, is_upper } = plane else { return None };
+        let mut other = of_box;
+        other[usize::from(axis)] += if is_upper { 1 } else { -1 };
+        let number = self.lattice.number(other)?;
+        let has_face = match self.cut.binary_search_by_key(&number, |(number, _)| *number) {
+            Ok(place) => self.cut[place].1 & bit(axis, !is_upper) > 0,
+            Err(_) => self.lattice.is_whole(self.sides, other),
+        };
+        has_face.then_some(number)
     }
-    // The side of each face on the boundary.
-    let side_of = |corners: &Corners<'_>, face: &Face| match face.plane {
-        Plane::Side(side) => Some(side),
-        Plane::Lattice { .. } if between[&face.plane].len() > 1 => None,
-        // What has no side lies where the grid ends.
-        Plane::Lattice { .. } => (0..sides.len())
-            .find(|side| face.corners.iter().all(|at| corners.distance(*at, *side) == 0.0)),
-    };
-    for polyhedron in &mut polyhedra {
-        let of_face = |face: Face| match side_of(&corners, &face) {
+
+    /// A box with its faces on the boundary as triangles.
+    fn triangulated(&self, corners: &Corners<'_>, number: u64, own: Polyhedron) -> Polyhedron {
+        let of_box = self.lattice.at(number);
+        let side_of = |face: &Face| match face.plane {
+            Plane::Side(side) => Some(side),
+            plane if self.other(of_box, plane).is_some() => None,
+            // Faces without a side lie where the grid ends.
+            Plane::Lattice { .. } => (0..self.sides.len())
+                .find(|side| face.corners.iter().all(|at| corners.distance(*at, *side) == 0.0))
+                .map(|side| side as u32),
+        };
+        let of_face = |face: Face| match side_of(&face) {
             None => vec![face],
             Some(side) => {
                 let triangle = |pair: &[u32]| Face {
@@ -277,73 +313,113 @@ pub(super) fn body<T: RealField + Copy, const D: usize>(
                 face.corners[1..].windows(2).map(triangle).collect()
             }
         };
-        *polyhedron = std::mem::take(polyhedron).into_iter().flat_map(of_face).collect();
+        own.into_iter().flat_map(of_face).collect()
     }
-    let volumes: Vec<f64> = polyhedra.iter().map(|own| corners.moments(own).0 / 6.0).collect();
-    let particles = join(&volumes, spacing.powi(3), |index| {
-        let of_face = |face: &Face| {
-            let measure = corners.area(&face.corners);
-            let others = between.get(&face.plane).into_iter().flatten().copied();
-            others.filter(move |with| *with != index).map(move |with| Contact { with, measure })
-        };
-        polyhedra[index].iter().flat_map(of_face).collect()
-    });
-    assemble(density, &corners, &polyhedra, &particles)
 }
 
-/// The body of particles with these members.
-fn assemble<T: RealField + Copy, const D: usize>(
+/// The particles `own(count)` of a body, and their boundary.
+pub(super) fn part<T: RealField + Copy, const D: usize>(
+    grid: &Grid<f64, D>,
+    per_cell: usize,
     density: f64,
-    corners: &Corners<'_>,
-    polyhedra: &[Polyhedron],
-    particles: &[Vec<usize>],
+    clip: &Clip<D>,
+    own: &dyn Fn(usize) -> Range<usize>,
 ) -> (Body<T, D>, Vec<Facet<D>>) {
-    let Corners { sides, lattice: Lattice { spacing, turn, .. }, .. } = corners;
-    let vector = |X: Vector3<f64>| SVector::<T, D>::from_fn(|a, _| real(X[a]));
-    const NONE: u32 = u32::MAX;
-    let mut renumbered = vec![NONE; corners.X.len()];
-    let mut own = Mesh::empty(Interpolation::Triangles, turn_of(*turn));
-    let mut boundary = Vec::new();
-    let (mut X, mut volume, mut mass) = (Vec::new(), Vec::new(), Vec::new());
+    let spacing = grid.spacing / per_cell as f64;
+    let lower = Vector3::from_fn(|a, _| grid.lower[a.min(D - 1)]);
+    let sides: Vec<Side<3>> = clip.sides.iter().map(|side| side.carried()).collect();
+    let lattice = Lattice {
+        origin: lower.add_scalar(clip.offset * spacing),
+        spacing,
+        turn: clip.turn,
+        // Boxes are not ordered by cells. A shifted lattice begins in the cell beside the grid.
+        in_cell: 1,
+        first_cell: -(per_cell as i64),
+        cells: [0, 1, 2].map(|a| (grid.cells[a.min(D - 1)] + 2) as i64 * per_cell as i64),
+    };
+    let mut corners = Corners {
+        sides: &sides,
+        lattice,
+        known: HashMap::new(),
+        X: Vec::new(),
+        distances: Vec::new(),
+        ranks: Vec::new(),
+        brought: (0, 0),
+    };
+    let mut survey =
+        Survey::new(&lattice, &sides, &mut |number, of_box| corners.clipped(number, of_box));
+    let between = Between::new(lattice, &sides, &survey.cut);
+    for (number, polyhedron) in &mut survey.cut {
+        let own = std::mem::take(polyhedron);
+        *polyhedron = between.triangulated(&corners, *number, own);
+    }
+    let volume = |(number, own): &(u64, Polyhedron)| (*number, corners.moments(own).0 / 6.0);
+    let volumes: Vec<(u64, f64)> = survey.cut.iter().map(volume).collect();
+    let groups = join(&volumes, spacing.powi(3), |number| {
+        let of_face = |face: &Face| {
+            let measure = corners.area(&face.corners);
+            let with = between.other(lattice.at(number), face.plane);
+            with.map(|with| Contact { with, measure })
+        };
+        survey.of(number).into_iter().flatten().filter_map(of_face).collect()
+    });
+    let division = Division { lattice, sides: &sides, survey: &survey, groups };
+    let own = own(division.particles());
+    let mut made = Made::new(clip.turn);
     // Among the corners of the polyhedron at hand.
     let mut places: Vec<u32> = Vec::new();
-    for members in particles {
+    division.each(&own, &mut |particle, boxes| {
+        let is_own = own.contains(&particle);
+        let mut of_particle = Vec::new();
         let (mut whole, mut moment, mut segments) = (0.0, Vector3::zeros(), 0.0);
-        for &member in members {
-            let (six_fold, of_moment) = corners.moments(&polyhedra[member]);
+        for &(number, of_box) in boxes {
+            let polyhedron = survey.of(number).cloned().unwrap_or_else(|| {
+                let own = corners.whole(of_box);
+                between.triangulated(&corners, number, own)
+            });
+            of_particle.extend(polyhedron.iter().flat_map(|face| &face.corners).copied());
+            if !is_own {
+                continue;
+            }
+            let (six_fold, of_moment) = corners.moments(&polyhedron);
             whole += six_fold / 6.0;
             moment += of_moment / 24.0;
             places.clear();
-            for face in &polyhedra[member] {
-                for &corner in &face.corners {
-                    let new = &mut renumbered[corner as usize];
-                    if *new == NONE {
-                        *new = own.X.len() as u32;
-                        own.X.push(vector(corners.at(corner)));
-                    }
-                    let place = places.iter().position(|known| known == new);
+            let faces = &mut made.mesh.faces;
+            for face in &polyhedron {
+                for corner in &face.corners {
+                    let place = places.iter().position(|known| known == corner);
                     let place = place.unwrap_or_else(|| {
-                        places.push(*new);
+                        places.push(*corner);
                         places.len() - 1
                     });
-                    own.faces.corners.push(place as u32);
+                    faces.corners.push(place as u32);
                 }
-                own.faces.ends.push(own.faces.corners.len() as u32);
+                faces.ends.push(faces.corners.len() as u32);
+            }
+            faces.of_polyhedra.push(faces.ends.len() as u32);
+            for face in &polyhedron {
                 if let (Plane::Side(side), &[a, b, c]) = (face.plane, &face.corners[..]) {
-                    segments += segment(sides[side], [a, b, c].map(|corner| corners.at(corner)));
-                    let of_facet = [a, b, c].map(|corner| renumbered[corner as usize]);
-                    let of_facet = std::array::from_fn(|k| of_facet[k.min(2)]);
-                    boundary.push(Facet { side, corners: of_facet });
+                    let on_side = sides[side as usize];
+                    segments += segment(on_side, [a, b, c].map(|corner| corners.at(corner)));
+                    let of_facet = std::array::from_fn(|k| [a, b, c][k.min(2)]);
+                    made.add_facet(particle, side as usize, of_facet);
                 }
             }
-            own.faces.of_polyhedra.push(own.faces.ends.len() as u32);
-            own.corners.extend_from_slice(&places);
-            own.ends.push(own.corners.len() as u32);
+            made.mesh.corners.extend_from_slice(&places);
+            made.mesh.ends.push(made.mesh.corners.len() as u32);
         }
-        own.of_particles.push(own.ends.len() as u32);
-        X.push(vector(moment / whole));
-        volume.push(real(whole));
-        mass.push(real(density * (whole + segments)));
-    }
-    (at_rest(own, X, volume, mass, *spacing), boundary)
+        made.meet(particle, of_particle.into_iter());
+        if is_own {
+            made.mesh.of_particles.push(made.mesh.ends.len() as u32);
+            made.X.push(vector_of(moment / whole));
+            made.volume.push(real(whole));
+            made.mass.push(real(density * (whole + segments)));
+        }
+    });
+    made.at_rest(spacing, |corner| vector_of(corners.at(corner)))
+}
+
+fn vector_of<T: RealField + Copy, const D: usize>(X: Vector3<f64>) -> SVector<T, D> {
+    SVector::from_fn(|a, _| real(X[a]))
 }

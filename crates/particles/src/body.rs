@@ -97,6 +97,25 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
         per_cell: usize,
         density: T,
     ) -> Result<Self, SetupError> {
+        let mut whole = Self::annulus_part(ring, spacing, per_cell, density, &|count| 0..count)?;
+        if let Some(mesh) = &mut whole.mesh {
+            mesh.numbers = None;
+        }
+        Ok(whole)
+    }
+
+    /// As [`annulus`](Self::annulus) some successive particles alone, `own(count)` of that many in all, with their corners.
+    ///
+    /// # Errors
+    ///
+    /// As [`annulus`](Self::annulus).
+    pub fn annulus_part(
+        ring: &Annulus<T>,
+        spacing: T,
+        per_cell: usize,
+        density: T,
+        own: &dyn Fn(usize) -> Range<usize>,
+    ) -> Result<Self, SetupError> {
         if D != 2 {
             return Err(SetupError::PolarDimension { dimension: D });
         }
@@ -129,36 +148,32 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
 
         let vector = |cos: T, sin: T| SVector::from_fn(|a, _| if a == 0 { cos } else { sin });
         let radius = |i: usize| inner + width * number(i);
-        let (mut of_corners, mut corners) = (Vec::new(), Vec::new());
-        for j in 0..rays {
-            let (cos, sin) = direction(j, around);
-            of_corners.extend((0..=across).map(|i| vector(cos, sin) * radius(i)));
-        }
-        let count = across * cells;
+        let own = own(across * cells);
+        let count = own.len();
         let (mut X, mut volume) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let mut half_edges = Vec::with_capacity(count);
-        for j in 0..cells {
+        let mut corners = Vec::with_capacity(4 * count);
+        for (i, j) in own.map(|p| (p % across, p / across)) {
             let (cos, sin) = direction(2 * j + 1, 2 * around);
             // A chord's centroid lies inside its arc.
             let chord = sine(half * angle) / (half * angle);
-            for i in 0..across {
-                let (low, high) = (radius(i), radius(i + 1));
-                let middle = half * (low + high);
-                // 2/3 (high^3 - low^3) / (high^2 - low^2)
-                let centre = middle + width * width / (real::<T>(12.0) * middle);
-                X.push(vector(cos, sin) * (centre * chord));
-                volume.push(middle * width * angle);
-                let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
-                half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
-                let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u32;
-                corners.extend([
-                    corner(i, j),
-                    corner(i + 1, j),
-                    corner(i + 1, j + 1),
-                    corner(i, j + 1),
-                ]);
-            }
+            let (low, high) = (radius(i), radius(i + 1));
+            let middle = half * (low + high);
+            // 2/3 (high^3 - low^3) / (high^2 - low^2)
+            let centre = middle + width * width / (real::<T>(12.0) * middle);
+            X.push(vector(cos, sin) * (centre * chord));
+            volume.push(middle * width * angle);
+            let edges = [vector(cos, sin) * width, vector(-sin, cos) * (middle * angle)];
+            half_edges.push(SMatrix::from_fn(|a, k| half * edges[k][a]));
+            let corner = |i: usize, j: usize| ((j % rays) * (across + 1) + i) as u64;
+            let of_cell = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            corners.extend(of_cell);
         }
+        let mesh = cells_between(corners, |number| {
+            let (i, j) = (number as usize % (across + 1), number as usize / (across + 1));
+            let (cos, sin) = direction(j, around);
+            vector(cos, sin) * radius(i)
+        });
         let particles = Particles {
             x: X.clone(),
             X,
@@ -169,8 +184,7 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
             half_size: SVector::repeat(half * width),
             ..Particles::default()
         };
-        let mesh = Some(Mesh::cells(of_corners, corners));
-        Ok(Self { half_edges, mesh, ..particles.into() })
+        Ok(Self { half_edges, mesh: Some(mesh), ..particles.into() })
     }
 }
 
@@ -219,18 +233,25 @@ fn cells_of_boxes<T: RealField + Copy, const D: usize>(
             }));
         }
     }
-    let mut numbers = of_cells.clone();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let position = |number: &u64| {
-        let mut rest = *number;
+    cells_between(of_cells, |number| {
+        let mut rest = number;
         SVector::from_fn(|a, _| {
             let index = rest % count[a] as u64;
             rest /= count[a] as u64;
             grid.lower[a] + real::<T>(index as f64) * edge[a]
         })
-    };
-    let X = numbers.iter().map(position).collect();
+    })
+}
+
+/// Cells between corners with these numbers in the whole body, which lie at `at(number)`.
+fn cells_between<T: RealField + Copy, const D: usize>(
+    of_cells: Vec<u64>,
+    at: impl Fn(u64) -> SVector<T, D>,
+) -> Mesh<T, D> {
+    let mut numbers = of_cells.clone();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let X = numbers.iter().map(|number| at(*number)).collect();
     let place = |number: u64| numbers.partition_point(|known| *known < number) as u32;
     let corners = of_cells.into_iter().map(place).collect();
     let numbers = Numbers { corners: numbers, loads: Vec::new() };
@@ -253,6 +274,19 @@ mod tests {
             assert_eq!(body.particles.len(), across * around, "{ring:?}");
             let half_size = 0.5 * (outer - inner) / across as f64;
             assert!((body.particles.half_size / half_size).iter().all(|r| (r - 1.0).abs() < 1e-13));
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_ring_has_the_particles_and_corners_of_the_whole() {
+        for quarter in [true, false] {
+            let ring = Annulus { inner: 0.4, outer: 0.6, quarter };
+            let whole = Body::<f64, 2>::annulus(&ring, 0.1, 2, 3.0).unwrap();
+            let count = whole.particles.len();
+            for own in [0..count, 0..7, 5..count - 3, count - 9..count, 4..4] {
+                let part = Body::annulus_part(&ring, 0.1, 2, 3.0, &|_| own.clone()).unwrap();
+                assert_eq!(part, whole.part(&own), "{own:?}");
+            }
         }
     }
 

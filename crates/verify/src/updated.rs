@@ -63,19 +63,21 @@ pub(crate) fn bytes_expected<const D: usize>(
             * (particles * (of_shape + of_transfer) as f64 + scene.nodes() * of_node as f64)
 }
 
-/// A body that a lattice clipped with its boundary makes, at rest.
+/// The particles `own(count)` of a body that a lattice clipped with its boundary makes, at rest.
 fn clipped<T: Precision<D>, const D: usize>(
     scene: &Scene<D>,
     placement: Placement,
     per_cell: usize,
     density: f64,
+    own: &dyn Fn(usize) -> Range<usize>,
 ) -> Result<Body<T, D>, CaseError> {
     let clip = Clip {
         sides: scene.boundary.iter().map(|part| part.side).collect(),
         turn: scene.turn,
         offset: placement.offset(),
     };
-    let (mut body, facets) = mmsmith_clip::body::<T, D>(&scene.grid(), per_cell, density, &clip)?;
+    let (mut body, facets) =
+        mmsmith_clip::part::<T, D>(&scene.grid(), per_cell, density, &clip, own)?;
     if let Some(mesh) = &mut body.mesh {
         let (grid, near) = (scene.grid::<T>(), T::nearest(1e-9 * scene.spacing));
         for (a, walls) in scene.walls.iter().enumerate() {
@@ -87,15 +89,17 @@ fn clipped<T: Precision<D>, const D: usize>(
                 }
             }
         }
-        for Facet { side, corners } in facets {
+        for Facet { side, corners, number } in facets {
             let part = &scene.boundary[side];
             if !part.is_loaded {
                 continue;
             }
             let ends = corners.map(|corner| mesh.X[corner as usize].map(Real::to_f64));
-            for (X, shares) in load_points(part.side, ends) {
+            for ((X, shares), point) in load_points(part.side, ends).into_iter().zip(0..) {
                 let (X, shares) = (X.map(Real::nearest), shares.map(Real::nearest));
                 mesh.loads.push(Load { corners, shares, X });
+                // A facet has three of these points at most.
+                mesh.numbers.iter_mut().for_each(|own| own.loads.push(4 * number + point));
             }
         }
         mesh.x.clone_from(&mesh.X);
@@ -162,22 +166,30 @@ fn body<T: Precision<D>, const D: usize>(
     density: f64,
     ranks: Option<&Arc<dyn Ranks>>,
 ) -> Result<(Body<T, D>, Option<Share>), CaseError> {
-    let part = |whole: Body<T, D>| match ranks {
-        None => (whole, None),
-        Some(ranks) => {
-            let share = share_of(whole.particles.len(), ranks);
-            (whole.part(&numbers(&share)), Some(share))
+    let counted = Cell::new(0);
+    let own = |count: usize| {
+        counted.set(count);
+        ranks.map_or(0..count, |ranks| numbers(&share_of(count, ranks)))
+    };
+    let with_share = |mut body: Body<T, D>| {
+        let share = ranks.map(|ranks| share_of(counted.get(), ranks));
+        if share.is_none()
+            && let Some(mesh) = &mut body.mesh
+        {
+            mesh.numbers = None;
         }
+        (body, share)
     };
     let (grid, exact_density, density) = (scene.grid::<T>(), density, T::nearest(density));
     let offset = match (updated.placement, &scene.domain) {
         (Placement::BodyFitted, &Domain::Annulus { inner, outer }) if EVERY_SCHEME => {
             let quarter = scene.extent() == Some(Extent::Quarter);
             let ring = Annulus { inner: T::nearest(inner), outer: T::nearest(outer), quarter };
-            return Ok(part(Body::annulus(&ring, grid.spacing, per_cell, density)?));
+            let body = Body::annulus_part(&ring, grid.spacing, per_cell, density, &own)?;
+            return Ok(with_share(body));
         }
         (placement @ Placement::Clipped { .. }, _) if EVERY_SCHEME => {
-            return Ok(part(clipped(scene, placement, per_cell, exact_density)?));
+            return Ok(with_share(clipped(scene, placement, per_cell, exact_density, &own)?));
         }
         (placement, _) => placement.offset(),
     };

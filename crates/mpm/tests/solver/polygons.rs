@@ -194,7 +194,7 @@ where
             let facet = from_lowest(&facet);
             assert!(known.insert(facet.clone(), false).is_none(), "{what}: {facet:?} twice");
         }
-        for Facet { side, corners } in &boundary {
+        for Facet { side, corners, .. } in &boundary {
             let seen = known.insert(from_lowest(corners), true);
             assert_eq!(seen, Some(false), "{what}");
             for X in corners.map(|corner| own.X[corner as usize]) {
