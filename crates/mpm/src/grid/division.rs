@@ -12,8 +12,8 @@ use crate::shape::one_axis::EXTENDED;
 /// --profile` with one to four particles along an axis of a cell.
 const NODE: f64 = 0.07;
 
-/// Tiles that are counted within a moment.
-const MOST_TILES: usize = 1 << 16;
+/// Tiles that are counted within a second or two.
+const MOST_TILES: usize = 1 << 19;
 
 /// Division of a body that fills a grid, with so many particles along each axis of a cell. `None` for a grid that no machine holds, or with more
 /// tiles than are soon counted.
