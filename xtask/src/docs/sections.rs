@@ -504,12 +504,12 @@ fn of_a_billion(
         format!("{large:.0}^{dimension:.0}"),
         format!("{tiles:.0}"),
         format!("{cores:.0}"),
-        format!("{:.2}", PARTICLES / cores / 1e6),
-        format!("{work:.3}"),
+        format!("{:.3}", PARTICLES / cores / 1e6),
+        format!("{work:.4}"),
         format!("{:.1}", sent / 1e6),
         format!("{:.4}", sent / 1e10),
         format!("{steps:.0}"),
-        format!("{hours:.1}"),
+        format!("{hours:.2}"),
     ])
 }
 
