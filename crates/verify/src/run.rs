@@ -79,14 +79,14 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Whether runs give their rows and nothing else: modules of WebAssembly have no files and no other process, and are compiled without what
+/// Whether runs give their rows and nothing else: modules of WebAssembly in browsers have no files and no other process, and are compiled without what
 /// serves these.
-const ROWS_ALONE: bool = cfg!(target_family = "wasm");
+const ROWS_ALONE: bool = cfg!(all(target_family = "wasm", target_os = "unknown"));
 
 /// Messages that one of several processes sent to the others, from the first step to the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunTraffic {
-    /// In the steps: nodes that bands of two processes share, and particles that go to another process.
+    /// In the steps: nodes that layers of two processes share, and particles that go to another process.
     pub stepping: Sent,
     /// After them: what is measured, written and agreed upon.
     pub measuring: Sent,
