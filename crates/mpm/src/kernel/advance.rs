@@ -23,8 +23,6 @@ pub(crate) struct AdvanceParticles<'a, T, const D: usize> {
     pub(crate) contributions: &'a mut Contributions<T, D, BLOCK>,
     /// The scalars of nodes, but in the plane.
     pub(crate) growth: &'a mut [T; BLOCK],
-    /// By how many particles the next block lies ahead in memory.
-    pub(crate) ahead: usize,
 }
 
 impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
@@ -65,9 +63,9 @@ impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
             );
             return;
         }
-        prefetch(&self.x[k], self.ahead);
-        prefetch(&self.v[k], self.ahead);
-        prefetch(&self.F[k], self.ahead);
+        prefetch(&self.x[k], BLOCK);
+        prefetch(&self.v[k], BLOCK);
+        prefetch(&self.F[k], BLOCK);
         let Self { time_step, per_cell, contributions, .. } = self;
         let (Some(x), Some(v), Some(F)) = (
             self.x[k].as_mut_slice().first_chunk_mut::<2>(),

@@ -113,21 +113,18 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         let mut copies = None;
         for (index, ids) in particles.indices().chunks(BLOCK).enumerate() {
             let place = index * BLOCK;
-            // Rows of a tile lie apart in memory.
-            let next = particles.indices().get(place + BLOCK);
-            let ahead = next.map_or(BLOCK, |next| (*next as usize).wrapping_sub(ids[0] as usize));
             if self.uniform.is_none() {
                 buffers.contributions.take(ids, self.fixed.mass, self.fixed.volume);
             }
             if let Some(block) = particles.contiguous(place, BLOCK) {
-                let found = self.advance_block(&mut buffers, (&mut window, c), (ids, ahead), block);
+                let found = self.advance_block(&mut buffers, (&mut window, c), ids, block);
                 outcome = outcome.merge(found);
                 continue;
             }
             let copies = copies.get_or_insert_with(|| MovingColumns::at_rest(BLOCK, &self.shares));
             particles.gather(place, ids.len(), copies);
             let block = copies.first(BLOCK, &self.shares);
-            let found = self.advance_block(&mut buffers, (&mut window, c), (ids, ahead), block);
+            let found = self.advance_block(&mut buffers, (&mut window, c), ids, block);
             outcome = outcome.merge(found);
             particles.scatter(copies);
         }
@@ -140,7 +137,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         &self,
         Buffers { weights, contributions, interpolated, growth, .. }: &mut Buffers<T, D>,
         (window, in_window): (&mut Window<'_, Node<T, D>, D>, &Constants<T, D>),
-        (ids, ahead): (&[u32], usize),
+        ids: &[u32],
         mut particles: Moving<'_, T, D>,
     ) -> Outcome {
         let Moving { x, v, F, .. } = &mut particles;
@@ -180,7 +177,6 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 F,
                 contributions,
                 growth,
-                ahead,
             };
             weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
             if self.follows_grid {
