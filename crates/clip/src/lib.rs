@@ -211,6 +211,14 @@ impl<T: RealField + Copy, const D: usize> Made<T, D> {
         }
     }
 
+    /// Ends a particle, whose polygons or polyhedra are in the mesh, with its centroid.
+    fn add_particle(&mut self, X: SVector<T, D>, volume: f64, mass: f64) {
+        self.mesh.of_particles.push(self.mesh.ends.len() as u32);
+        self.X.push(X);
+        self.volume.push(real(volume));
+        self.mass.push(real(mass));
+    }
+
     /// A facet of a particle, with the number that follows on that of its last one.
     fn add_facet(&mut self, particle: usize, side: usize, corners: [u32; D]) {
         let first = (particle as u64) << PARTICLE;

@@ -293,10 +293,7 @@ pub(super) fn part<T: RealField + Copy, const D: usize>(
         }
         made.meet(particle, of_particle.into_iter());
         if is_own {
-            made.mesh.of_particles.push(made.mesh.ends.len() as u32);
-            made.X.push(vector_of(moment / area));
-            made.volume.push(real(area));
-            made.mass.push(real(density * (area + segments)));
+            made.add_particle(vector_of(moment / area), area, density * (area + segments));
         }
     });
     made.at_rest(spacing, |corner| vector_of(corners.at(corner)))

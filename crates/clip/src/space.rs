@@ -411,10 +411,7 @@ pub(super) fn part<T: RealField + Copy, const D: usize>(
         }
         made.meet(particle, of_particle.into_iter());
         if is_own {
-            made.mesh.of_particles.push(made.mesh.ends.len() as u32);
-            made.X.push(vector_of(moment / whole));
-            made.volume.push(real(whole));
-            made.mass.push(real(density * (whole + segments)));
+            made.add_particle(vector_of(moment / whole), whole, density * (whole + segments));
         }
     });
     made.at_rest(spacing, |corner| vector_of(corners.at(corner)))

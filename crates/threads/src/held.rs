@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 /// The layers that a process holds.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Held {
     /// Their numbers, each that of its first segment.
     pub layers: Range<usize>,
