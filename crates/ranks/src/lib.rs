@@ -19,7 +19,7 @@ use bytemuck::{AnyBitPattern, NoUninit, bytes_of, bytes_of_mut, cast_slice, cast
 
 pub use directory::{Answers, Directory};
 pub use in_process::in_process;
-pub use moves::{Lists, Move};
+pub use moves::{Lists, Move, Source};
 pub use pairs::Pairs;
 pub use simulated::{Failed, Schedule, Simulated, simulated};
 pub use traffic::{Sent, Traffic, counted};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, bytes_of, cast_slice, cast_slice_mut};
+use bytemuck::{Pod, cast_slice, cast_slice_mut};
 
 use crate::{Ranks, announce, exchange};
 
@@ -12,10 +12,10 @@ pub struct Lists<E> {
     elements: Vec<E>,
 }
 
-impl<E: Copy> Lists<E> {
+impl<E> Lists<E> {
     /// Lists in the order of their places.
     pub fn new<I: IntoIterator<Item = E>>(lists: impl Iterator<Item = I>) -> Self {
-        let mut all = Self { ends: Vec::new(), elements: Vec::new() };
+        let mut all = Self::none();
         for list in lists {
             all.elements.extend(list);
             all.ends.push(all.elements.len());
@@ -23,17 +23,47 @@ impl<E: Copy> Lists<E> {
         all
     }
 
+    /// No lists.
+    pub fn none() -> Self {
+        Self { ends: Vec::new(), elements: Vec::new() }
+    }
+
+    /// The elements of all lists, one list after the other.
+    pub fn all(&self) -> &[E] {
+        &self.elements
+    }
+
+    /// How many lists there are.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
     /// The list of a place.
     pub fn of(&self, p: usize) -> &[E] {
-        let start = if p == 0 { 0 } else { self.ends[p - 1] };
-        &self.elements[start..self.ends[p]]
+        &self.elements[self.start(p)..self.ends[p]]
     }
+
+    /// Where the list of a place begins among the elements of all.
+    pub fn start(&self, p: usize) -> usize {
+        if p == 0 { 0 } else { self.ends[p - 1] }
+    }
+}
+
+/// Where an element that is here after a move has been before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Here, at this place.
+    Here(usize),
+    /// Elsewhere: its place among those that come.
+    Elsewhere(usize),
 }
 
 /// Which elements go where, and in which order those that come are kept.
 pub struct Move {
     /// None where one process has all.
     ranks: Option<Arc<dyn Ranks>>,
+    /// How many elements are here before.
+    before: usize,
     /// The places of the elements that go to each other process.
     out: Vec<Vec<u32>>,
     /// How many come from each.
@@ -60,7 +90,8 @@ impl Move {
         let first = ids.len() as u32;
         let come = first..first + counts.iter().sum::<usize>() as u32;
         let order = stay.into_iter().chain(come).collect();
-        let mut moved = Self { ranks: ranks.cloned(), out, counts, order };
+        let before = ids.len();
+        let mut moved = Self { ranks: ranks.cloned(), before, out, counts, order };
         let ids = moved.all(ids);
         let mut by_id: Vec<u32> = (0..ids.len() as u32).collect();
         by_id.sort_unstable_by_key(|&place| ids[place as usize]);
@@ -105,37 +136,36 @@ impl Move {
         self.ranks.as_ref().map_or_else(Vec::new, |ranks| exchange(&**ranks, &out, counts))
     }
 
-    /// The lists of those that are here afterwards.
-    pub fn lists<E: Pod>(&self, lists: &Lists<E>) -> Lists<E> {
-        let bytes = self.byte_lists(&lists.ends, cast_slice(&lists.elements), size_of::<E>());
-        let Lists { ends, elements } = bytes;
-        let mut own = vec![E::zeroed(); elements.len() / size_of::<E>()];
-        cast_slice_mut(&mut own).copy_from_slice(&elements);
-        Lists { ends: ends.into_iter().map(|end| end / size_of::<E>()).collect(), elements: own }
+    /// Where each of the elements that are here afterwards comes from.
+    pub fn sources(&self) -> impl Iterator<Item = Source> + Clone {
+        self.order.iter().map(|&place| match (place as usize).checked_sub(self.before) {
+            None => Source::Here(place as usize),
+            Some(other) => Source::Elsewhere(other),
+        })
     }
 
-    fn byte_lists(&self, ends: &[usize], elements: &[u8], size: usize) -> Lists<u8> {
-        let here = ends.len();
-        let list = |p: usize| {
-            let start = if p == 0 { 0 } else { ends[p - 1] };
-            &elements[start * size..ends[p] * size]
+    /// The lists of the elements that come from other processes; `of` has those of the elements here. Collective.
+    pub fn coming_lists<E: Pod, I: IntoIterator<Item = E>>(
+        &self,
+        of: impl Fn(usize) -> I,
+    ) -> Lists<E> {
+        let Some(ranks) = &self.ranks else { return Lists::new(std::iter::empty::<I>()) };
+        let of_rank = |places: &Vec<u32>| Lists::new(places.iter().map(|&p| of(p as usize)));
+        let out: Vec<Lists<E>> = self.out.iter().map(of_rank).collect();
+        let lengths = |lists: &Lists<E>| -> Vec<u64> {
+            (0..lists.count()).map(|p| lists.of(p).len() as u64).collect()
         };
-        let lengths: Vec<u64> = (0..here).map(|p| list(p).len() as u64).collect();
-        let counts: Vec<usize> = self.counts.iter().map(|count| count * size_of::<u64>()).collect();
-        let coming = self.coming(&|p| bytes_of(&lengths[p]), &counts);
-        let coming = coming.as_chunks().0.iter().map(|bytes| u64::from_ne_bytes(*bytes) as usize);
-        let mut rest = coming.clone();
+        let lengths: Vec<Vec<u64>> = out.iter().map(lengths).collect();
+        let lengths = exchange(&**ranks, &lengths, &self.counts);
+        let mut rest = lengths.iter().map(|&length| length as usize);
         let counts: Vec<usize> =
-            self.counts.iter().map(|count| rest.by_ref().take(*count).sum()).collect();
-        let ends = coming.scan(0, |end, length| {
-            *end += length;
+            self.counts.iter().map(|&count| rest.by_ref().take(count).sum()).collect();
+        let out: Vec<Vec<E>> = out.into_iter().map(|lists| lists.elements).collect();
+        let ends = lengths.iter().scan(0, |end, &length| {
+            *end += length as usize;
             Some(*end)
         });
-        let others = Lists { ends: ends.collect(), elements: self.coming(&list, &counts) };
-        Lists::new(self.order.iter().map(|&place| {
-            let place = place as usize;
-            if place < here { list(place) } else { others.of(place - here) }.iter().copied()
-        }))
+        Lists { ends: ends.collect(), elements: exchange(&**ranks, &out, &counts) }
     }
 
     /// Number of elements here afterwards.

@@ -92,6 +92,11 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
         self.stresses.resize(corners.mesh.loads.len(), SMatrix::zeros());
     }
 
+    /// Frees the sums; [`fit`](Self::fit) has to follow.
+    pub(crate) fn free(&mut self) {
+        (self.sums, self.affine_sums) = (Vec::new(), Vec::new());
+    }
+
     /// Adds the loads to what particles give at corners.
     pub(crate) fn load(&mut self, corners: &SharedCorners<T, D>, loading: Loading<'_, T, D>) {
         let Self { sums, stresses, is_of_half_plane, .. } = self;

@@ -1,6 +1,7 @@
 //! Domains between shared corners: all that a simulation keeps of them.
 
 use mmsmith_lanes::simd::Lanes;
+use mmsmith_particles::mesh::Mesh;
 
 use crate::domain::corner_exchange::Exchange;
 use crate::domain::corner_values::CornerValues;
@@ -36,6 +37,16 @@ impl<T: Lanes, const D: usize> Corners<T, D> {
         let mut own = Self { shared, exchange, values, reprojected, is_affine, reprojects };
         own.fit();
         own
+    }
+
+    /// Gives the mesh, and frees all that belongs to its corners; [`replace`](Self::replace) has to follow.
+    pub(crate) fn take_mesh(&mut self) -> Mesh<T, D> {
+        let Self { shared, exchange, values, reprojected, .. } = self;
+        let none = Mesh::empty(shared.mesh.interpolation, shared.mesh.turn);
+        let none = SharedCorners::of_part(none, shared.at_corner, &[], (0, None));
+        exchange.free();
+        (*values, *reprojected) = (CornerValues::none(), CornerValues::none());
+        std::mem::replace(shared, none).mesh
     }
 
     /// Other corners take the place of these.

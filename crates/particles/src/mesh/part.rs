@@ -1,22 +1,38 @@
 //! The domains of some of a body's particles, and what processes tell each other of them.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 use bytemuck::Pod;
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{RealField, SVector};
 
-use super::{Interpolation, Load, Mesh, Numbers, start};
-use mmsmith_ranks::{Lists, Move};
+use super::{Faces, Interpolation, Load, Mesh, Numbers, start};
+use mmsmith_ranks::{Lists, Move, Source};
 
-/// The polygons of some particles, which can be told apart from the others.
-pub struct Records<T, const D: usize> {
-    /// For each particle the number of its polygons, and for each polygon: how many corners it has, their numbers in the whole body, how
-    /// many faces, and of each face how many corners, and their places in the polyhedron.
-    topology: Lists<u64>,
-    /// Reference positions of a particle's corners, in the order of its polygons.
+/// The polygons of particles that come from other processes.
+pub struct Coming<T, const D: usize> {
+    /// For each particle the number of its polygons, and for each polygon: how many corners it has, how many faces, and of each face how
+    /// many corners, and their places in the polyhedron.
+    topology: Lists<u32>,
+    /// The numbers in the whole body of a particle's corners, in the order of its polygons.
+    numbers: Lists<u64>,
+    /// Their reference positions.
     X: Lists<SVector<T, D>>,
-    /// Current positions.
+    /// Their current positions.
     x: Lists<SVector<T, D>>,
+    /// Their tiles.
+    tiles: Lists<u32>,
+}
+
+/// A corner of the particles that are here after a move.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Corner {
+    is_behind: bool,
+    /// In the whole body.
+    number: u64,
+    /// Its number here before, or behind all of these a place in the list of those that come.
+    from: usize,
+    tile: u32,
 }
 
 /// Loads, each with its number in the whole body and those of its corners.
@@ -27,67 +43,30 @@ pub struct LoadRecords<T, const D: usize> {
     X: Vec<SVector<T, D>>,
 }
 
-impl<T: RealField + Copy, const D: usize> Records<T, D> {
-    /// The records of some particles.
-    pub fn new(own: &Mesh<T, D>, particles: impl Iterator<Item = usize> + Clone) -> Self {
-        let at = |positions: &'_ [SVector<T, D>], p: usize| -> Vec<SVector<T, D>> {
-            let corners = &own.corners[own.places(p)];
-            corners.iter().map(|&corner| positions[corner as usize]).collect()
-        };
+impl<T: RealField + Pod, const D: usize> Coming<T, D> {
+    /// The polygons that come with a move of the particles of `own`, whose corners are in these tiles. Collective.
+    pub fn new(own: &Mesh<T, D>, tiles: &[u32], moved: &Move) -> Self {
+        let corners = |p: usize| own.of_particle(p).iter().map(|&corner| corner as usize);
         Self {
-            topology: Lists::new(particles.clone().map(|p| topology(own, p))),
-            X: Lists::new(particles.clone().map(|p| at(&own.X, p))),
-            x: Lists::new(particles.map(|p| at(&own.x, p))),
+            topology: moved.coming_lists(|p| topology(own, p)),
+            numbers: moved.coming_lists(|p| corners(p).map(|corner| own.number(corner))),
+            X: moved.coming_lists(|p| corners(p).map(|corner| own.X[corner])),
+            x: moved.coming_lists(|p| corners(p).map(|corner| own.x[corner])),
+            tiles: moved.coming_lists(|p| corners(p).map(|corner| tiles[corner])),
         }
     }
+}
 
-    /// The records of the particles that are here after a move.
-    pub fn follow(&self, moved: &Move) -> Self
-    where
-        T: Pod,
-    {
-        let Self { topology, X, x } = self;
-        Self { topology: moved.lists(topology), X: moved.lists(X), x: moved.lists(x) }
-    }
-
-    /// The polygons of these particles with such loads, whose corners come in the order of their numbers, those that `is_behind` says,
-    /// by particle and place, behind all others; and for each corner a particle and a place in it where it is.
-    pub fn assemble(
-        &self,
-        particles: usize,
-        loads: &LoadRecords<T, D>,
-        (interpolation, turn): (Interpolation, Option<SMatrix<T, D, D>>),
-        is_behind: impl Fn(usize, usize) -> bool,
-    ) -> (Mesh<T, D>, Vec<[usize; 2]>) {
-        let mut own = Mesh::empty(interpolation, turn);
-        // The number in the whole body of each place's corner, particle after particle.
-        let mut numbers = Vec::new();
-        let mut found: HashMap<u64, [usize; 2]> = HashMap::new();
-        for p in 0..particles {
-            let first = numbers.len();
-            read_topology(self.topology.of(p), &mut own, &mut numbers);
-            for (place, &number) in numbers[first..].iter().enumerate() {
-                found.entry(number).or_insert([p, place]);
-            }
+impl<T, const D: usize> Coming<T, D> {
+    /// No particles.
+    fn none() -> Self {
+        Self {
+            topology: Lists::none(),
+            numbers: Lists::none(),
+            X: Lists::none(),
+            x: Lists::none(),
+            tiles: Lists::none(),
         }
-        let mut sorted: Vec<(bool, u64)> =
-            found.iter().map(|(number, [p, place])| (is_behind(*p, *place), *number)).collect();
-        sorted.sort_unstable();
-        let places: Vec<[usize; 2]> = sorted.iter().map(|(_, number)| found[number]).collect();
-        own.X = places.iter().map(|&[p, place]| self.X.of(p)[place]).collect();
-        own.x = places.iter().map(|&[p, place]| self.x.of(p)[place]).collect();
-        let known: HashMap<u64, u32> =
-            sorted.iter().zip(0..).map(|((_, number), corner)| (*number, corner)).collect();
-        own.corners = numbers.iter().map(|number| known[number]).collect();
-        let LoadRecords { numbers, corners, shares, X } = loads;
-        for ((corners, shares), X) in corners.iter().zip(shares).zip(X) {
-            // A load is where the particle is on whose surface it acts.
-            let corners = std::array::from_fn(|k| known.get(&corners[k]).copied().unwrap_or(0));
-            own.loads.push(Load { corners, shares: std::array::from_fn(|k| shares[k]), X: *X });
-        }
-        let corners = sorted.into_iter().map(|(_, number)| number).collect();
-        own.numbers = Some(Numbers { corners, loads: numbers.clone() });
-        (own, places)
     }
 }
 
@@ -151,53 +130,156 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
         };
         let loads: Vec<usize> = (0..self.loads.len()).filter(acts_here).collect();
         let loads = LoadRecords::new(self, &loads);
-        let records = Records::new(self, particles.iter().copied());
-        let kind = (self.interpolation, self.turn);
-        records.assemble(particles.len(), &loads, kind, |_, _| false).0
+        let own = particles.iter().map(|&p| Source::Here(p));
+        self.assemble(&vec![0; self.X.len()], own, &Coming::none(), &loads, |_| false).0
+    }
+
+    /// The mesh of the particles of these sources with such loads, and the tile of each corner. The corners come in the order of their
+    /// numbers, those in tiles that `is_behind` says behind all others. `tiles` has the tiles of the corners here.
+    pub fn assemble(
+        &self,
+        tiles: &[u32],
+        sources: impl Iterator<Item = Source> + Clone,
+        coming: &Coming<T, D>,
+        loads: &LoadRecords<T, D>,
+        is_behind: impl Fn(u32) -> bool,
+    ) -> (Self, Vec<u32>) {
+        let before = self.X.len();
+        let corner = |number: u64, from: usize, tile: u32| Corner {
+            is_behind: is_behind(tile),
+            number,
+            from,
+            tile,
+        };
+        let mut corners = Vec::new();
+        let mut is_met = vec![false; before];
+        for source in sources.clone() {
+            match source {
+                Source::Here(p) => {
+                    for &known in self.of_particle(p) {
+                        let known = known as usize;
+                        if !std::mem::replace(&mut is_met[known], true) {
+                            corners.push(corner(self.number(known), known, tiles[known]));
+                        }
+                    }
+                }
+                Source::Elsewhere(p) => {
+                    let (from, tiles) = (before + coming.numbers.start(p), coming.tiles.of(p));
+                    let each = coming.numbers.of(p).iter().zip(tiles).zip(from..);
+                    corners.extend(each.map(|((&number, &tile), from)| corner(number, from, tile)));
+                }
+            }
+        }
+        corners.sort_unstable();
+        corners.dedup_by_key(|corner| corner.number);
+
+        let mut own = Self::empty(self.interpolation, self.turn);
+        let at = |known: &[SVector<T, D>], others: &Lists<SVector<T, D>>| {
+            let of = |corner: &Corner| match corner.from.checked_sub(before) {
+                None => known[corner.from],
+                Some(place) => others.all()[place],
+            };
+            corners.iter().map(of).collect()
+        };
+        (own.X, own.x) = (at(&self.X, &coming.X), at(&self.x, &coming.x));
+        let mut now = vec![0; before];
+        for (number, corner) in (0..).zip(&corners) {
+            if let Some(now) = now.get_mut(corner.from) {
+                *now = number;
+            }
+        }
+        let (front, back) = corners.split_at(corners.partition_point(|corner| !corner.is_behind));
+        let find = |number: u64| {
+            let among = |part: &[Corner]| part.binary_search_by_key(&number, |own| own.number);
+            among(front).or_else(|_| among(back).map(|place| front.len() + place))
+        };
+        // A corner that comes is among those found, and so is one of a load, which is where the particle is on whose surface it acts.
+        let find = |number: &u64| find(*number).map_or(0, |place| place as u32);
+        for source in sources {
+            match source {
+                Source::Here(p) => {
+                    own.append_polygons(self, self.polygons(p));
+                    own.corners.extend(self.of_particle(p).iter().map(|&c| now[c as usize]));
+                }
+                Source::Elsewhere(p) => {
+                    own.read_topology(coming.topology.of(p));
+                    own.corners.extend(coming.numbers.of(p).iter().map(find));
+                }
+            }
+        }
+        let LoadRecords { numbers, corners: at_loads, shares, X } = loads;
+        for ((corners, shares), X) in at_loads.iter().zip(shares).zip(X) {
+            let corners = std::array::from_fn(|k| find(&corners[k]));
+            own.loads.push(Load { corners, shares: std::array::from_fn(|k| shares[k]), X: *X });
+        }
+        let tiles = corners.iter().map(|corner| corner.tile).collect();
+        let corners = corners.into_iter().map(|corner| corner.number).collect();
+        own.numbers = Some(Numbers { corners, loads: numbers.clone() });
+        (own, tiles)
     }
 
     /// The number of a corner in the whole body.
     pub fn number(&self, corner: usize) -> u64 {
         self.numbers.as_ref().map_or(corner as u64, |numbers| numbers.corners[corner])
     }
+
+    /// Whether polyhedra have faces.
+    fn has_faces(&self) -> bool {
+        D == 3 && self.interpolation == Interpolation::Triangles
+    }
+
+    /// Appends a particle's polygons, but for the corners in `corners`.
+    fn append_polygons(&mut self, other: &Self, polygons: Range<usize>) {
+        let mut corners = self.ends.last().copied().unwrap_or(0);
+        for polygon in polygons {
+            corners += other.ends[polygon] - start(&other.ends, polygon) as u32;
+            self.ends.push(corners);
+            if self.has_faces() {
+                let Faces { corners, ends, of_polyhedra } = &mut self.faces;
+                for face in other.faces.of(polygon) {
+                    corners.extend(face);
+                    ends.push(corners.len() as u32);
+                }
+                of_polyhedra.push(ends.len() as u32);
+            }
+        }
+        self.of_particles.push(self.ends.len() as u32);
+    }
+
+    /// As [`append_polygons`](Self::append_polygons) of a particle that comes.
+    fn read_topology(&mut self, record: &[u32]) {
+        let mut record = record.iter().copied();
+        let mut next = || record.next().unwrap_or(0);
+        let mut corners = self.ends.last().copied().unwrap_or(0);
+        for _ in 0..next() {
+            corners += next();
+            self.ends.push(corners);
+            for _ in 0..next() {
+                for _ in 0..next() {
+                    self.faces.corners.push(next());
+                }
+                self.faces.ends.push(self.faces.corners.len() as u32);
+            }
+            if self.has_faces() {
+                self.faces.of_polyhedra.push(self.faces.ends.len() as u32);
+            }
+        }
+        self.of_particles.push(self.ends.len() as u32);
+    }
 }
 
-fn topology<T: RealField + Copy, const D: usize>(own: &Mesh<T, D>, p: usize) -> Vec<u64> {
+/// The polygons of a particle, as [`Coming`] has them.
+fn topology<T: RealField + Copy, const D: usize>(own: &Mesh<T, D>, p: usize) -> Vec<u32> {
     let polygons = own.polygons(p);
-    let mut record = vec![polygons.len() as u64];
+    let mut record = vec![polygons.len() as u32];
     for polygon in polygons {
-        let corners = &own.corners[start(&own.ends, polygon)..own.ends[polygon] as usize];
-        record.push(corners.len() as u64);
-        record.extend(corners.iter().map(|&corner| own.number(corner as usize)));
-        let has_faces = D == 3 && own.interpolation == Interpolation::Triangles;
-        let faces = if has_faces { own.faces.of(polygon).collect() } else { Vec::new() };
-        record.push(faces.len() as u64);
+        record.push(own.ends[polygon] - start(&own.ends, polygon) as u32);
+        let faces = if own.has_faces() { own.faces.of(polygon).collect() } else { Vec::new() };
+        record.push(faces.len() as u32);
         for face in faces {
-            record.push(face.len() as u64);
-            record.extend(face.iter().map(|&place| u64::from(place)));
+            record.push(face.len() as u32);
+            record.extend(face);
         }
     }
     record
-}
-
-/// Appends a particle's polygons to `own`, but for its corners, whose numbers in the whole body are appended to `numbers`.
-fn read_topology<T, const D: usize>(record: &[u64], own: &mut Mesh<T, D>, numbers: &mut Vec<u64>) {
-    let mut record = record.iter().copied();
-    let mut next = || record.next().unwrap_or(0);
-    for _ in 0..next() {
-        for _ in 0..next() {
-            numbers.push(next());
-        }
-        own.ends.push(numbers.len() as u32);
-        for _ in 0..next() {
-            for _ in 0..next() {
-                own.faces.corners.push(next() as u32);
-            }
-            own.faces.ends.push(own.faces.corners.len() as u32);
-        }
-        if D == 3 && own.interpolation == Interpolation::Triangles {
-            own.faces.of_polyhedra.push(own.faces.ends.len() as u32);
-        }
-    }
-    own.of_particles.push(own.ends.len() as u32);
 }
