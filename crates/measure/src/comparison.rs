@@ -84,7 +84,7 @@ impl<'a, const D: usize> Comparison<'a, D> {
         times: (f64, f64),
     ) -> PerField<PerNorm<f64>> {
         let others = homes.hear(|places| self.each(observed, times, &places));
-        let count = homes.here().len();
+        let count = homes.here();
         let room = || (Room::zero(), [[[0.0; BLOCK]; 4]; RUNS + 1]);
         let groups = tallies(count, room, |(room, here), first, rows: &mut [[Row<f64>; 4]]| {
             let places = first..count.min(first + rows.len() * BLOCK);
