@@ -1,10 +1,11 @@
 """Steps a second of mms beside those of other codes, measured in turn on one machine.
 
-    python peers.py MMS SCRIPTS [--cells N] [--rounds N] [--steps N]
+    python peers.py MMS SCRIPTS [--space] [--cells N] [--rounds N] [--steps N]
 
 SCRIPTS is a folder with `gimp_plain.c`, `taichi_mls2d.py` and `warp_mls2d.py`, programs that print one JSON line with
 `mups_median`, millions of particle-steps a second. All compute a unit square of neo-Hookean material, four particles a
-cell, in double precision, on one thread. mms adds the body force of its exact solution.
+cell, in double precision, on one thread. mms adds the body force of its exact solution. With --space it is a unit cube with
+eight particles a cell, and the programs are `gimp_plain_3d.c` of that folder and `warp_mls3d.py` beside this file.
 
 Every round runs each code once, so that a slow phase of the machine meets all of them. A ratio is the geometric mean over
 the rounds, with its 95 % interval. A code that is not installed here is left out, and named.
@@ -35,6 +36,8 @@ PEERS = {
     "taichi, UGIMP": "ugimp + flip + usl",
     "taichi, MLS-MPM": "bspline2 + apic + usl",
     "warp, MLS-MPM": "bspline2 + apic + usl",
+    "plain C, UGIMP in space": "ugimp + flip + usl",
+    "warp, MLS-MPM in space": "bspline2 + apic + usl",
 }
 # Two-sided 95 % of Student's t, by degrees of freedom.
 STUDENT = {1: 12.71, 2: 4.30, 3: 3.18, 4: 2.78, 5: 2.57, 6: 2.45, 7: 2.36, 8: 2.31, 9: 2.26, 14: 2.14, 19: 2.09}
@@ -55,28 +58,29 @@ def printed(command):
     return json.loads(lines[-1])
 
 
-def of_mms(program, scheme, cells, steps):
+def of_mms(program, problem, scheme, cells, steps):
     """Millions of particle-steps a second of one run."""
     shape, transfer, integrator = SCHEMES[scheme]
     # A period takes 2/(CFL h) steps.
     cfl = 0.4
     periods = steps * cfl / (2 * cells)
-    command = [program, "run", "axis-aligned", "--cells", str(cells), "--shape", shape, "--transfer", transfer]
+    command = [program, "run", problem, "--cells", str(cells), "--shape", shape, "--transfer", transfer]
     command += ["--integrator", integrator, "--cfl", str(cfl), "--periods", str(periods), "--threads", "1", "--json", "-"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)["result"]["particle_steps_per_s"] / 1e6
 
 
-def available(scripts, folder):
+def available(scripts, folder, in_space):
     """The peers that can run here: name and the command for a number of cells and steps."""
     found = {}
     compiler = shutil.which("cc")
-    source = scripts / "gimp_plain.c"
-    program = Path(folder) / "gimp_plain"
+    source = scripts / ("gimp_plain_3d.c" if in_space else "gimp_plain.c")
+    program = Path(folder) / source.stem
     if compiler and source.is_file():
         build = [compiler, "-O3", "-march=native", "-o", str(program), str(source), "-lm"]
         if subprocess.run(build, capture_output=True, check=False).returncode == 0:
-            found["plain C, UGIMP"] = lambda cells, steps: [str(program), str(cells), str(steps), "1"]
+            name = "plain C, UGIMP in space" if in_space else "plain C, UGIMP"
+            found[name] = lambda cells, steps: [str(program), str(cells), str(steps), "1"]
 
     def python(module, script, name, arguments):
         path = scripts / script
@@ -85,6 +89,10 @@ def available(scripts, folder):
             found[name] = lambda cells, steps: [sys.executable, str(path), *arguments(cells, steps)]
 
     numbers = lambda cells, steps: [str(cells), str(steps), "1"]
+    if in_space:
+        here = Path(__file__).resolve().parent / "warp_mls3d.py"
+        python("warp", here, "warp, MLS-MPM in space", lambda c, s: ["f64", *numbers(c, s)])
+        return found
     python("taichi", "taichi_mls2d.py", "taichi, UGIMP", lambda c, s: ["gimp", "f64", "1", *numbers(c, s)])
     python("taichi", "taichi_mls2d.py", "taichi, MLS-MPM", lambda c, s: ["mls", "f64", "1", *numbers(c, s)])
     python("warp", "warp_mls2d.py", "warp, MLS-MPM", lambda c, s: ["f64", *numbers(c, s)])
@@ -106,27 +114,32 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("mms")
     parser.add_argument("scripts", type=Path)
-    parser.add_argument("--cells", type=int, default=256)
+    parser.add_argument("--space", action="store_true")
+    parser.add_argument("--cells", type=int, help="default: 256, 32 in space")
     parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--steps", type=int, default=60)
     options = parser.parse_args()
     if not options.scripts.is_dir() or shutil.which(options.mms) is None:
         parser.error(f"{options.scripts} has to be a folder, and {options.mms} a program")
+    problem = "axis-aligned-3d" if options.space else "axis-aligned"
+    cells = options.cells or (32 if options.space else 256)
     with tempfile.TemporaryDirectory() as folder:
-        peers = available(options.scripts, folder)
+        peers = available(options.scripts, folder, options.space)
         for name in PEERS.keys() - peers.keys():
-            print(f"{name}: not installed here, left out", file=sys.stderr)
+            if name.endswith("in space") == options.space:
+                print(f"{name}: not installed here, left out", file=sys.stderr)
         rates = {name: [] for name in [*SCHEMES, *peers]}
         for _ in range(options.rounds):
             for scheme in SCHEMES:
-                rates[scheme].append(of_mms(options.mms, scheme, options.cells, options.steps))
+                rates[scheme].append(of_mms(options.mms, problem, scheme, cells, options.steps))
             for name, command in list(peers.items()):
-                result = printed(command(options.cells, options.steps))
+                result = printed(command(cells, options.steps))
                 if result is None:
                     del peers[name], rates[name]
                 else:
                     rates[name].append(result["mups_median"])
-    print(f"{options.cells} x {options.cells} cells, one thread, {options.rounds} rounds, in turn\n")
+    grid = " x ".join([str(cells)] * (3 if options.space else 2))
+    print(f"{grid} cells, one thread, {options.rounds} rounds, in turn\n")
     print("| code | million particle-steps/s | times, of mms with the same method | 95 % |\n|---|---:|---:|---|")
     for name, values in rates.items():
         line = f"| {name} | {statistics.median(values):.2f} |"
