@@ -106,6 +106,7 @@ def run(
     vtk: str | os.PathLike[str] | None = None,
     frames: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
+    process_grid: str | None = None,
     every: int | None = None,
     history: str | os.PathLike[str] | None = None,
     profile: bool = False,
@@ -211,6 +212,7 @@ def run(
         vtk: Write particle files (.vtu, and a .pvd that lists them) to this folder; from rest, one of the equilibrium.
         frames: Number of particle files, spread evenly from the first state to the last. Default: 20.
         checkpoint: Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one.
+        process_grid: Processes along each axis, such as 2x4, where mpirun starts several. Default: those whose fullest has the least to do.
         every: Steps between checkpoints. Default: 1000.
         history: Write errors of u, energies and momentum over time to this CSV file, of the particles and of the exact motion, at up to
             1000 evenly spread steps; json then has them too.

@@ -8,6 +8,7 @@ With --quick every second run is made but for the longest, each with one small n
 
 import argparse
 import json
+import math
 import os
 import random
 import shutil
@@ -53,6 +54,18 @@ CASES = [
     f"{REVOLUTION}/ring-in-walls.toml --cells 64 --periods 0.05 --shape cpdi2 --layout clipped",
     # It is turned inside out.
     "axis-aligned --cells 64 --shape linear --integrator usl --cfl 1.9",
+]
+
+# Processes along several axes.
+LONG = Path(__file__).resolve().parent / "long-box.toml"
+GRIDS = [
+    ("2x2", "axis-aligned --cells 128 --periods 0.02 --transfer apic --integrator usl"),
+    ("2x3", "ring --cells 128 --periods 0.02 --shape cpdi2 --layout clipped --grid-angle 20"),
+    ("2x2x2", f"{LONG} --cells 8 --periods 0.01"),
+    ("3x2", "swirl --cells 192 --periods 0.02 --shape bspline2 --transfer xpic2 --integrator musl"),
+    ("1x2x2", "axis-aligned-3d --cells 24 --periods 0.01 --shape cpdi --integrator usf"),
+    ("2x1x2", f"{LONG} --cells 8 --periods 0.01 --shape cpdi2"),
+    ("1x2x2", f"{LONG} --cells 8 --periods 0.01 --precision f32"),
 ]
 
 
@@ -203,3 +216,10 @@ for number, case in enumerate(CASES):
     for count in counts:
         assert run(count, case) == alone, f"{count} processes: {case}"
     print(f"{number + 1} of {len(CASES)}, same bits with {', '.join(map(str, counts))} processes: {case}", flush=True)
+for number, (grid, case) in enumerate(GRIDS):
+    # The quick runs have the first three.
+    if options.quick and (number > 2 or number % 2 != ["even", "odd"].index(options.quick)):
+        continue
+    count = math.prod(map(int, grid.split("x")))
+    assert run(count, f"{case} --process-grid {grid}") == run(None, case), f"{grid} processes: {case}"
+    print(f"same bits with {grid} processes: {case}", flush=True)

@@ -56,6 +56,7 @@ pub(crate) use stability::StabilityOptions;
 pub(crate) use statics::StaticOptions;
 pub(crate) use texts::{CompletionsOptions, ManOptions, ReferenceOptions};
 pub(crate) use tradeoff::TradeoffOptions;
+pub(crate) use values::ProcessGrid;
 
 /// Manufactured solutions for solid mechanics: check fields, run a material point solver, measure its order.
 #[derive(Parser)]

@@ -8,7 +8,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use mmsmith_verify::{CheckpointFolder, Ranks, RunTraffic, gather};
 
-use crate::arguments::Command;
+use crate::arguments::{Command, ProcessGrid};
 use crate::terminal;
 
 /// Variables in which launchers tell how many processes they started, and how many on this machine.
@@ -65,6 +65,21 @@ fn start() -> Result<Arc<dyn Ranks>> {
 /// The processes; none where this one is alone.
 pub(crate) fn ranks() -> Option<Arc<dyn Ranks>> {
     RANKS.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// The processes, in the grid that is asked for.
+///
+/// # Errors
+///
+/// Where one process is asked to be several.
+pub(crate) fn arranged(grid: Option<&ProcessGrid>) -> Result<Option<Arc<dyn Ranks>>> {
+    let Some(ProcessGrid(along_axes)) = grid else { return Ok(ranks()) };
+    let count: usize = along_axes.iter().product();
+    match ranks() {
+        Some(ranks) => Ok(Some(mmsmith_verify::arranged(ranks, along_axes.clone()))),
+        None if count == 1 => Ok(None),
+        None => bail!("--process-grid: one process runs; start {count} with mpirun -n {count}"),
+    }
 }
 
 /// Whether this process tells what all have done.

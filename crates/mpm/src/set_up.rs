@@ -24,7 +24,7 @@ use crate::kernel::block::{BlockLaw, MemoryBlocks, OwnBlocks};
 use crate::kernel::buffers::BufferPool;
 use crate::kernel::half_plane;
 use crate::kernel::projected::ProjectedBlocks;
-use crate::processes::decomposition::{LocalBody, Share, admit};
+use crate::processes::decomposition::{LocalBody, Share};
 use crate::scheme::{Integrator, Settings, Transfer, VelocityUpdate};
 use crate::step::is_fused;
 use crate::step::passes::Passes;
@@ -308,11 +308,12 @@ pub(crate) fn allocate<T: Lanes, const D: usize>(
         None => domain.most_nodes(),
     };
     let tiles = Tiles::new(&layout, &grid.cells, most_nodes);
-    let part = share.and_then(|share| beyond(LocalBody::new(share)));
-    if let Some(part) = &part {
-        admit(part.ranks.count(), &layout, &tiles)?;
-        // The first sort tells which rows this process holds.
-        layout.hold(0..1);
+    let part = share.map(|share| LocalBody::new(share, &layout, &tiles)).transpose()?;
+    let part = part.and_then(beyond);
+    if part.is_some() {
+        // The first sort tells which nodes this process holds.
+        let first_row = layout.held.along(D - 1, 0..1);
+        layout.hold(first_row);
     }
     let Particles { mass, volume, .. } = &particles;
     let least = |numbers: &mut dyn Iterator<Item = T>| {

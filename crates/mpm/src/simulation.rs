@@ -173,6 +173,7 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
 
     /// See [`step`](Self::step).
     pub(crate) fn advance(&mut self, body_force: &dyn BodyForce<T, D>) -> Result<(), StepError> {
+        self.own = None;
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
@@ -228,6 +229,8 @@ impl<T: Lanes, const D: usize> Simulation<T, D> {
             self.state.tell_mean_stress();
         }
         let Self { state: State { particles, part, .. }, own: buffer, law, .. } = self;
+        // Those of before make room.
+        *buffer = None;
         let own = match part.as_ref().and_then(|part| part.own.as_ref()) {
             Some(own) => buffer.insert(particles.some(&own.places)),
             None => particles,

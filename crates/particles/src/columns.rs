@@ -271,8 +271,11 @@ impl<T: Lanes, const D: usize> MovingColumns<T, D> {
 /// The elements of the particles at some places of `count`, in that order.
 fn some<E: Copy>(all: &[E], count: usize, places: &[u32]) -> Vec<E> {
     let share = all.len() / count.max(1);
-    let of = |&place: &u32| &all[place as usize * share..][..share];
-    places.iter().flat_map(of).copied().collect()
+    let mut some = Vec::with_capacity(share * places.len());
+    for &place in places {
+        some.extend_from_slice(&all[place as usize * share..][..share]);
+    }
+    some
 }
 
 impl<'a, T, const D: usize> Moving<'a, T, D> {

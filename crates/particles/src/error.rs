@@ -171,15 +171,33 @@ pub enum SetupError {
         "the solver is compiled without the feature every-scheme: for gimp, cd and flip on one process"
     )]
     UsualSchemeOnly,
-    /// More processes than a grid can be cut for.
-    #[error(
-        "{ranks} processes are more than the {most} that the rows of this grid can be shared out to; start {most} at most"
-    )]
+    /// A grid that cannot be cut for so many processes.
+    #[error("this grid cannot be cut for {ranks} processes; start {most}")]
     TooManyRanks {
         /// The number of processes.
         ranks: usize,
-        /// The largest number that is of use.
+        /// The largest number below it for which the grid can be cut.
         most: usize,
+    },
+    /// A grid of processes that does not suit.
+    #[error(
+        "{ranks} processes in a grid of {}: {}",
+        asked.iter().map(usize::to_string).collect::<Vec<_>>().join(" x "),
+        match asked.iter().product::<usize>() {
+            product if product != *ranks => format!("these are {product}; start so many"),
+            _ => format!(
+                "this grid of cells can be cut for {} processes along its axes at most",
+                most.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")
+            ),
+        }
+    )]
+    ProcessGrid {
+        /// Processes along each axis, as asked for.
+        asked: Vec<usize>,
+        /// The number of processes.
+        ranks: usize,
+        /// The most processes along each axis.
+        most: Vec<usize>,
     },
     /// Mesh of a part of a body without their numbers in the whole.
     #[error("the polygons of a process have no numbers in the whole body; take them by Body::part")]

@@ -6,8 +6,9 @@
 //! A function called *collective* is called by all processes, in the same order.
 //!
 //! [`in_process()`] gives ranks that are threads of one process, for tests, and [`simulated()`] those of a cluster whose messages come late
-//! and whose processes are killed. The crate `mmsmith-message-passing` gives those of MPI.
+//! and whose processes are killed. [`arranged()`] asks for a grid of processes. The crate `mmsmith-message-passing` gives those of MPI.
 
+mod arranged;
 mod directory;
 mod in_process;
 mod moves;
@@ -17,6 +18,7 @@ mod traffic;
 
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 
+pub use arranged::arranged;
 pub use directory::{Answers, Directory};
 pub use in_process::in_process;
 pub use moves::{Lists, Move, Source};
@@ -34,6 +36,11 @@ pub trait Ranks: Send + Sync {
 
     /// The number of processes.
     fn count(&self) -> usize;
+
+    /// How many processes a grid of them has along each axis, where that is asked for. Default: whoever uses them chooses.
+    fn along_axes(&self) -> Option<&[usize]> {
+        None
+    }
 
     /// Sends a message, and does not wait for it to arrive.
     fn send(&self, to: usize, bytes: &[u8]);

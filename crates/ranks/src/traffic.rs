@@ -60,6 +60,10 @@ impl Ranks for Counted {
         self.ranks.count()
     }
 
+    fn along_axes(&self) -> Option<&[usize]> {
+        self.ranks.along_axes()
+    }
+
     fn send(&self, to: usize, bytes: &[u8]) {
         self.traffic.messages.fetch_add(1, Ordering::Relaxed);
         self.traffic.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);

@@ -3,26 +3,54 @@
 use std::ops::Range;
 
 use crate::held::{Held, Shared};
+use crate::region::Region;
 
 /// The tiles of an array: pieces along each axis, whose windows are ranges of elements. Layers are the pieces along the last axis, and a row has all
-/// elements with one index along it.
+/// elements here with one index along it.
+///
+/// Beside the tiles of this process it has those of other processes, of the same layers, whose windows reach into the elements that this process
+/// completes: these *come* from there. Tiles here that reach into elements of other processes are *lent* to them.
 #[derive(Clone, Debug)]
 pub struct TileLattice<const D: usize> {
-    /// The windows of the pieces along each axis; of the last axis all, whoever holds them.
+    /// The windows of the pieces along each axis, whoever holds them.
     windows: [Vec<Range<usize>>; D],
     /// How far along each axis pieces lie apart whose windows may overlap.
     reach: [usize; D],
-    /// The layers of tiles here.
-    held: Held,
-    /// For each tile here the number of tiles here whose turn comes before and that it overlaps with.
+    held: Held<D>,
+    /// The pieces along each axis of the tiles here and of those that come.
+    around: [Range<usize>; D],
+    /// The elements that the windows of the tiles here cover.
+    region: Region<D>,
+    /// Elements of these that no process completes but this one and those of the layers below and above.
+    own: Region<D>,
+    /// The tiles that come from each other process, and those that go there.
+    pub(crate) coming: Vec<Coming<D>>,
+    pub(crate) lent: Vec<Lent<D>>,
+    /// For each tile the number of tiles whose turn comes before and that it overlaps with.
     predecessors: Vec<u16>,
-    /// The tiles here in the order of work, and how many of them other processes wait for.
+    /// The tiles of this process in the order of work, and how many of them other processes wait for.
     pub(crate) order: Vec<usize>,
     pub(crate) awaited: usize,
     pub(crate) chunks: Vec<Chunk>,
-    elements: Elements,
+    /// How many elements are cleared together, and completed together but for longer rows.
+    at_once: usize,
     /// How many strips all chunks have.
     pub(crate) strips: usize,
+}
+
+/// Tiles of another process whose windows reach into the elements that this process completes.
+#[derive(Clone, Debug)]
+pub(crate) struct Coming<const D: usize> {
+    pub(crate) process: usize,
+    pub(crate) tiles: Vec<usize>,
+}
+
+/// Tiles here whose windows reach into the elements that another process completes.
+#[derive(Clone, Debug)]
+pub(crate) struct Lent<const D: usize> {
+    pub(crate) process: usize,
+    /// The tiles, ascending, each with the elements that go there.
+    pub(crate) parts: Vec<(usize, Region<D>)>,
 }
 
 /// Some successive rows of a segment, which are completed together.
@@ -30,7 +58,7 @@ pub struct TileLattice<const D: usize> {
 pub(crate) struct Chunk {
     pub(crate) segment: usize,
     pub(crate) rows: Range<usize>,
-    /// How many tiles here have windows that reach into the segment.
+    /// How many tiles have windows that reach into the segment.
     pub(crate) tiles: usize,
     /// The number of its first strip, among those of all chunks.
     first_strip: usize,
@@ -38,31 +66,16 @@ pub(crate) struct Chunk {
     strips: usize,
 }
 
-/// How many elements there are to work on.
-#[derive(Clone, Copy, Debug)]
-pub struct Elements {
-    /// In a row.
-    pub row: usize,
-    /// Cleared together, and completed together but for longer rows.
-    pub at_once: usize,
-}
-
-impl Elements {
-    /// How many rows are completed together.
-    fn rows(self) -> usize {
-        (self.at_once / self.row.max(1)).max(1)
-    }
-}
-
 impl<const D: usize> TileLattice<D> {
-    /// The lattice of these windows along each axis, and the layers `held` here along the last axis.
+    /// The lattice of these windows along each axis, of which this process has the tiles `held`. So many elements are cleared together.
     ///
     /// # Panics
     ///
-    /// Where windows along an axis do not ascend, or those along the last axis overlap with more than their neighbours, or leave rows out.
-    pub fn new(windows: [Vec<Range<usize>>; D], held: Held, elements: Elements) -> Self {
+    /// Where windows along an axis do not ascend, or those along the last axis overlap with more than their neighbours, or leave rows out; where a
+    /// process along another axis has fewer pieces than overlap.
+    pub fn new(windows: [Vec<Range<usize>>; D], held: Held<D>, at_once: usize) -> Self {
         // What the unsafe code relies on.
-        assert!(elements.at_once > 0);
+        assert!(at_once > 0);
         let reach = windows.each_ref().map(|windows| {
             assert!(windows.windows(2).all(|w| w[0].start <= w[1].start && w[0].end <= w[1].end));
             let apart = |by: usize| {
@@ -70,54 +83,198 @@ impl<const D: usize> TileLattice<D> {
             };
             (1..=windows.len()).find(|&by| apart(by)).unwrap_or(1).max(1) - 1
         });
-        assert!(reach[D - 1] <= 1 && held.all == windows[D - 1].len());
+        for a in 0..D {
+            assert_eq!(held.cuts.pieces(a), windows[a].len());
+            let least = if a == D - 1 || held.cuts.count(a) == 1 { 1 } else { reach[a].max(1) };
+            assert!(held.cuts.0[a].windows(2).all(|cut| cut[0] + least <= cut[1]));
+        }
+        assert!(reach[D - 1] <= 1);
         assert!(windows[D - 1].windows(2).all(|w| w[1].start <= w[0].end));
+        let none = Region(std::array::from_fn(|_| 0..0));
         let mut own = Self {
             windows,
             reach,
+            around: none.0.clone(),
+            region: none.clone(),
+            own: none,
             held,
+            coming: Vec::new(),
+            lent: Vec::new(),
             predecessors: Vec::new(),
             order: Vec::new(),
             awaited: 0,
             chunks: Vec::new(),
-            elements,
+            at_once,
             strips: 0,
         };
+        let at = own.held.at;
+        own.around = own.around_of(&at);
+        own.region = Region(std::array::from_fn(|a| own.extent(a, at[a])));
+        own.own = own.completed_by(&at);
+        own.exchange_tiles();
         own.predecessors = (0..own.count())
             .map(|tile| {
                 own.neighbours(tile).filter(|&other| own.precedes(other, tile)).count() as u16
             })
             .collect();
-        let (layers, awaited) = own.held.order();
-        let in_a_layer = own.in_a_layer();
-        own.awaited = awaited * in_a_layer;
-        own.order = layers
-            .into_iter()
-            .flat_map(|layer| {
-                let first = (layer - own.held.layers.start) * in_a_layer;
-                first..first + in_a_layer
-            })
-            .collect();
-        for segment in own.held.segments() {
-            let all = own.segment(segment);
-            for first in all.clone().step_by(elements.rows()) {
-                let rows = first..all.end.min(first + elements.rows());
-                let strips = (rows.len() * elements.row).div_ceil(elements.at_once);
-                let first_strip = own.strips;
-                own.chunks.push(Chunk { segment, rows, tiles: 0, first_strip, strips });
-                own.strips += strips;
-            }
-        }
-        for tile in 0..own.count() {
-            let range = own.chunks_of(tile);
-            own.chunks[range].iter_mut().for_each(|chunk| chunk.tiles += 1);
-        }
+        own.order_work();
+        own.cut_rows();
         own
     }
 
-    /// The layers of tiles here.
-    pub fn held(&self) -> &Held {
+    /// Finds the tiles that come from other processes, and those that go there.
+    fn exchange_tiles(&mut self) {
+        let cuts = &self.held.cuts;
+        let in_a_layer: usize = (0..D - 1).map(|a| cuts.count(a)).product();
+        let first = self.held.at[D - 1] * in_a_layer;
+        let others = (first..first + in_a_layer).filter(|rank| *rank != cuts.rank(&self.held.at));
+        let (mut coming, mut lent) = (Vec::new(), Vec::new());
+        for process in others {
+            let at = cuts.place(process);
+            let holds = |tile: &usize| cuts.holder(&self.pieces(*tile)) == process;
+            let tiles: Vec<usize> = (0..self.count()).filter(holds).collect();
+            if !tiles.is_empty() {
+                coming.push(Coming { process, tiles });
+            }
+            let (around, completed) = (self.around_of(&at), self.completed_by(&at));
+            let own = (0..self.count()).filter(|tile| {
+                let pieces = self.pieces(*tile);
+                self.is_own(*tile) && (0..D).all(|a| around[a].contains(&pieces[a]))
+            });
+            let parts: Vec<_> = own
+                .map(|tile| (tile, Region(self.window(tile)).intersection(&completed)))
+                .collect();
+            if !parts.is_empty() {
+                lent.push(Lent { process, parts });
+            }
+        }
+        (self.coming, self.lent) = (coming, lent);
+    }
+
+    /// Puts the tiles in order of work: first those that go to other processes, then layer by layer.
+    fn order_work(&mut self) {
+        let (layers, awaited) = self.held.order();
+        let in_a_layer = self.in_a_layer();
+        let of_layers = |layers: &[usize]| -> Vec<usize> {
+            let first = |layer: &usize| (layer - self.held.layers().start) * in_a_layer;
+            let tiles = layers.iter().flat_map(|layer| first(layer)..first(layer) + in_a_layer);
+            tiles.filter(|tile| self.is_own(*tile)).collect()
+        };
+        let mut is_taken = vec![false; self.count()];
+        for (tile, _) in self.lent.iter().flat_map(|lent| &lent.parts) {
+            is_taken[*tile] = true;
+        }
+        let (lent, others): (Vec<usize>, Vec<usize>) =
+            of_layers(&layers).into_iter().partition(|tile| is_taken[*tile]);
+        let of_awaited = of_layers(&layers[..awaited]);
+        let awaited = lent.len() + of_awaited.iter().filter(|tile| !is_taken[**tile]).count();
+        self.order = [lent, others].concat();
+        self.awaited = awaited;
+    }
+
+    /// Cuts the rows here into chunks.
+    fn cut_rows(&mut self) {
+        let row = self.region.strides()[D - 1];
+        let at_once = (self.at_once / row.max(1)).max(1);
+        for segment in self.held.segments() {
+            let all = self.segment(segment);
+            for first in all.clone().step_by(at_once) {
+                let rows = first..all.end.min(first + at_once);
+                let strips = (rows.len() * row).div_ceil(self.at_once);
+                let first_strip = self.strips;
+                self.chunks.push(Chunk { segment, rows, tiles: 0, first_strip, strips });
+                self.strips += strips;
+            }
+        }
+        for tile in 0..self.count() {
+            let range = self.chunks_of(tile);
+            self.chunks[range].iter_mut().for_each(|chunk| chunk.tiles += 1);
+        }
+    }
+
+    /// The tiles of this process.
+    pub fn held(&self) -> &Held<D> {
         &self.held
+    }
+
+    /// The elements here.
+    pub fn region(&self) -> &Region<D> {
+        &self.region
+    }
+
+    /// The elements along an axis of the process at a place along it.
+    pub fn extent(&self, axis: usize, at: usize) -> Range<usize> {
+        let pieces = self.held.pieces_at(axis, at);
+        if axis == D - 1 {
+            return self.segment(pieces.start).start..self.segment(pieces.end).end;
+        }
+        let windows = &self.windows[axis];
+        windows[pieces.start].start..windows[pieces.end - 1].end
+    }
+
+    /// The elements that the processes at a place complete: along the last axis all there, along others those before the next process.
+    fn completed_by(&self, at: &[usize; D]) -> Region<D> {
+        Region(std::array::from_fn(|a| {
+            let extent = self.extent(a, at[a]);
+            match self.windows[a].get(self.held.pieces_at(a, at[a]).end) {
+                Some(next) if a < D - 1 => extent.start..next.start,
+                _ => extent,
+            }
+        }))
+    }
+
+    /// The elements that this process completes, with those of the layers below and above.
+    pub(crate) fn completed(&self) -> &Region<D> {
+        &self.own
+    }
+
+    /// The elements that go to the process below along an axis once they are complete, axes above this one first.
+    pub(crate) fn returned(&self, axis: usize) -> Region<D> {
+        let below = self.extent(axis, self.held.at[axis].saturating_sub(1));
+        self.up_to(axis).along(axis, self.own.0[axis].start..below.end)
+    }
+
+    /// Elements that come so from the process above.
+    pub(crate) fn returning(&self, axis: usize) -> Region<D> {
+        self.up_to(axis).along(axis, self.own.0[axis].end..self.region.0[axis].end)
+    }
+
+    /// The elements here along axes above `axis`, and those that this process completes along the others.
+    fn up_to(&self, axis: usize) -> Region<D> {
+        Region(std::array::from_fn(|a| {
+            if a > axis { self.region.0[a].clone() } else { self.own.0[a].clone() }
+        }))
+    }
+
+    /// The pieces along each axis of the tiles of a process and of those that come to it.
+    fn around_of(&self, at: &[usize; D]) -> [Range<usize>; D] {
+        std::array::from_fn(|a| {
+            let Range { start, end } = self.held.pieces_at(a, at[a]);
+            if a == D - 1 { start..end } else { start.saturating_sub(self.reach[a])..end }
+        })
+    }
+
+    /// Whether this process holds a tile.
+    fn is_own(&self, tile: usize) -> bool {
+        let pieces = self.pieces(tile);
+        (0..D).all(|a| self.held.pieces(a).contains(&pieces[a]))
+    }
+
+    /// The number here of the tile of these pieces.
+    fn tile_of(&self, pieces: &[usize; D]) -> usize {
+        (0..D)
+            .rev()
+            .fold(0, |tile, a| tile * self.around[a].len() + pieces[a] - self.around[a].start)
+    }
+
+    /// The elements that the buffer of a tile has: those of its window, or of a tile that comes the ones that this process completes.
+    pub(crate) fn buffered(&self, tile: usize) -> Region<D> {
+        if self.is_own(tile) { Region(self.window(tile)) } else { self.added(tile) }
+    }
+
+    /// The elements to which a tile adds here.
+    pub(crate) fn added(&self, tile: usize) -> Region<D> {
+        Region(self.window(tile)).intersection(&self.own)
     }
 
     /// The rows of a segment: those from the first of a layer's window to the first of the next one's.
@@ -137,66 +294,55 @@ impl<const D: usize> TileLattice<D> {
         start..self.chunks.partition_point(|chunk| chunk.segment <= layer + 1)
     }
 
-    /// The strips of a chunk, each with its number and its elements from the beginning of the chunk on; of a tile those alone where its window has
+    /// The strips of a chunk, each with its number and its elements from the beginning of the chunk on; of a tile those alone where it has
     /// elements of the chunk.
     pub(crate) fn strips_of(
         &self,
         chunk: &Chunk,
-        strides: &[usize; D],
         tile: Option<usize>,
     ) -> impl Iterator<Item = (usize, Range<usize>)> + use<D> {
-        let (at_once, first) = (self.elements.at_once, chunk.first_strip);
+        let (at_once, first, strides) = (self.at_once, chunk.first_strip, self.region.strides());
         let end = chunk.rows.len() * strides[D - 1];
         // A chunk of several rows is one strip.
-        let window = match tile.map(|tile| self.window(tile)) {
-            Some(window) if D > 1 && chunk.strips > 1 => {
-                let along = &window[D - 2];
-                along.start * strides[D - 2]..along.end * strides[D - 2]
+        let range = match tile.map(|tile| self.added(tile)) {
+            Some(added) if D > 1 && chunk.strips > 1 => {
+                let (along, before) = (&added.0[D - 2], self.region.0[D - 2].start);
+                (along.start - before) * strides[D - 2]..(along.end - before) * strides[D - 2]
             }
             _ => 0..end,
         };
-        (window.start / at_once..window.end.div_ceil(at_once).min(chunk.strips))
+        (range.start / at_once..range.end.div_ceil(at_once).min(chunk.strips))
             .map(move |strip| (first + strip, strip * at_once..end.min((strip + 1) * at_once)))
     }
 
-    /// Number of tiles here.
+    /// Number of tiles here, with those that come.
     pub fn count(&self) -> usize {
-        self.held.layers.len() * self.in_a_layer()
+        self.around[D - 1].len() * self.in_a_layer()
     }
 
-    /// Number of tiles in a layer.
+    /// Number of them in a layer.
     fn in_a_layer(&self) -> usize {
-        self.windows[..D - 1].iter().map(Vec::len).product()
+        self.around[..D - 1].iter().map(ExactSizeIterator::len).product()
     }
 
-    /// The pieces of a tile along each axis; layers count from the first of all.
-    fn pieces(&self, tile: usize) -> [usize; D] {
-        let mut rest = tile + self.held.layers.start * self.in_a_layer();
+    /// The pieces of a tile along each axis.
+    pub fn pieces(&self, tile: usize) -> [usize; D] {
+        let mut rest = tile;
         std::array::from_fn(|a| {
-            let count = self.windows[a].len();
-            let piece = rest % count;
-            rest /= count;
+            let around = &self.around[a];
+            let piece = around.start + rest % around.len();
+            rest /= around.len();
             piece
         })
     }
 
-    /// The window of a tile here along each axis.
+    /// The window of a tile along each axis.
     pub fn window(&self, tile: usize) -> [Range<usize>; D] {
         let pieces = self.pieces(tile);
         std::array::from_fn(|a| self.windows[a][pieces[a]].clone())
     }
 
-    /// How many elements a row has.
-    pub(crate) fn row(&self) -> usize {
-        self.elements.row
-    }
-
-    /// The end of all windows along an axis.
-    pub(crate) fn end(&self, axis: usize) -> usize {
-        self.windows[axis].last().map_or(0, |window| window.end)
-    }
-
-    /// Number of elements in the window of a tile here.
+    /// Number of elements in the window of a tile.
     pub fn elements(&self, tile: usize) -> usize {
         self.window(tile).into_iter().map(|window| window.len()).product()
     }
@@ -220,22 +366,20 @@ impl<const D: usize> TileLattice<D> {
     /// The other tiles here whose windows may overlap with that of a tile.
     fn neighbours(&self, tile: usize) -> impl Iterator<Item = usize> + '_ {
         let pieces = self.pieces(tile);
-        let around: [Range<usize>; D] = std::array::from_fn(|a| {
-            let all = if a == D - 1 { self.held.layers.clone() } else { 0..self.windows[a].len() };
+        let near: [Range<usize>; D] = std::array::from_fn(|a| {
             let (first, end) =
                 (pieces[a].saturating_sub(self.reach[a]), pieces[a] + self.reach[a] + 1);
-            first.max(all.start)..end.min(all.end)
+            first.max(self.around[a].start)..end.min(self.around[a].end)
         });
-        let count: usize = around.iter().map(ExactSizeIterator::len).product();
+        let count: usize = near.iter().map(ExactSizeIterator::len).product();
         let found = (0..count).map(move |number| {
-            let (mut rest, mut other, mut stride) = (number, 0, 1);
-            for a in 0..D {
-                let first = if a == D - 1 { self.held.layers.start } else { 0 };
-                other += (around[a].start - first + rest % around[a].len()) * stride;
-                rest /= around[a].len();
-                stride *= self.windows[a].len();
-            }
-            other
+            let mut rest = number;
+            let pieces = near.each_ref().map(|near| {
+                let piece = near.start + rest % near.len();
+                rest /= near.len();
+                piece
+            });
+            self.tile_of(&pieces)
         });
         found.filter(move |&other| other != tile)
     }
@@ -248,7 +392,7 @@ impl<const D: usize> TileLattice<D> {
     /// The tiles here of the layer that adds to a shared segment.
     pub(crate) fn adding_to(&self, shared: Shared) -> Range<usize> {
         let layer = if shared.is_below { shared.segment } else { shared.segment - 1 };
-        let first = (layer - self.held.layers.start) * self.in_a_layer();
+        let first = (layer - self.held.layers().start) * self.in_a_layer();
         first..first + self.in_a_layer()
     }
 

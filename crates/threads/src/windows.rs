@@ -7,9 +7,10 @@
 //! axis decides first. Elements are cleared right before the first tile is added to them, and rows completed right after the last one, while they lie in
 //! the cache. The safety argument for the parts of the array that threads change is in this file.
 //!
-//! A process may hold some successive layers of tiles, pieces along the last axis, whose neighbours other processes hold
-//! ([`held`](crate::held)). Of two processes that share a segment, the one whose layer comes first sends its sums as soon as they are there; the
-//! other one begins with them, completes the segment and sends it back.
+//! A process may hold a box of tiles, whose neighbours other processes hold ([`held`](crate::held)). Along the last axis two processes share a
+//! segment: the one whose layer comes first sends its sums as soon as they are there; the other one begins with them, completes the segment and
+//! sends it back. Along any other axis the upper one of two processes completes the elements that windows of both have. The lower one sends it the buffers
+//! of the tiles that reach into these, which it adds in their turn, and gets complete elements back.
 
 #![allow(unsafe_code, reason = "lines and rows of one array, changed by several threads")]
 
@@ -20,8 +21,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 use crate::held::Shared;
-use crate::lattice::{Chunk, TileLattice};
+use crate::lattice::{Chunk, Coming, Lent, TileLattice};
 use crate::on_all_threads;
+use crate::region::Region;
 
 /// Buffers that no tile uses at present, which outlive a pass; all their elements are zero.
 #[derive(Debug)]
@@ -48,16 +50,6 @@ impl<N: Copy> TileBuffers<N> {
     }
 }
 
-/// The array of a pass, of which this process may hold some rows alone.
-pub struct TiledArray<'a, N, const D: usize> {
-    /// The elements here.
-    pub elements: &'a mut [N],
-    /// How far elements lie apart along each axis.
-    pub strides: [usize; D],
-    /// The first row here.
-    pub first_row: usize,
-}
-
 /// Fills the buffer of a tile here, the elements of its window, which come in zero.
 pub type FillTile<'a, N> = dyn Fn(usize, &mut [N]) + Sync + 'a;
 
@@ -75,44 +67,49 @@ pub struct Hooks<'a, N> {
     pub zero: N,
     /// The sum of elements and others, which are cleared.
     pub add: &'a AddLine<'a, N>,
-    /// The exchange with processes that hold other layers, where there are such.
+    /// The exchange with other processes, where there are such.
     pub halo: Option<Halo<'a, N>>,
 }
 
-/// Messages with the processes of the layers below and above.
+/// Messages with other processes: elements line by line.
 #[derive(Clone, Copy)]
 pub struct Halo<'a, N> {
-    /// Sends the elements of a segment that is shared.
-    pub send: &'a (dyn Fn(Shared, &[N]) + Sync),
-    /// Receives them.
-    pub receive: &'a (dyn Fn(Shared, &mut [N]) + Sync),
+    /// Sends elements to a process.
+    pub send: &'a (dyn Fn(usize, &[&[N]]) + Sync),
+    /// Receives elements of a process.
+    pub receive: &'a (dyn Fn(usize, &mut [&mut [N]]) + Sync),
     /// Whether that would not wait.
-    pub has_arrived: &'a (dyn Fn(Shared) -> bool + Sync),
+    pub has_arrived: &'a (dyn Fn(usize) -> bool + Sync),
     /// Whether these rows are complete after [`Hooks::after`].
     pub is_complete: &'a (dyn Fn(Range<usize>) -> bool + Sync),
     /// Between the last sums of all and the last messages.
     pub finish: &'a (dyn Fn(&mut [N]) + Sync),
 }
 
-/// Adds the tiles of an array, of which some have sums: [`FillTile`] for those, and the hooks around it.
+/// Adds the tiles of an array, of which some have sums: [`FillTile`] for those, and the hooks around it. `elements` has the lattice's region.
 ///
 /// # Panics
 ///
-/// Where `array` does not have the rows of all segments here.
+/// Where `elements` has other elements.
 pub fn sum_tiles<N: Copy + Send + Sync, const D: usize>(
-    array: TiledArray<'_, N, D>,
+    elements: &mut [N],
     lattice: &TileLattice<D>,
     buffers: &TileBuffers<N>,
     has_sums: &[bool],
     fill: &FillTile<'_, N>,
     hooks: Hooks<'_, N>,
 ) {
-    let mut pass = Pass::new(array, lattice, buffers, hooks);
+    let mut pass = Pass::new(elements, lattice, buffers, hooks);
     pass.on_all_threads(has_sums, fill);
     let Some(Halo { send, receive, finish, .. }) = hooks.halo else { return };
     let shared: Vec<Shared> = lattice.held().shared().collect();
     let (lent, borrowed): (Vec<Shared>, Vec<Shared>) =
         shared.into_iter().partition(|shared| shared.is_first_here);
+    // Other processes send their tiles, and then the sums of their first layers, whatever they wait for.
+    let came = (0..lattice.coming.len()).map(|number| pass.take_coming(number));
+    if came.fold(false, |any, came| any | came) {
+        pass.on_all_threads(has_sums, fill);
+    }
     let came = borrowed.iter().map(|&shared| pass.begin_with_sums(shared));
     if came.fold(false, |any, came| any | came) {
         pass.on_all_threads(has_sums, fill);
@@ -120,11 +117,19 @@ pub fn sum_tiles<N: Copy + Send + Sync, const D: usize>(
     finish(pass.all());
     for shared in borrowed {
         if !*pass.is_returned[usize::from(shared.is_below)].get_mut() {
-            send(shared, pass.of_segment(shared.segment));
+            send(shared.process, &pass.lines(&pass.of_segment(shared.segment)));
         }
     }
     for shared in lent {
-        receive(shared, pass.of_segment(shared.segment));
+        receive(shared.process, &mut pass.lines_mut(&pass.of_segment(shared.segment)));
+    }
+    for axis in (0..D - 1).rev() {
+        if let Some(process) = lattice.held().neighbour(axis, false) {
+            send(process, &pass.lines(&lattice.returned(axis)));
+        }
+        if let Some(process) = lattice.held().neighbour(axis, true) {
+            receive(process, &mut pass.lines_mut(&lattice.returning(axis)));
+        }
     }
 }
 
@@ -151,14 +156,19 @@ impl<N> Progress<N> {
     }
 }
 
+/// The elements of tiles that go to a process.
+#[derive(Debug)]
+struct Loan<N> {
+    elements: Mutex<Vec<N>>,
+    /// How many of the tiles are not among them yet.
+    left: AtomicUsize,
+}
+
 /// A pass over the tiles of an array.
 struct Pass<'a, N, const D: usize> {
     lattice: &'a TileLattice<D>,
     first: *mut N,
     length: usize,
-    strides: [usize; D],
-    /// Elements of the whole array before the first here.
-    before: usize,
     buffers: &'a TileBuffers<N>,
     hooks: Hooks<'a, N>,
     progress: Mutex<Progress<N>>,
@@ -170,6 +180,10 @@ struct Pass<'a, N, const D: usize> {
     left_of_segment: Vec<AtomicUsize>,
     /// Whether the sums of the shared segment above, and of that below, have come, or are being taken.
     has_come: [AtomicBool; 2],
+    /// Whether the tiles of each process whose tiles come here have, or are being taken.
+    have_come: Vec<AtomicBool>,
+    /// The message to each process to which tiles are lent.
+    loans: Vec<Loan<N>>,
     /// Whether these segments have been sent back.
     is_returned: [AtomicBool; 2],
     borrowed: PhantomData<&'a mut [N]>,
@@ -181,22 +195,18 @@ unsafe impl<N: Send + Sync, const D: usize> Sync for Pass<'_, N, D> {}
 
 impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     fn new(
-        array: TiledArray<'a, N, D>,
+        elements: &'a mut [N],
         lattice: &'a TileLattice<D>,
         buffers: &'a TileBuffers<N>,
         hooks: Hooks<'a, N>,
     ) -> Self {
-        let TiledArray { elements, strides, first_row } = array;
-        let (row, segments) = (strides[D - 1], lattice.held().segments());
-        // What the unsafe code relies on: lines lie in the array, elements of distinct places along an axis are distinct, and chunks cover it.
-        assert_eq!(strides[0], 1);
-        for a in 0..D - 1 {
-            assert!(lattice.end(a) * strides[a] <= strides[a + 1]);
-        }
-        assert_eq!(row, lattice.row());
-        let end = segments.clone().next_back().map_or(first_row, |last| lattice.segment(last).end);
-        assert_eq!(first_row, lattice.segment(segments.start).start);
-        assert_eq!((end - first_row) * row, elements.len());
+        // What the unsafe code relies on: the elements are those of the region, which lines of it have once (`Region::lines`).
+        assert_eq!(elements.len(), lattice.region().len());
+        let segments = lattice.held().segments();
+        let loan = |Lent { parts, .. }: &Lent<D>| Loan {
+            elements: Mutex::new(vec![hooks.zero; parts.iter().map(|(_, part)| part.len()).sum()]),
+            left: AtomicUsize::new(parts.len()),
+        };
         let count = lattice.count();
         let progress = Progress {
             pending: lattice.before().into_iter().map(|before| before + 1).collect(),
@@ -209,8 +219,6 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
             lattice,
             first: elements.as_mut_ptr(),
             length: elements.len(),
-            strides,
-            before: first_row * row,
             buffers,
             hooks,
             progress: Mutex::new(progress),
@@ -220,6 +228,8 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
                 .map(|segment| AtomicUsize::new(of_segment(segment)))
                 .collect(),
             has_come: Default::default(),
+            have_come: lattice.coming.iter().map(|_| AtomicBool::new(false)).collect(),
+            loans: lattice.lent.iter().map(loan).collect(),
             is_returned: Default::default(),
             borrowed: PhantomData,
         }
@@ -235,7 +245,7 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     ///
     /// No other slice of these elements may be in use. Threads keep to that as follows.
     ///
-    /// - *A line of a tile* (`add`) is part of the window of this tile, and of strips that have begun. A tile is added once, by the thread that
+    /// - *A line of a tile* (`add`) is part of the window of this tile, of whichever process, and of strips that have begun. A tile is added once, by the thread that
     ///   took it from `ready`, where it is put when all tiles before it with overlapping windows are added (`pending`). Tiles of
     ///   the same turn do not overlap: along some axis their pieces are a multiple of `reach + 1` apart. Of two tiles with overlapping
     ///   windows one comes before the other, as their pieces lie within `reach` along each axis (`neighbours`) and their turns differ.
@@ -255,8 +265,9 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
 
     /// The indices of the elements of rows.
     fn of_rows(&self, rows: Range<usize>) -> Range<usize> {
-        let row = self.strides[D - 1];
-        rows.start * row - self.before..rows.end * row - self.before
+        let Region(region) = self.lattice.region();
+        let row = self.length / region[D - 1].len().max(1);
+        (rows.start - region[D - 1].start) * row..(rows.end - region[D - 1].start) * row
     }
 
     /// All elements here, while no thread works.
@@ -265,10 +276,21 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
         unsafe { self.elements(0..self.length) }
     }
 
-    /// The elements of a segment, while no thread works.
-    fn of_segment(&mut self, segment: usize) -> &mut [N] {
+    /// The elements of a segment that this process completes, with those of the layers below and above.
+    fn of_segment(&self, segment: usize) -> Region<D> {
+        self.lattice.completed().along(D - 1, self.lattice.segment(segment))
+    }
+
+    /// The lines of a region, while no thread works.
+    fn lines(&mut self, region: &Region<D>) -> Vec<&[N]> {
         // SAFETY: as in `all`.
-        unsafe { self.elements(self.of_rows(self.lattice.segment(segment))) }
+        region.lines(self.lattice.region()).map(|line| &*unsafe { self.elements(line) }).collect()
+    }
+
+    /// As [`lines`](Self::lines), to be changed.
+    fn lines_mut(&mut self, region: &Region<D>) -> Vec<&mut [N]> {
+        // SAFETY: as in `all`; lines of a region are distinct.
+        region.lines(self.lattice.region()).map(|line| unsafe { self.elements(line) }).collect()
     }
 
     /// Fills the buffers of tiles that have sums, and adds those whose turn it is, until nothing is left that waits for no other process.
@@ -286,6 +308,7 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
                     fill(tile, &mut buffer[..elements]);
                     buffer
                 });
+                self.lend(tile, filled.as_deref());
                 let mut progress = self.progress();
                 progress.filled[tile] = filled;
                 progress.count_down(tile);
@@ -308,15 +331,63 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
         Some(order[place])
     }
 
-    /// Takes the sums of other processes that have arrived.
+    /// Sends the elements of a tile, if it has any, to the processes that complete them, with the last of the tiles that go there.
+    fn lend(&self, tile: usize, filled: Option<&[N]>) {
+        let Some(halo) = &self.hooks.halo else { return };
+        for (Lent { process, parts }, loan) in self.lattice.lent.iter().zip(&self.loans) {
+            let Ok(number) = parts.binary_search_by_key(&tile, |(lent, _)| *lent) else { continue };
+            let Loan { elements, left } = loan;
+            if let Some(filled) = filled {
+                let mut place = parts[..number].iter().map(|(_, part)| part.len()).sum();
+                let mut elements = elements.lock().unwrap_or_else(PoisonError::into_inner);
+                for line in parts[number].1.lines(&self.lattice.buffered(tile)) {
+                    elements[place..place + line.len()].copy_from_slice(&filled[line.clone()]);
+                    place += line.len();
+                }
+            }
+            if left.fetch_sub(1, Ordering::AcqRel) == 1 {
+                let elements = elements.lock().unwrap_or_else(PoisonError::into_inner);
+                (halo.send)(*process, &[&elements]);
+            }
+        }
+    }
+
+    /// Takes tiles and sums of other processes that have arrived.
     fn receive_arrived(&self) {
         let Some(halo) = &self.hooks.halo else { return };
+        for (number, Coming { process, .. }) in self.lattice.coming.iter().enumerate() {
+            if !self.have_come[number].load(Ordering::Relaxed) && (halo.has_arrived)(*process) {
+                self.take_coming(number);
+            }
+        }
         for shared in self.lattice.held().shared().filter(|shared| !shared.is_first_here) {
             let has_come = &self.has_come[usize::from(shared.is_below)];
-            if !has_come.load(Ordering::Relaxed) && (halo.has_arrived)(shared) {
+            if !has_come.load(Ordering::Relaxed) && (halo.has_arrived)(shared.process) {
                 self.begin_with_sums(shared);
             }
         }
+    }
+
+    /// Receives the tiles of another process that reach into elements here. Once; what follows does nothing. True where it did something.
+    fn take_coming(&self, number: usize) -> bool {
+        let Some(halo) = &self.hooks.halo else { return false };
+        if self.have_come[number].swap(true, Ordering::Relaxed) {
+            return false;
+        }
+        let Coming { process, tiles } = &self.lattice.coming[number];
+        let elements = |tile: usize| self.lattice.buffered(tile).len();
+        let mut buffers: Vec<Vec<N>> =
+            tiles.iter().map(|&tile| self.buffers.take(elements(tile), self.hooks.zero)).collect();
+        let lines = buffers.iter_mut().zip(tiles);
+        let mut lines: Vec<_> =
+            lines.map(|(buffer, &tile)| &mut buffer[..elements(tile)]).collect();
+        (halo.receive)(*process, &mut lines);
+        let mut progress = self.progress();
+        for (&tile, buffer) in tiles.iter().zip(buffers) {
+            progress.filled[tile] = Some(buffer);
+            progress.count_down(tile);
+        }
+        true
     }
 
     /// Receives the sums of another process whose layer comes first in a shared segment. Once; what follows does nothing. True where it did
@@ -326,11 +397,12 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
         if self.has_come[usize::from(shared.is_below)].swap(true, Ordering::Relaxed) {
             return false;
         }
-        let rows = self.of_rows(self.lattice.segment(shared.segment));
-        // SAFETY: strips before their sums (see `elements`); this is reached once (`has_come`), and `begun` is set below.
-        (halo.receive)(shared, unsafe { self.elements(rows) });
+        let lines = self.of_segment(shared.segment).lines(self.lattice.region());
+        // SAFETY: strips before their sums (see `elements`), whose lines are distinct; this is reached once (`has_come`), and `begun` is set below.
+        let mut lines: Vec<_> = lines.map(|line| unsafe { self.elements(line) }).collect();
+        (halo.receive)(shared.process, &mut lines);
         for chunk in self.lattice.chunks.iter().filter(|chunk| chunk.segment == shared.segment) {
-            for (strip, _) in self.lattice.strips_of(chunk, &self.strides, None) {
+            for (strip, _) in self.lattice.strips_of(chunk, None) {
                 self.begun[strip].call_once(|| {});
             }
         }
@@ -364,7 +436,7 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     /// Sees to it that a chunk has the elements that sums begin with: all, or those in the window of a tile.
     fn begin(&self, chunk: &Chunk, tile: Option<usize>) {
         let first = self.of_rows(chunk.rows.clone()).start;
-        for (strip, range) in self.lattice.strips_of(chunk, &self.strides, tile) {
+        for (strip, range) in self.lattice.strips_of(chunk, tile) {
             self.begun[strip].call_once(|| {
                 // SAFETY: a strip before its sums (see `elements`).
                 (self.hooks.before)(unsafe {
@@ -378,17 +450,13 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
     fn add(&self, tile: usize, buffer: &mut [N]) {
         let chunks = &self.lattice.chunks[self.lattice.chunks_of(tile)];
         chunks.iter().for_each(|chunk| self.begin(chunk, Some(tile)));
-        let window = self.lattice.window(tile);
-        let buffer = &mut buffer[..self.lattice.elements(tile)];
-        for (line, values) in buffer.chunks_exact_mut(window[0].len()).enumerate() {
-            let (mut rest, mut place) = (line, window[0].start);
-            for a in 1..D {
-                place += (window[a].start + rest % window[a].len()) * self.strides[a];
-                rest /= window[a].len();
-            }
-            let place = place - self.before;
+        let (buffered, added) = (self.lattice.buffered(tile), self.lattice.added(tile));
+        for (from, to) in added.lines(&buffered).zip(added.lines(self.lattice.region())) {
             // SAFETY: a line of a tile (see `elements`).
-            (self.hooks.add)(unsafe { self.elements(place..place + values.len()) }, values);
+            (self.hooks.add)(unsafe { self.elements(to) }, &mut buffer[from]);
+        }
+        if added != buffered {
+            buffer[..buffered.len()].fill(self.hooks.zero);
         }
     }
 
@@ -409,10 +477,11 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
             return;
         }
         let (Some(shared), Some(halo)) = (shared, &self.hooks.halo) else { return };
-        let rows = self.lattice.segment(shared.segment);
-        if is_lent || (halo.is_complete)(rows.clone()) {
-            // SAFETY: a segment after its sums (see `elements`).
-            (halo.send)(shared, unsafe { self.elements(self.of_rows(rows)) });
+        if is_lent || (halo.is_complete)(self.lattice.segment(shared.segment)) {
+            let lines = self.of_segment(shared.segment).lines(self.lattice.region());
+            // SAFETY: a segment after its sums (see `elements`), whose lines are distinct.
+            let lines: Vec<_> = lines.map(|line| &*unsafe { self.elements(line) }).collect();
+            (halo.send)(shared.process, &lines);
             self.is_returned[usize::from(shared.is_below)].store(true, Ordering::Relaxed);
         }
     }
@@ -421,8 +490,7 @@ impl<'a, N: Copy + Send + Sync, const D: usize> Pass<'a, N, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::held::Held;
-    use crate::lattice::Elements;
+    use crate::held::{Cuts, Held};
     use proptest::prelude::*;
     use std::collections::{BTreeSet, VecDeque};
     use std::sync::Condvar;
@@ -438,45 +506,48 @@ mod tests {
     }
 
     /// The sums of the whole lattice: each tile takes an element from what it was, so that the order shows. Rows are completed by a factor.
-    fn changed(lattice: &TileLattice<3>, dims: [usize; 3], threads: usize) -> Vec<u64> {
-        let mut array = vec![0; dims.iter().product()];
+    fn changed(lattice: &TileLattice<3>, threads: usize) -> Vec<u64> {
+        let mut array = vec![0; lattice.region().len()];
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let buffers = TileBuffers::default();
         // Buffers are used a second time, and what the array has been does not matter.
         for before in [3, 5] {
             array.fill(before);
-            pool.install(|| sum(lattice, (dims, 0), &mut array, &buffers, None));
+            pool.install(|| sum(lattice, &mut array, &buffers, None));
         }
         array
     }
 
+    /// The number of a tile among all.
+    fn number(lattice: &TileLattice<3>, tile: usize) -> usize {
+        let pieces = lattice.pieces(tile);
+        (0..3).rev().fold(0, |number, a| number * lattice.held().cuts.pieces(a) + pieces[a])
+    }
+
     fn sum(
         lattice: &TileLattice<3>,
-        (dims, first_tile): ([usize; 3], usize),
         elements: &mut [u64],
         buffers: &TileBuffers<u64>,
         halo: Option<Halo<'_, u64>>,
     ) {
         let has_sums: Vec<bool> =
-            (first_tile..first_tile + lattice.count()).map(has_sums).collect();
+            (0..lattice.count()).map(|tile| has_sums(number(lattice, tile))).collect();
         let fill = |tile: usize, buffer: &mut [u64]| {
             assert!(buffer.iter().all(|&element| element == 0));
-            buffer.fill((first_tile + tile) as u64 + 1);
+            buffer.fill(number(lattice, tile) as u64 + 1);
         };
+        let row = lattice.region().strides()[2];
         let hooks = Hooks {
             before: &|elements: &mut [u64]| elements.fill(BEFORE),
             after: &|elements: &mut [u64], first| {
-                assert_eq!(first % (dims[0] * dims[1]), 0);
+                assert_eq!(first % row, 0);
                 elements.iter_mut().for_each(|element| *element = after(*element));
             },
             zero: 0,
             add: &add,
             halo,
         };
-        let strides = [1, dims[0], dims[0] * dims[1]];
-        let first_row = lattice.segment(lattice.held().segments().start).start;
-        let array = TiledArray { elements, strides, first_row };
-        sum_tiles(array, lattice, buffers, &has_sums, &fill, hooks);
+        sum_tiles(elements, lattice, buffers, &has_sums, &fill, hooks);
     }
 
     /// The number that sums begin with.
@@ -492,22 +563,21 @@ mod tests {
     }
 
     fn add(elements: &mut [u64], values: &mut [u64]) {
-        for (element, value) in elements.iter_mut().zip(values) {
+        assert_eq!(elements.len(), values.len());
+        for (element, value) in elements.iter_mut().zip(values).filter(|(_, value)| **value > 0) {
             *element = element.wrapping_mul(1_000_003).wrapping_add(*value);
             *value = 0;
         }
     }
 
     /// Sums by hand: tile after tile in the order of turns.
-    fn by_turns(lattice: &TileLattice<3>, dims: [usize; 3]) -> Vec<u64> {
-        let mut array = vec![BEFORE; dims.iter().product()];
+    fn by_turns(lattice: &TileLattice<3>) -> Vec<u64> {
+        let mut array = vec![BEFORE; lattice.region().len()];
         let mut order: Vec<usize> = (0..lattice.count()).collect();
         order.sort_by_key(|&tile| lattice.turn(tile));
         for tile in order.into_iter().filter(|&tile| has_sums(tile)) {
-            let [x, y, z] = lattice.window(tile);
-            for (z, y) in z.flat_map(|z| y.clone().map(move |y| (z, y))) {
-                for x in x.clone() {
-                    let element = &mut array[x + dims[0] * (y + dims[1] * z)];
+            for line in Region(lattice.window(tile)).lines(lattice.region()) {
+                for element in &mut array[line] {
                     *element = element.wrapping_mul(1_000_003).wrapping_add(tile as u64 + 1);
                 }
             }
@@ -524,35 +594,30 @@ mod tests {
             reach in prop::array::uniform2(0..3_usize),
             at_once in 1..400_usize,
         ) {
-            let dims: [usize; 3] = [
-                reach[0] + pieces[0] * length[0] + reach[1],
-                reach[1] + pieces[1] * length[1] + reach[0],
-                2 + 4 * pieces[2] + 2,
-            ];
             let lattice = TileLattice::new(
                 [
                     windows(pieces[0], length[0], reach[0], reach[1]),
                     windows(pieces[1], length[1], reach[1], reach[0]),
                     windows(pieces[2], 4, 2, 2),
                 ],
-                Held::whole(pieces[2]),
-                Elements { row: dims[0] * dims[1], at_once },
+                Held::whole(pieces),
+                at_once,
             );
-            let expected = by_turns(&lattice, dims);
+            let expected = by_turns(&lattice);
             for threads in [1, 2, 3] {
-                prop_assert_eq!(&changed(&lattice, dims, threads), &expected);
+                prop_assert_eq!(&changed(&lattice, threads), &expected);
             }
             prop_assert_eq!(lattice.count(), pieces.iter().product::<usize>());
             let turns: BTreeSet<_> = (0..lattice.count()).map(|tile| lattice.turn(tile)).collect();
             prop_assert!(lattice.longest(&|_| 0.0, &|_| 1.0, &|_| 0.0) <= turns.len() as f64);
             prop_assert_eq!(lattice.longest(&|_| 2.0, &|_| 0.0, &|_| 3.0), 5.0);
-            let rows_at_once = at_once / (dims[0] * dims[1]);
+            let rows_at_once = at_once / lattice.region().strides()[2];
             let of_rows = |rows: usize| rows as f64;
             prop_assert!(lattice.longest(&|_| 0.0, &|_| 0.0, &of_rows) <= rows_at_once.max(1) as f64);
         }
     }
 
-    /// Messages on their way to a process.
+    /// Messages on their way from a process to another.
     #[derive(Default)]
     struct Mailbox {
         messages: Mutex<VecDeque<Vec<u64>>>,
@@ -560,8 +625,8 @@ mod tests {
     }
 
     impl Mailbox {
-        fn send(&self, elements: &[u64]) {
-            self.messages.lock().unwrap().push_back(elements.to_vec());
+        fn send(&self, lines: &[&[u64]]) {
+            self.messages.lock().unwrap().push_back(lines.concat());
             self.arrived.notify_all();
         }
 
@@ -569,59 +634,116 @@ mod tests {
             !self.messages.lock().unwrap().is_empty()
         }
 
-        fn receive(&self, elements: &mut [u64]) {
+        fn receive(&self, lines: &mut [&mut [u64]]) {
             let messages = self.messages.lock().unwrap();
             let mut messages = self.arrived.wait_while(messages, |all| all.is_empty()).unwrap();
-            elements.copy_from_slice(&messages.pop_front().unwrap());
+            let message = messages.pop_front().unwrap();
+            let mut rest = &message[..];
+            for line in lines {
+                let own = rest.split_off(..line.len()).unwrap();
+                line.copy_from_slice(own);
+            }
+            assert!(rest.is_empty(), "{} more elements", rest.len());
         }
+    }
+
+    /// The arrays of all processes, each with several threads, against the same parts of the array of one process.
+    fn check_processes(windows: &[Vec<Range<usize>>; 3], cuts: &Cuts<3>, is_complete: bool) {
+        let pieces = windows.each_ref().map(Vec::len);
+        let whole = TileLattice::new(windows.clone(), Held::whole(pieces), 70);
+        let expected = by_turns(&whole);
+        let count: usize = (0..3).map(|a| cuts.count(a)).product();
+        let boxes: Vec<Vec<Mailbox>> =
+            (0..count).map(|_| (0..count).map(|_| Mailbox::default()).collect()).collect();
+        std::thread::scope(|scope| {
+            for rank in 0..count {
+                let (boxes, whole, expected) = (&boxes, &whole, &expected);
+                let held = Held::of(cuts.clone(), rank);
+                let lattice = TileLattice::new(windows.clone(), held, 70);
+                scope.spawn(move || {
+                    let halo = Halo {
+                        send: &|to, lines: &[&[u64]]| boxes[rank][to].send(lines),
+                        receive: &|from, lines: &mut [&mut [u64]]| boxes[from][rank].receive(lines),
+                        has_arrived: &|from| boxes[from][rank].has_arrived(),
+                        is_complete: &|_| is_complete,
+                        finish: &|_| {},
+                    };
+                    let mut array = vec![9; lattice.region().len()];
+                    let buffers = TileBuffers::default();
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + rank % 2);
+                    let pool = pool.build().unwrap();
+                    for _ in 0..2 {
+                        pool.install(|| sum(&lattice, &mut array, &buffers, Some(halo)));
+                    }
+                    let of_one: Vec<u64> = lattice
+                        .region()
+                        .lines(whole.region())
+                        .flat_map(|line| expected[line].to_vec())
+                        .collect();
+                    assert_eq!(array, of_one, "process {rank} of {cuts:?}");
+                });
+            }
+        });
+        let all = boxes.iter().flatten();
+        assert!(all.into_iter().all(|mailbox| !mailbox.has_arrived()), "{cuts:?}");
     }
 
     /// Processes that hold a layer or more each have the elements of one process, whichever of them completes rows at once.
     #[test]
     fn layers_of_several_processes_give_the_sums_of_one() {
-        let of_axes = || [windows(3, 2, 1, 1), windows(4, 2, 2, 2), windows(5, 4, 2, 2)];
-        let dims = [8, 12, 24];
-        let plane = dims[0] * dims[1];
-        let elements = Elements { row: plane, at_once: 70 };
-        let expected = by_turns(&TileLattice::new(of_axes(), Held::whole(5), elements), dims);
+        let windows = [windows(3, 2, 1, 1), windows(4, 2, 2, 2), windows(5, 4, 2, 2)];
         for cuts in
             [vec![0, 1, 5], vec![0, 2, 5], vec![0, 3, 5], vec![0, 1, 2, 3, 4, 5], vec![0, 4, 5]]
         {
-            for completes_at_once in [true, false] {
-                let count = cuts.len() - 1;
-                // To the process below and to that above.
-                let boxes: Vec<[Mailbox; 2]> = (0..count).map(|_| Default::default()).collect();
-                std::thread::scope(|scope| {
-                    for rank in 0..count {
-                        let (boxes, cuts, expected) = (&boxes, &cuts, &expected);
-                        scope.spawn(move || {
-                            let held = Held { layers: cuts[rank]..cuts[rank + 1], all: 5 };
-                            let lattice = TileLattice::new(of_axes(), held, elements);
-                            let segments = lattice.held().segments();
-                            let rows = lattice.segment(segments.start).start
-                                ..lattice.segment(segments.end - 1).end;
-                            let mut array = vec![0; rows.len() * plane];
-                            let out = |shared: Shared| match shared.is_below {
-                                true => &boxes[rank - 1][0],
-                                false => &boxes[rank + 1][1],
-                            };
-                            let own = |shared: Shared| &boxes[rank][usize::from(shared.is_below)];
-                            let halo = Halo {
-                                send: &|shared, elements: &[u64]| out(shared).send(elements),
-                                receive: &|shared, elements: &mut [u64]| {
-                                    own(shared).receive(elements)
-                                },
-                                has_arrived: &|shared| own(shared).has_arrived(),
-                                is_complete: &|_| completes_at_once,
-                                finish: &|_| {},
-                            };
-                            let place = (dims, cuts[rank] * 12);
-                            sum(&lattice, place, &mut array, &TileBuffers::default(), Some(halo));
-                            assert_eq!(array, expected[rows.start * plane..rows.end * plane]);
-                        });
-                    }
-                });
+            for is_complete in [true, false] {
+                let cuts = Cuts([vec![0, 3], vec![0, 4], cuts.clone()]);
+                check_processes(&windows, &cuts, is_complete);
             }
+        }
+    }
+
+    /// Cuts of so many pieces where each process has `least` of them or more, by numbers that choose.
+    fn cut(pieces: usize, least: usize, chosen: &[usize]) -> Vec<usize> {
+        let mut cuts = vec![0];
+        for number in chosen {
+            let last = cuts[cuts.len() - 1];
+            let most = pieces.saturating_sub(last + least);
+            if most >= least {
+                cuts.push(last + least + number % (most - least + 1));
+            }
+        }
+        cuts.push(pieces);
+        cuts
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+
+        #[test]
+        fn boxes_of_several_processes_give_the_sums_of_one(
+            pieces in prop::array::uniform3(1..7_usize),
+            length in prop::array::uniform2(2..4_usize),
+            reach in prop::array::uniform2(0..4_usize),
+            chosen in prop::array::uniform3(prop::collection::vec(0..6_usize, 0..3)),
+            is_complete in any::<bool>(),
+        ) {
+            let windows = [
+                windows(pieces[0], length[0], reach[0], reach[1]),
+                windows(pieces[1], length[1], reach[1], reach[0]),
+                windows(pieces[2], 4, 2, 2),
+            ];
+            let overlaps = |a: usize| {
+                let last = |windows: &[Range<usize>]| {
+                    windows.iter().filter(|window| window.start < windows[0].end).count() - 1
+                };
+                (0..pieces[a]).map(|first| last(&windows[a][first..])).max().unwrap().max(1)
+            };
+            let cuts = Cuts([
+                cut(pieces[0], overlaps(0), &chosen[0]),
+                cut(pieces[1], overlaps(1), &chosen[1]),
+                cut(pieces[2], 1, &chosen[2]),
+            ]);
+            check_processes(&windows, &cuts, is_complete);
         }
     }
 }

@@ -110,7 +110,7 @@ pub use mmsmith_laws::{ReturnMap, Volume};
 pub use mmsmith_measure::norms::{Field, Norm, PerField, PerNorm};
 pub use mmsmith_mpm::{Division, PassTime, Profile, StepError};
 pub use mmsmith_mpm::{Integrator, Registers, Shape, Transfer};
-pub use mmsmith_ranks::{Ranks, Sent, gather};
+pub use mmsmith_ranks::{Ranks, Sent, arranged, gather};
 pub use mmsmith_vtk::Provenance;
 pub use named::{Named, names};
 pub use observe::{Failure, FailureKind, Observed};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::values::thread_count;
+use super::values::{ProcessGrid, process_grid, thread_count};
 
 #[derive(Args)]
 pub(crate) struct ResumeOptions {
@@ -14,4 +14,7 @@ pub(crate) struct ResumeOptions {
     /// Number of threads. Default: that of the run
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
+    /// Processes along each axis, such as 2x4, where mpirun starts several. Default: those whose fullest has the least to do
+    #[arg(long, value_name = "NxN", value_parser = process_grid)]
+    pub(crate) process_grid: Option<ProcessGrid>,
 }

@@ -6,7 +6,8 @@ use clap::{Args, ValueEnum};
 
 use super::scheme::SchemeOptions;
 use super::statics::StaticOptions;
-use super::values::{cell_count, time, variation};
+use super::values::ProcessGrid;
+use super::values::{cell_count, process_grid, time, variation};
 
 #[derive(Args)]
 pub(crate) struct RunOptions {
@@ -34,6 +35,9 @@ pub(crate) struct RunOptions {
     /// Write checkpoints to this folder; after a kill, `mms resume DIR` continues from the last one
     #[arg(long, value_name = "DIR")]
     pub(crate) checkpoint: Option<PathBuf>,
+    /// Processes along each axis, such as 2x4, where mpirun starts several. Default: those whose fullest has the least to do
+    #[arg(long, value_name = "NxN", value_parser = process_grid)]
+    pub(crate) process_grid: Option<ProcessGrid>,
     /// Steps between checkpoints
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "checkpoint", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) every: u64,

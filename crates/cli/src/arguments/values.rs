@@ -33,6 +33,19 @@ pub(super) fn thread_count(text: &str) -> Result<usize, String> {
         .ok_or_else(|| "it must be a whole number from 1 to 1024".into())
 }
 
+/// Processes along each axis.
+#[derive(Clone, Debug)]
+pub(crate) struct ProcessGrid(pub(crate) Vec<usize>);
+
+pub(super) fn process_grid(text: &str) -> Result<ProcessGrid, String> {
+    let along_axes: Result<Vec<usize>, _> = text.split('x').map(positive_count).collect();
+    along_axes
+        .ok()
+        .filter(|along_axes| along_axes.len() <= 3)
+        .map(ProcessGrid)
+        .ok_or_else(|| "it must be numbers of processes along each axis, such as 2x4".into())
+}
+
 /// A number of cells of one run.
 pub(super) fn cell_count(text: &str) -> Result<usize, String> {
     positive_count(text).map_err(|error| match text.split(',').count() {

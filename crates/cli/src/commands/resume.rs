@@ -32,6 +32,8 @@ pub(crate) fn resume(options: &ResumeOptions) -> Result<bool> {
         format!("cannot enter {}, where the run was started", start.folder.display())
     })?;
     run.scheme.threads = options.threads.or(run.scheme.threads);
+    // Other processes go on than those that began.
+    run.process_grid.clone_from(&options.process_grid);
     match CheckpointFolder::reached(folder.path())? {
         Some(step) => terminal::note(format_args!("{given}: the run goes on after step {step}")),
         None => terminal::note(format_args!("{given}: no checkpoint yet, the run begins anew")),

@@ -154,7 +154,7 @@ fn simulate(
             checkpoints,
             history: moments.as_mut(),
             snapshot: picture.map(Picture::snapshot),
-            ranks: processes::ranks(),
+            ranks: processes::arranged(options.process_grid.as_ref())?,
             traffic: Some(&mut traffic),
             profile: profile.as_mut(),
             ..Outputs::new(show)

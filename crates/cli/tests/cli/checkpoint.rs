@@ -245,6 +245,8 @@ fn folders_that_cannot_be_gone_on_with_are_named() {
     let place = place.path();
     refuses(place, "resume nowhere", &["nowhere", "mms run --checkpoint nowhere writes"]);
     refuses(place, "run bar --every 3", &["--checkpoint"]);
+    refuses(place, "run bar --process-grid 2x3", &["one process runs", "mpirun -n 6"]);
+    refuses(place, "run bar --process-grid 2,3", &["--process-grid", "2x4"]);
     refuses(place, "run bars --checkpoint kept", &["did you mean 'bar'"]);
 
     let called = mms(place, "run bar --cells 8 --checkpoint kept --every 1");

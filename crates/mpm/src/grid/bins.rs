@@ -8,7 +8,6 @@
 //! Particles may drift for some steps before the next sort. The order of the last sort decides the order of all sums. It follows from the
 //! tile that each particle was in then, which belongs to the state of a run: a run that continues to the same bits restores it.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use mmsmith_particles::Division;
@@ -23,16 +22,18 @@ use crate::kernel::copies::BLOCK;
 use mmsmith_threads::disjoint::Partition;
 use mmsmith_threads::held::Held;
 use mmsmith_threads::lattice::TileLattice;
-use mmsmith_threads::windows::{Hooks, TileBuffers, TiledArray, sum_tiles};
+use mmsmith_threads::windows::{Hooks, TileBuffers, sum_tiles};
 
-/// Particles sorted by tile, within each tile by id, but for those that follow no whole block.
+/// Particles, or corners that they share, sorted by tile, within each tile by id, but for particles that follow no whole block.
 ///
 /// They are not sorted further: neighbours mostly have successive ids, their data then lie side by side in memory, and the
 /// kernels use whole blocks in place. Particles that are left between whole blocks come last in a tile.
 pub(crate) struct Bins<N, const D: usize> {
     tiles: Tiles<D>,
-    /// The tiles of the layers that this process holds.
+    /// The tiles that this process holds.
     lattice: TileLattice<D>,
+    /// For each tile of the whole grid its number here.
+    here: Vec<u32>,
     /// Their buffers, between passes.
     buffers: TileBuffers<N>,
     /// The processes that hold all of them, where those are several.
@@ -66,10 +67,11 @@ pub(crate) type UpdateAndAdd<'a, N, P, const D: usize> =
 impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
     /// Allocates for `particles` particles on the grid; `sort_as` has to follow.
     pub(crate) fn new(tiles: Tiles<D>, particles: usize) -> Self {
-        let held = Held::whole(tiles.layers());
+        let held = Held::whole(tiles.pieces());
         let mut own = Self {
             tiles,
-            lattice: tiles.lattice(&held),
+            lattice: tiles.lattice(held.clone()),
+            here: Vec::new(),
             buffers: TileBuffers::default(),
             ranks: None,
             order: Partition::new(0, 0),
@@ -85,33 +87,35 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
         &self.tiles
     }
 
-    /// Makes room for so many particles in the layers `held`; `sort_as` has to follow.
-    pub(crate) fn hold(&mut self, held: Held, particles: usize) {
-        if held != *self.lattice.held() {
-            self.lattice = self.tiles.lattice(&held);
+    /// The tiles that this process holds.
+    pub(crate) fn lattice(&self) -> &TileLattice<D> {
+        &self.lattice
+    }
+
+    /// Makes room for so many particles in the tiles `held`; `sort_as` has to follow.
+    pub(crate) fn hold(&mut self, held: Held<D>, particles: usize) {
+        if self.here.is_empty() || held != *self.lattice.held() {
+            self.lattice = self.tiles.lattice(held);
+            self.here.clear();
+            self.here.resize(self.tiles.count(), u32::MAX);
+            for tile in 0..self.lattice.count() {
+                let of_grid = self.tiles.number(&self.lattice.pieces(tile));
+                self.here[of_grid as usize] = tile as u32;
+            }
         }
         let tiles = self.lattice.count();
         self.counts.resize(tiles + 1, 0);
         self.order = Partition::new(particles, tiles);
     }
 
-    /// Shares the layers out among processes; [`hold`](Self::hold) has to follow.
+    /// Shares the tiles out among processes; [`hold`](Self::hold) has to follow.
     pub(crate) fn share_out(&mut self, ranks: Arc<dyn Ranks>) {
         self.ranks = beyond(ranks);
     }
 
-    /// The processes that hold all layers, where those are several.
+    /// The processes that hold all tiles, where those are several.
     pub(crate) fn ranks(&self) -> Option<Arc<dyn Ranks>> {
         self.ranks.as_deref().cloned()
-    }
-
-    /// The rows that other processes hold as well, at the lower and at the upper end of those here.
-    pub(crate) fn shared_rows(&self) -> [Option<Range<usize>>; 2] {
-        let of = |is_below: bool| {
-            let shared = self.lattice.held().shared().find(|shared| shared.is_below == is_below);
-            shared.map(|shared| self.lattice.segment(shared.segment))
-        };
-        [of(true), of(false)]
     }
 
     /// The result of the last sort: the tile of every particle.
@@ -130,41 +134,39 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
 
     /// How many threads the particles keep busy as they were at the last sort; none where other processes hold some of them.
     pub(crate) fn division(&self, layout: &Layout<D>) -> Option<Division> {
-        let tiles = self.tiles.layers() * self.tiles.in_a_layer();
         let of_tile = |tile| self.order.part(tile).map_or(0, <[u32]>::len);
-        let particles: Vec<usize> = (0..tiles).map(of_tile).collect();
+        let particles: Vec<usize> = (0..self.tiles.count()).map(of_tile).collect();
         self.ranks.is_none().then(|| division(&self.tiles, layout, &particles))
     }
 
-    /// The number of the first tile here.
-    fn first_tile(&self) -> usize {
-        self.lattice.held().layers.start * self.tiles.in_a_layer()
-    }
-
-    /// Sorts all particles by their tiles, of layers that are held here; `id(p)` is the number of particle p in the whole body, so that the order is
-    /// the same for any number of processes.
-    pub(crate) fn sort_as(&mut self, keys: Vec<u32>, id: &dyn Fn(usize) -> u64) {
-        self.keys = keys;
-        let first = self.first_tile();
-        self.counts.fill(0);
-        for &key in &self.keys {
-            self.counts[key as usize - first + 1] += 1;
+    /// Sorts all particles by their tiles, which are held here. Those that come in whole blocks come first in a tile, where `id(p)` is told, the
+    /// number of particle p in the whole body, so that the order is the same for any number of processes.
+    pub(crate) fn sort_as(&mut self, keys: Vec<u32>, id: Option<&dyn Fn(usize) -> u64>) {
+        let Self { here, counts, order, keys: known, .. } = self;
+        *known = keys;
+        let keys = &*known;
+        let here = |key: u32| here[key as usize] as usize;
+        counts.fill(0);
+        for &key in keys {
+            counts[here(key) + 1] += 1;
         }
-        for tile in 1..self.counts.len() {
-            self.counts[tile] += self.counts[tile - 1];
+        for tile in 1..counts.len() {
+            counts[tile] += counts[tile - 1];
         }
-        let (order, starts) = self.order.arrange();
-        for (start, first) in starts.iter_mut().zip(&self.counts) {
+        let (order, starts) = order.arrange();
+        for (start, first) in starts.iter_mut().zip(&*counts) {
             *start = *first as usize;
         }
-        for (p, &key) in self.keys.iter().enumerate() {
-            let place = &mut self.counts[key as usize - first];
+        for (p, &key) in keys.iter().enumerate() {
+            let place = &mut counts[here(key)];
             order[*place as usize] = p as u32;
             *place += 1;
         }
-        let mut others = Vec::new();
-        for tile in starts.windows(2) {
-            whole_blocks_first(&mut order[tile[0]..tile[1]], &mut others, id);
+        if let Some(id) = id {
+            let mut others = Vec::new();
+            for tile in starts.windows(2) {
+                whole_blocks_first(&mut order[tile[0]..tile[1]], &mut others, id);
+            }
         }
     }
 
@@ -199,8 +201,8 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
         divide: impl FnOnce(&'a mut Partition) -> P,
         add: &UpdateAndAdd<'_, N, P, D>,
     ) {
-        let first_tile = self.first_tile();
-        let Self { order, lattice, buffers, .. } = self;
+        let Self { tiles, order, lattice, buffers, .. } = self;
+        debug_assert_eq!(layout.held, *lattice.region());
         let has_particles: Vec<bool> =
             (0..lattice.count()).map(|part| order.part(part) != Some(&[])).collect();
         let divided = divide(order);
@@ -213,11 +215,10 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
                 }
                 before += window[a].start * strides[a];
             }
-            let (tile, nodes_before) = ((first_tile + part) as u32, before as f64);
+            let (tile, nodes_before) = (tiles.number(&lattice.pieces(part)), before as f64);
             add(Window { nodes, tile, strides, nodes_before }, &divided, part);
         };
-        let array = TiledArray { elements, strides: layout.strides, first_row: layout.first_row };
-        sum_tiles(array, lattice, buffers, &has_particles, &fill, hooks);
+        sum_tiles(elements, lattice, buffers, &has_particles, &fill, hooks);
     }
 }
 
@@ -271,10 +272,10 @@ mod tests {
             let edges = edges(cells);
             let (_, mut bins) = bins(cells, edges.len());
             assert!(edges.is_empty() || !bins.order.is_whole());
-            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), &|p| p as u64);
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), Some(&|p| p as u64));
             assert!(bins.order.is_whole());
             let mut met = vec![0; edges.len()];
-            let count = bins.tiles.layers() * bins.tiles.in_a_layer();
+            let count = bins.tiles.count();
             for tile in 0..count {
                 let particles = bins.order.part(tile).unwrap();
                 assert!(particles.is_sorted());
@@ -298,7 +299,7 @@ mod tests {
         fn check<const D: usize>(cells: [usize; D]) {
             let edges = edges(cells);
             let (layout, mut bins) = bins(cells, edges.len());
-            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), &|p| p as u64);
+            bins.sort_as(bins.keys_of(edges.len(), &|p| edges[p]), Some(&|p| p as u64));
             let row = layout.row();
             let hooks = Hooks {
                 before: &|nodes: &mut [i64]| nodes.fill(0),

@@ -23,7 +23,7 @@ pub fn division_of_lattice<const D: usize>(
 ) -> Option<Division> {
     let layout = Layout::new(grid, size_of::<[f64; 8]>()).ok()?;
     let tiles = Tiles::new(&layout, &grid.cells, EXTENDED);
-    let count = tiles.layers() * tiles.in_a_layer();
+    let count = tiles.count();
     if count > MOST_TILES {
         return None;
     }
@@ -47,9 +47,8 @@ pub(crate) fn division<const D: usize>(
     layout: &Layout<D>,
     particles: &[usize],
 ) -> Division {
-    let held = Held::whole(tiles.layers());
     let row = layout.row() as f64;
-    let lattice = tiles.lattice(&held);
+    let lattice = tiles.lattice(Held::whole(tiles.pieces()));
     let fill = |tile: usize| particles[tile] as f64;
     let add = |tile: usize| {
         let sums = if particles[tile] > 0 { lattice.elements(tile) } else { 0 };

@@ -25,7 +25,7 @@ use crate::grid::bins::{AddToWindow, Bins};
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeUpdate};
 use crate::grid::node::Node;
-use crate::grid::rows_around::RowsAround;
+use crate::grid::nodes_around::NodesAround;
 use crate::grid::{Layout, PAD_BELOW};
 use mmsmith_threads::each_chunk;
 
@@ -49,8 +49,8 @@ pub(crate) struct Extension<T, const D: usize> {
     is_of_half_plane: bool,
     light: Vec<Light>,
     inner: Vec<Inner<T>>,
-    /// Rows of other processes that light nodes here may continue, or have in common with light nodes there.
-    around: RowsAround<T, D>,
+    /// Nodes of other processes that light nodes here may continue, or have in common with light nodes there.
+    around: NodesAround<T, D>,
 }
 
 /// A light node.
@@ -72,7 +72,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
     /// For cells of the mass `of_cell`; in the half plane of a body of revolution of that mass times their radius.
     pub(crate) fn new(of_cell: T, is_of_half_plane: bool) -> Self {
         let least_mass = of_cell * real(LIGHT);
-        let (light, inner, around) = (Vec::new(), Vec::new(), RowsAround::default());
+        let (light, inner, around) = (Vec::new(), Vec::new(), NodesAround::default());
         Self { least_mass, is_of_half_plane, light, inner, around }
     }
 
@@ -86,19 +86,19 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
     ) {
         grid.sums().p2g(bins, nodes, add);
         let mut around = std::mem::take(&mut self.around);
-        around.with((grid.c, grid.layout), bins, nodes, |first_row, nodes| {
-            self.update(grid, first_row, nodes);
+        around.with((grid.c, grid.layout), bins, nodes, |layout, nodes| {
+            self.update(&GridUpdate::new(layout, grid.c, grid.update), nodes);
         });
         self.around = around;
     }
 
-    /// Updates nodes that have all sums, from row `first_row` of the grid on.
+    /// Updates nodes that have all sums.
     fn update<S: NodeUpdate<T, D>>(
         &mut self,
         grid: &GridUpdate<'_, T, S, D>,
-        first_row: usize,
         nodes: &mut [Node<T, D>],
     ) {
+        let first_row = grid.layout.first_row();
         if grid.update.brings_mass() {
             self.find(grid.c, grid.layout, nodes);
         }
@@ -131,7 +131,8 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
             false => *least_mass,
             // The function of a node on the axis has the mass of a cell with a sixth of the spacing as its radius.
             true => {
-                let line = (node % layout.dims[0]) as f64 - PAD_BELOW as f64;
+                let Range { start, end } = layout.held.0[0];
+                let line = (start + node % (end - start)) as f64 - PAD_BELOW as f64;
                 let radius = c.lower[0] + c.spacing() * real(line);
                 *least_mass * radius.abs().max(c.spacing() * real(1.0 / 6.0))
             }
@@ -148,8 +149,7 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
                 numbered.filter(|(number, node)| is_light(*number, node)).map(|(number, _)| number)
             })
             .collect();
-        let mut dims = layout.dims;
-        dims[D - 1] = nodes.len() / layout.row();
+        let dims = layout.held.0.each_ref().map(ExactSizeIterator::len);
         light.clear();
         inner.clear();
         for node in found {

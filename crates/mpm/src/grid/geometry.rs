@@ -48,7 +48,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             walls: grid.walls,
             inverse_spacing: grid.spacing.recip(),
             strides: layout.strides,
-            nodes_before: (layout.first_row * layout.row()) as f64,
+            nodes_before: layout.nodes_before() as f64,
             tiles: *tiles,
             time_step,
             sent: 2 * D + 1,

@@ -19,7 +19,6 @@ use crate::grid::node::{Components, Node};
 use crate::scheme::{Transfer, VelocityUpdate};
 use mmsmith_threads::disjoint::Partition;
 use mmsmith_threads::each_chunk;
-use mmsmith_threads::held::Shared;
 use mmsmith_threads::windows::{Halo, Hooks};
 
 /// How the grid is updated after P2G.
@@ -314,16 +313,11 @@ where
             self.finish(nodes);
             return;
         };
-        let neighbour = |shared: Shared| match shared.is_below {
-            true => ranks.rank() - 1,
-            false => ranks.rank() + 1,
-        };
         let sent = self.c.sent;
-        let send = |shared, nodes: &[_]| send_nodes(ranks, neighbour(shared), sent, nodes);
-        let receive =
-            |shared, nodes: &mut [_]| receive_nodes(ranks, neighbour(shared), sent, nodes);
+        let send = |to, lines: &[&[_]]| send_nodes(ranks, to, sent, lines);
+        let receive = |from, lines: &mut [&mut [_]]| receive_nodes(ranks, from, sent, lines);
         let finish = |nodes: &mut [_]| self.finish(nodes);
-        let has_arrived = |shared| ranks.has_arrived(neighbour(shared));
+        let has_arrived = |from| ranks.has_arrived(from);
         // Rows of an edge are updated with all of it.
         let is_updated = |rows: Range<usize>| {
             let is_apart = |edge: &Edge| rows.end <= edge.rows.start || edge.rows.end <= rows.start;
@@ -345,7 +339,7 @@ where
         let Self { layout, edges, .. } = self;
         layout.fold_rows(nodes, &|image, ghost, flip| self.fold(image, ghost, flip));
         let rows = first / layout.row()..(first + nodes.len()) / layout.row();
-        let rows = layout.first_row + rows.start..layout.first_row + rows.end;
+        let rows = layout.first_row() + rows.start..layout.first_row() + rows.end;
         let [low, high] = edges;
         let mut to_update = rows.clone();
         if !low.is_within(&rows) {
@@ -436,15 +430,18 @@ impl<T: Lanes, const D: usize> Loop for AddLine<'_, T, D> {
     }
 }
 
-/// Sends the first `sent` numbers of nodes to a process.
+/// Sends the first `sent` numbers of nodes to a process, line by line.
 pub(crate) fn send_nodes<T: RealField + Pod, const D: usize>(
     ranks: &dyn Ranks,
     to: usize,
     sent: usize,
-    nodes: &[Node<T, D>],
+    lines: &[&[Node<T, D>]],
 ) {
-    let mut numbers = Vec::with_capacity(nodes.len() * sent);
-    nodes.iter().for_each(|node| numbers.extend_from_slice(&node.values[..sent]));
+    let count: usize = lines.iter().map(|line| line.len()).sum();
+    let mut numbers = Vec::with_capacity(count * sent);
+    for node in lines.iter().copied().flatten() {
+        numbers.extend_from_slice(&node.values[..sent]);
+    }
     ranks.send(to, cast_slice(&numbers));
 }
 
@@ -453,11 +450,13 @@ pub(crate) fn receive_nodes<T: RealField + Pod, const D: usize>(
     ranks: &dyn Ranks,
     from: usize,
     sent: usize,
-    nodes: &mut [Node<T, D>],
+    lines: &mut [&mut [Node<T, D>]],
 ) {
-    let mut numbers = vec![T::zero(); nodes.len() * sent];
+    let count: usize = lines.iter().map(|line| line.len()).sum();
+    let mut numbers = vec![T::zero(); count * sent];
     ranks.receive(from, cast_slice_mut(&mut numbers));
-    for (node, numbers) in nodes.iter_mut().zip(numbers.chunks(sent)) {
+    let nodes = lines.iter_mut().flat_map(|line| line.iter_mut());
+    for (node, numbers) in nodes.zip(numbers.chunks(sent)) {
         *node = Node::zero();
         node.values[..sent].copy_from_slice(numbers);
     }

@@ -6,7 +6,7 @@ pub(crate) mod extension;
 pub(crate) mod geometry;
 pub(crate) mod grid_update;
 pub(crate) mod node;
-pub(crate) mod rows_around;
+pub(crate) mod nodes_around;
 pub(crate) mod state;
 pub(crate) mod tiles;
 pub(crate) mod volume_rates;
@@ -15,6 +15,7 @@ use std::ops::Range;
 
 use mmsmith_particles::{Grid, SetupError};
 use mmsmith_threads::each;
+use mmsmith_threads::region::Region;
 
 use crate::grid::node::Components;
 
@@ -62,18 +63,19 @@ struct Ghost {
     flip: Components,
 }
 
-/// Layout of the nodes in memory: node `(i, j, k)` is at `i strides[0] + j strides[1] + k strides[2]`, axis 0 fastest, with padding
-/// on all sides.
+/// Layout of the nodes in memory, axis 0 fastest, with padding on all sides: a process holds those of a region, in which node `(i, j, k)` from its first
+/// one on is at `i strides[0] + j strides[1] + k strides[2]`.
 ///
 /// Operations on ghost nodes come in two parts: within rows, and from row to row for walls across the last axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout<const D: usize> {
+    /// Layers of nodes of the whole grid along each axis.
     pub(crate) dims: [usize; D],
+    /// The layers of nodes along each axis that this process holds: all, or some successive ones.
+    pub(crate) held: Region<D>,
     pub(crate) strides: [usize; D],
-    /// Number of nodes that this process holds: all, or those of some successive rows.
+    /// Number of nodes that it holds.
     pub(crate) nodes: usize,
-    /// The first row that it holds.
-    pub(crate) first_row: usize,
     ghosts: Vec<Ghost>,
     walls: Vec<WallLayer>,
 }
@@ -97,9 +99,9 @@ impl<const D: usize> Layout<D> {
         };
         let mut layout = Self {
             dims: [0; D],
+            held: Region(std::array::from_fn(|_| 0..0)),
             strides: [0; D],
             nodes: 1,
-            first_row: 0,
             ghosts: vec![],
             walls: vec![],
         };
@@ -116,7 +118,6 @@ impl<const D: usize> Layout<D> {
                 return Err(too_large());
             }
             layout.dims[axis] = dim;
-            layout.strides[axis] = layout.nodes;
             layout.nodes = layout.nodes.checked_mul(dim).ok_or_else(too_large)?;
             let (first, last) = (PAD_BELOW, PAD_BELOW + cells);
             let [lower, upper] = grid.walls[axis];
@@ -150,21 +151,33 @@ impl<const D: usize> Layout<D> {
         if addressable != Some(true) || layout.nodes > usize::MAX / (2 * tiles::LAYER_OF_NODES) {
             return Err(too_large());
         }
+        layout.hold(Region(layout.dims.map(|dim| 0..dim)));
         Ok(layout)
     }
 
-    /// Holds some rows alone.
-    pub(crate) fn hold(&mut self, rows: Range<usize>) {
-        self.first_row = rows.start;
-        self.nodes = rows.len() * self.row();
+    /// Holds the nodes of a region alone.
+    pub(crate) fn hold(&mut self, held: Region<D>) {
+        self.strides = held.strides();
+        self.nodes = held.len();
+        self.held = held;
     }
 
     /// The rows that this process holds.
     pub(crate) fn rows(&self) -> Range<usize> {
-        self.first_row..self.first_row + self.nodes / self.row().max(1)
+        self.held.0[D - 1].clone()
     }
 
-    /// Nodes in a row: all that share an index along the last axis.
+    /// The first row that it holds.
+    pub(crate) fn first_row(&self) -> usize {
+        self.rows().start
+    }
+
+    /// Where the first node of the grid would be, counted backwards from the first one here.
+    pub(crate) fn nodes_before(&self) -> usize {
+        (0..D).map(|a| self.held.0[a].start * self.strides[a]).sum()
+    }
+
+    /// Nodes in a row: all here that share an index along the last axis.
     pub(crate) fn row(&self) -> usize {
         self.strides[D - 1]
     }
@@ -179,10 +192,14 @@ impl<const D: usize> Layout<D> {
         self.ghosts.iter().filter(|ghost| ghost.axis == D - 1).count()
     }
 
-    /// Calls `visit` with the index of every node in a layer across an axis, of `nodes` nodes from the beginning of a row on.
+    /// Calls `visit` with the index of every node here in a layer across an axis, of `nodes` nodes from the beginning of a row on.
     fn for_layer(&self, nodes: usize, (axis, layer): (usize, usize), mut visit: impl FnMut(usize)) {
-        let (stride, slab) = (self.strides[axis], self.strides[axis] * self.dims[axis]);
-        for start in (layer * stride..nodes).step_by(slab) {
+        let held = &self.held.0[axis];
+        if !held.contains(&layer) {
+            return;
+        }
+        let (stride, slab) = (self.strides[axis], self.strides[axis] * held.len());
+        for start in ((layer - held.start) * stride..nodes).step_by(slab) {
             (start..start + stride).for_each(&mut visit);
         }
     }
@@ -258,10 +275,12 @@ impl<const D: usize> Layout<D> {
     /// beginning of a row on; the components `flip` change their signs.
     #[inline(always)]
     fn for_ghosts_in_rows(&self, nodes: usize, mut visit: impl FnMut(usize, usize, Components)) {
-        for g in self.ghosts.iter().filter(|g| g.axis < D - 1) {
+        // Images that are not here belong to ghosts that other processes complete.
+        let are_in_rows = |g: &&Ghost| g.axis < D - 1 && self.held.0[g.axis].contains(&g.image);
+        for g in self.ghosts.iter().filter(are_in_rows) {
             let (ghost, image) = (g.layer * self.strides[g.axis], g.image * self.strides[g.axis]);
             self.for_layer(nodes, (g.axis, g.layer), |index| {
-                visit(index, index - ghost + image, g.flip);
+                visit(index, index + image - ghost, g.flip);
             });
         }
     }

@@ -1,7 +1,5 @@
 //! The grid of a running simulation: its nodes, and the particles above them sorted by tile.
 
-use std::ops::Range;
-
 use mmsmith_lanes::simd::Lanes;
 use mmsmith_threads::held::Held;
 use nalgebra::SVector;
@@ -36,17 +34,17 @@ pub(crate) struct GridState<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> GridState<T, D> {
-    /// Makes room for the layers of tiles `own`, with so many particles or corners, and for the rows that those reach.
-    pub(crate) fn hold(&mut self, own: Range<usize>, points: usize) {
+    /// Makes room for the tiles `held`, with so many particles or corners, and for the nodes that those reach.
+    pub(crate) fn hold(&mut self, held: Held<D>, points: usize) {
         let Self { constants, layout, bins, .. } = self;
-        let held = Held { layers: own, all: bins.tiles().layers() };
-        let rows: Range<usize> = bins.tiles().rows_of(&held);
         bins.hold(held, points);
-        if rows == layout.rows() {
+        let region = bins.lattice().region();
+        if *region == layout.held {
             return;
         }
-        layout.hold(rows);
-        constants.nodes_before = (layout.first_row * layout.row()) as f64;
+        layout.hold(region.clone());
+        constants.strides = layout.strides;
+        constants.nodes_before = layout.nodes_before() as f64;
         let resize = |nodes: &mut Vec<Node<T, D>>| {
             if !nodes.is_empty() {
                 *nodes = vec![Node::zero(); layout.nodes];

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mmsmith_threads::held::Held;
-use mmsmith_threads::lattice::{Elements, TileLattice};
+use mmsmith_threads::lattice::TileLattice;
 
 use crate::grid::{Layout, NODES_AT_ONCE, PAD_BELOW};
 
@@ -105,7 +105,6 @@ impl Pieces {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiles<const D: usize> {
     axes: [Pieces; D],
-    elements: Elements,
 }
 
 impl<const D: usize> Tiles<D> {
@@ -119,22 +118,12 @@ impl<const D: usize> Tiles<D> {
             let count = (cells[a] / least).max(1);
             Pieces { count, cells: cells[a], nodes: layout.dims[a], reach }
         });
-        Self { axes, elements: Elements { row: layout.row(), at_once: NODES_AT_ONCE } }
+        Self { axes }
     }
 
     /// Their cuts along the first axis and the last.
     pub(crate) fn half_plane(&self) -> Tiles<2> {
-        Tiles { axes: [self.axes[0], self.axes[D - 1]], elements: self.elements }
-    }
-
-    /// Number of layers.
-    pub(crate) fn layers(&self) -> usize {
-        self.axes[D - 1].count
-    }
-
-    /// Number of tiles in a layer.
-    pub(crate) fn in_a_layer(&self) -> usize {
-        self.axes[..D - 1].iter().map(|pieces| pieces.count).product()
+        Tiles { axes: [self.axes[0], self.axes[D - 1]] }
     }
 
     /// How many of the particles of a lattice each piece of each axis has, with so many along an axis of a cell.
@@ -147,23 +136,71 @@ impl<const D: usize> Tiles<D> {
         })
     }
 
+    /// Nodes that a process in the middle sends in a pass, about, where so many share each axis evenly.
+    pub(crate) fn sent(&self, along_axes: &[usize; D]) -> f64 {
+        let share = |a: usize| self.axes[a].nodes as f64 / along_axes[a] as f64;
+        let across = |axis: usize| (0..D).filter(|a| *a != axis).map(share).product::<f64>();
+        let deep = |axis: usize| match axis + 1 < D {
+            false => 2.0 * LAYER as f64,
+            // Windows of layers cover each row twice, and the nodes of the nearest tile go back.
+            true => {
+                let all: usize = self.overlaps(axis).sum();
+                (2 * all + self.overlaps(axis).next().unwrap_or(0)) as f64
+            }
+        };
+        let sides = |axis: usize| (along_axes[axis] - 1).min(2) as f64;
+        (0..D).map(|a| sides(a) * deep(a) * across(a)).sum()
+    }
+
     /// The tile of a particle at a sort, by the lower edges of its box along all axes, in cells.
     pub(crate) fn tile_of(&self, edges: &[f64; D]) -> u32 {
-        let tile = (0..D).rev().fold(0, |tile, a| {
-            let pieces = self.axes[a];
-            tile * pieces.count + pieces.of(edges[a])
-        });
-        tile as u32
+        self.number(&std::array::from_fn(|a| self.axes[a].of(edges[a])))
+    }
+
+    /// Number of tiles.
+    pub(crate) fn count(&self) -> usize {
+        self.axes.iter().map(|pieces| pieces.count).product()
     }
 
     /// Whether the grid has this tile.
     pub(crate) fn has(&self, tile: u32) -> bool {
-        self.layer_of(tile) < self.layers()
+        (tile as usize) < self.count()
     }
 
-    /// The layer of a tile.
-    pub(crate) fn layer_of(&self, tile: u32) -> usize {
-        tile as usize / self.in_a_layer()
+    /// Number of pieces along each axis.
+    pub(crate) fn pieces(&self) -> [usize; D] {
+        self.axes.map(|pieces| pieces.count)
+    }
+
+    /// The pieces of a tile along each axis.
+    #[inline(always)]
+    pub(crate) fn pieces_of(&self, tile: u32) -> [usize; D] {
+        let mut rest = tile as usize;
+        std::array::from_fn(|a| {
+            let count = if a + 1 < D { self.axes[a].count } else { usize::MAX };
+            let piece = rest % count;
+            rest /= count;
+            piece
+        })
+    }
+
+    /// The tile of pieces along each axis.
+    pub(crate) fn number(&self, pieces: &[usize; D]) -> u32 {
+        (0..D).rev().fold(0, |tile, a| tile * self.axes[a].count + pieces[a]) as u32
+    }
+
+    /// The fewest pieces along an axis that a process holds among others: eight cells, so that it has all nodes that updates of its neighbours ask for.
+    pub(crate) fn least_held(&self, axis: usize) -> usize {
+        let Pieces { count, cells, .. } = self.axes[axis];
+        let is_enough = |held: &usize| held * cells >= LAYER * count;
+        if axis + 1 < D { (1..count).find(is_enough).unwrap_or(count) } else { 1 }
+    }
+
+    /// How many nodes the window of the first piece along an axis has in common with each of the next.
+    fn overlaps(&self, axis: usize) -> impl Iterator<Item = usize> {
+        let pieces = self.axes[axis];
+        let end = pieces.window(0).end;
+        (1..pieces.count).map_while(move |next| end.checked_sub(pieces.first(next)))
     }
 
     /// The first row of nodes of a layer, or their number for the one after the last.
@@ -172,29 +209,18 @@ impl<const D: usize> Tiles<D> {
         if layer < layers.count { layers.first(layer) } else { layers.nodes }
     }
 
-    /// The rows that the windows of these layers cover.
-    pub(crate) fn rows_of(&self, held: &Held) -> Range<usize> {
-        let Range { start, end } = held.segments();
-        self.first_row(start)..self.first_row(end)
-    }
-
     /// For each axis the lower edges of stencils of `width` nodes, in cells from the lower corner of the grid, that lie in the window of a
     /// tile: from the first value on and below the second.
     #[inline(always)]
     pub(crate) fn range(&self, tile: u32, width: usize) -> [(f64, f64); D] {
-        let mut rest = tile as usize;
-        std::array::from_fn(|a| {
-            let pieces = self.axes[a];
-            let piece = if a + 1 < D { rest % pieces.count } else { rest };
-            rest /= pieces.count;
-            pieces.range(piece, width)
-        })
+        let pieces = self.pieces_of(tile);
+        std::array::from_fn(|a| self.axes[a].range(pieces[a], width))
     }
 
-    /// The windows of the tiles of the layers `held`.
-    pub(crate) fn lattice(&self, held: &Held) -> TileLattice<D> {
+    /// The windows of the tiles `held`.
+    pub(crate) fn lattice(&self, held: Held<D>) -> TileLattice<D> {
         let windows = |pieces: &Pieces| (0..pieces.count).map(|p| pieces.window(p)).collect();
-        TileLattice::new(self.axes.each_ref().map(windows), held.clone(), self.elements)
+        TileLattice::new(self.axes.each_ref().map(windows), held, NODES_AT_ONCE)
     }
 }
 
@@ -220,7 +246,7 @@ mod tests {
         at: &[f64],
     ) -> Result<(), TestCaseError> {
         let (layout, tiles) = tiles(cells, EXTENDED);
-        let lattice = tiles.lattice(&Held::whole(tiles.layers()));
+        let lattice = tiles.lattice(Held::whole(tiles.pieces()));
         let edges: [f64; D] = std::array::from_fn(|a| at[a] * (cells[a] as f64 + 2.0) - 2.0);
         let tile = tiles.tile_of(&edges);
         prop_assert!(tiles.has(tile));

@@ -1,7 +1,7 @@
 //! The state of a simulation between two steps, as bytes, and simulations that go on from it.
 //!
 //! A process saves the particles that it holds. Any number of processes goes on with them: first each particle goes to a process that
-//! follows from its number, where its state is put in place, then to the process of the layer that it was sorted into before the state was
+//! follows from its number, where its state is put in place, then to the process of the tile that it was sorted into before the state was
 //! saved. The order of all sums is that of the last sort, so the bits of what follows are those of a run that was never saved.
 
 use std::slice;

@@ -121,6 +121,10 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
                 outcome = outcome.merge(found);
                 continue;
             }
+            if ids.len() < BLOCK {
+                // Kernels look at whole blocks: beyond the last particle these are at rest, whatever was copied before.
+                copies = None;
+            }
             let copies = copies.get_or_insert_with(|| MovingColumns::at_rest(BLOCK, &self.shares));
             particles.gather(place, ids.len(), copies);
             let block = copies.first(BLOCK, &self.shares);

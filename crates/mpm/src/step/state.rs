@@ -33,7 +33,7 @@ pub(crate) struct State<T, const D: usize> {
     /// The grid, with the particles sorted by tile.
     pub(crate) grid: GridState<T, D>,
     /// Where other processes hold the rest of the body: this one's part.
-    pub(crate) part: Option<Beyond<LocalBody>>,
+    pub(crate) part: Option<Beyond<LocalBody<D>>>,
     /// Particles after the early part of a step.
     pub(crate) early: EarlyState<T, D>,
     /// Buffers for blocks of particles.

@@ -2,14 +2,17 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mmsmith_mpm::{
     Body, Grid, Integrator, Settings, Shape, Share, Simulation, StepError, Transfer,
 };
-use mmsmith_ranks::{Failed, Schedule, simulated};
+use mmsmith_ranks::{Failed, Ranks, Schedule, arranged, simulated};
 
-use crate::ranks::{Of, body, fly, flying, grid, law, polygon_settings, polygons, share};
+use crate::ranks::{
+    Of, body, fly, flying, grid, law, polygon_settings, polygons, share, wide, widened,
+};
 use crate::schemes;
 
 /// A simulation, and its end with one process.
@@ -18,6 +21,8 @@ struct Problem {
     body: Body<f64, 2>,
     settings: Settings<f64>,
     steps: usize,
+    /// Whether the grid can be cut into three parts along axis 0.
+    is_wide: bool,
     expected: Vec<Of<2>>,
     error: Option<StepError>,
 }
@@ -30,19 +35,26 @@ impl Problem {
     ) -> Self {
         let mut alone = Simulation::new(grid.clone(), body.clone(), law(), settings).unwrap();
         let (expected, error, _) = fly(&mut alone, steps);
-        Self { grid, body, settings, steps, expected, error }
+        let is_wide = grid.cells[0] >= 3 * 64;
+        Self { grid, body, settings, steps, is_wide, expected, error }
+    }
+
+    /// The processes, along both axes where the grid is wide.
+    fn arranged(&self, ranks: Arc<dyn Ranks>) -> Arc<dyn Ranks> {
+        match ranks.count() {
+            3 if self.is_wide => arranged(ranks, vec![3, 1]),
+            count if self.is_wide && count % 2 == 0 => arranged(ranks, vec![2, count / 2]),
+            _ => ranks,
+        }
     }
 
     /// The particles and the error of one of several processes.
-    fn part(
-        &self,
-        ranks: std::sync::Arc<dyn mmsmith_ranks::Ranks>,
-    ) -> (Vec<Of<2>>, Option<StepError>) {
+    fn part(&self, ranks: Arc<dyn Ranks>) -> (Vec<Of<2>>, Option<StepError>) {
         // One thread, so that a schedule has one course.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         pool.install(|| {
             let (body, ids) = share(&self.body, &*ranks);
-            let share = Share { ranks, ids };
+            let share = Share { ranks: self.arranged(ranks), ids };
             let mut part =
                 Simulation::shared_out(self.grid.clone(), body, share, law(), self.settings)
                     .unwrap();
@@ -58,7 +70,7 @@ fn problems() -> Vec<Problem> {
         let body = body::<2>(30.0, settings.transfer == Transfer::Flip);
         Problem::new((grid(), body), settings, 9)
     });
-    let polygons = polygon_settings()
+    let flying_polygons = polygon_settings()
         .step_by(4)
         .map(|settings| Problem::new(polygons::<2>(50.0), settings, 8));
     let fails = Settings {
@@ -68,7 +80,14 @@ fn problems() -> Vec<Problem> {
     };
     let fails = Problem::new((grid(), body::<2>(2.0, true)), fails, 40);
     assert!(fails.error.is_some());
-    schemes.chain(polygons).chain([fails]).collect()
+    let side_by_side = schemes::schemes()
+        .map(flying)
+        .step_by(23)
+        .map(|settings| Problem::new(wide(settings.transfer == Transfer::Flip), settings, 9));
+    let around = polygon_settings()
+        .step_by(13)
+        .map(|settings| Problem::new(widened(polygons::<2>(50.0), &[84]), settings, 8));
+    schemes.chain(flying_polygons).chain([fails]).chain(side_by_side).chain(around).collect()
 }
 
 /// As many numbers as the variable of the environment says, in `.ci/long`, or else `few`.

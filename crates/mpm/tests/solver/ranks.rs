@@ -7,7 +7,7 @@ use mmsmith_mpm::{
     Body, BodyForce, Grid, Integrator, Interpolation, Law, Load, Material, SavedState,
     SavedStateError, Scalar, Settings, SetupError, Shape, Share, Simulation, StepError, Transfer,
 };
-use mmsmith_ranks::{Ranks, counted, in_process};
+use mmsmith_ranks::{Ranks, arranged, counted, in_process};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -149,18 +149,35 @@ fn agrees_on<const D: usize>(
 ) where
     f64: Scalar<D>,
 {
+    let processes: Vec<_> = counts.iter().map(|&count| (count, None)).collect();
+    agrees_in((grid, whole, law), settings, &processes, steps);
+}
+
+/// With so many processes each time, and so many of them along each axis where that is told.
+fn agrees_in<const D: usize>(
+    (grid, whole, law): (&Grid<f64, D>, &Body<f64, D>, Law<f64, D>),
+    settings: Settings<f64>,
+    processes: &[(usize, Option<[usize; D]>)],
+    steps: usize,
+) where
+    f64: Scalar<D>,
+{
     let set_up = || Simulation::new(grid.clone(), whole.clone(), law.clone(), settings).unwrap();
     let (expected, error, _) = fly(&mut set_up(), steps);
     assert_ne!(expected, state(&mut set_up()));
-    for &count in counts {
+    for &(count, along_axes) in processes {
         let found = in_process(count, |ranks| {
             let (body, ids) = share(whole, &*ranks);
+            let ranks = match along_axes {
+                Some(along_axes) => arranged(ranks, along_axes.to_vec()),
+                None => ranks,
+            };
             let share = Share { ranks, ids };
             let mut part =
                 Simulation::shared_out(grid.clone(), body, share, law.clone(), settings).unwrap();
             fly(&mut part, steps)
         });
-        let what = format!("{count} processes, {steps} steps, {settings:?}");
+        let what = format!("{count} processes {along_axes:?}, {steps} steps, {settings:?}");
         let sorted = found[0].2;
         // Cuts or particles have moved on the way.
         assert!(error.is_some() || sorted > 1, "{what}: sorted {sorted} times");
@@ -174,6 +191,122 @@ fn agrees_on<const D: usize>(
         // As text: what is not a number equals itself.
         let other = all.iter().zip(&expected).find(|(a, b)| format!("{a:?}") != format!("{b:?}"));
         assert_eq!(other, None, "{what}, {error:?}, sorted {sorted} times");
+    }
+}
+
+/// A grid that can be cut along all axes, with a body from the walls at its foot and its left side across the first cut along each; it flies away from
+/// these walls.
+pub(crate) fn wide<const D: usize>(is_uniform: bool) -> (Grid<f64, D>, Body<f64, D>)
+where
+    f64: Scalar<D>,
+{
+    let mut grid = grid::<D>();
+    let (cells, body): (&[usize], &[usize]) = match D {
+        2 => (&[200, 48], &[75, 20]),
+        _ => (&[260, 17, 40], &[5, 5, 12]),
+    };
+    grid.cells.copy_from_slice(cells);
+    let at = |X: &SVector<f64, D>, a: usize| (X[a] - grid.lower[a]) / grid.spacing;
+    // In space about the edges where four processes meet.
+    let centre = |a: usize| if D == 3 && a < 2 { [130.0, 8.5][a] } else { 0.0 };
+    let inside =
+        |X: &SVector<f64, D>| (0..D).all(|a| (at(X, a) - centre(a)).abs() < body[a] as f64);
+    let mut body = Body::lattice(&grid, 2, 2.0, inside);
+    let p = &mut body.particles;
+    for k in 0..p.len() {
+        p.v[k] = SVector::from_fn(|a, _| 12.0 + 0.5 * noise(7 * k + a));
+        p.F[k] += SMatrix::from_fn(|i, j| 0.05 * noise(11 * k + 3 * i + j));
+        if !is_uniform {
+            p.mass[k] *= 1.0 + 0.1 * noise(k);
+        }
+    }
+    (grid, body)
+}
+
+/// A body in a grid that has so many more cells on both sides along each axis.
+pub(crate) fn widened<const D: usize>(
+    (mut grid, body): (Grid<f64, D>, Body<f64, D>),
+    more: &[usize],
+) -> (Grid<f64, D>, Body<f64, D>) {
+    for (a, &more) in more.iter().enumerate() {
+        grid.cells[a] += 2 * more;
+        grid.lower[a] -= more as f64 * grid.spacing;
+    }
+    (grid, body)
+}
+
+/// Processes along each axis, and their number.
+fn along<const D: usize>(along_axes: [usize; D]) -> (usize, Option<[usize; D]>) {
+    (along_axes.iter().product(), Some(along_axes))
+}
+
+#[test]
+fn processes_along_several_axes_have_the_bits_of_one() {
+    along_several_axes(4);
+}
+
+#[test]
+#[ignore = "two minutes: .ci/long runs it"]
+fn so_it_is_in_every_scheme() {
+    along_several_axes(1);
+}
+
+/// Every `step`-th scheme, in space every sixth of these.
+fn along_several_axes(step: usize) {
+    let in_the_plane = [[2, 1], [2, 2], [3, 1], [2, 3], [3, 2], [2, 4]];
+    let in_space = [[2, 2, 2], [1, 2, 2], [2, 1, 3], [1, 2, 3], [2, 2, 1]];
+    for (n, settings) in schemes::schemes().map(flying).skip(step - 1).step_by(step).enumerate() {
+        let is_uniform = settings.transfer == Transfer::Flip;
+        let law = || if n % 4 == 1 { projected() } else { law().into() };
+        let (grid, whole) = wide::<2>(is_uniform);
+        let processes = along(in_the_plane[n % in_the_plane.len()]);
+        agrees_in((&grid, &whole, law()), settings, &[processes], 14);
+        if n % 6 == 0 {
+            let law = if n % 12 == 0 { projected() } else { self::law().into() };
+            let (grid, whole) = wide::<3>(is_uniform);
+            let processes = along(in_space[n / 6 % in_space.len()]);
+            agrees_in((&grid, &whole, law), settings, &[processes], 12);
+        }
+    }
+}
+
+/// Boxes that stretch beyond a cell: in one process the last block of a tile is copied behind others, in several it lies beside them.
+#[test]
+fn stretched_boxes_have_the_bits_of_one_process() {
+    for integrator in [Integrator::Usl, Integrator::Cd] {
+        let settings = flying(schemes::settings(Shape::Gimp, integrator, Transfer::Flip));
+        let (grid, whole) = wide::<2>(true);
+        agrees_on((&grid, &whole, law().into()), settings, &[2, 4], 14);
+    }
+}
+
+#[test]
+fn polygons_on_processes_along_several_axes_have_the_bits_of_one() {
+    for (n, settings) in polygon_settings().enumerate() {
+        let law = || if n % 2 == 0 { projected() } else { law().into() };
+        let (grid, whole) = widened(polygons::<2>(40.0), &[84]);
+        let processes = [[2, 2], [3, 1], [2, 3], [3, 2]][n % 4];
+        agrees_in((&grid, &whole, law()), settings, &[along(processes)], 16);
+        if n % 4 == 0 {
+            let law = if n % 8 == 0 { projected() } else { self::law().into() };
+            let (grid, whole) = widened(polygons::<3>(70.0), &[122, 4]);
+            let processes = [[2, 2, 2], [1, 2, 3], [2, 1, 2]][n / 4 % 3];
+            agrees_in((&grid, &whole, law), settings, &[along(processes)], 16);
+        }
+    }
+}
+
+#[test]
+fn half_planes_on_processes_along_the_radius_have_the_bits_of_one() {
+    for (n, settings) in revolving::schemes().enumerate() {
+        let mut grid = revolving::grid(20.0);
+        let mut whole = revolving::body(&grid, 1.0);
+        whole.particles.v.iter_mut().for_each(|v| v[2] += 40.0);
+        let settings = Settings { time_step: 1.0 / 512.0, ..settings };
+        grid.lower[0] -= 150.0 * grid.spacing;
+        grid.cells[0] += 300;
+        let processes = [[2, 1, 1], [2, 1, 2], [2, 1, 3]][n % 3];
+        agrees_in((&grid, &whole, law().into()), settings, &[along(processes)], 16);
     }
 }
 
@@ -335,8 +468,20 @@ fn a_body_that_fills_the_grid_from_wall_to_wall_has_the_bits_of_one_process() {
 
 /// The states that `count` processes save after some steps, each its part, and what they come to in some more.
 fn save_and_go_on<const D: usize>(
-    (grid, whole, settings, law): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>, Law<f64, D>),
+    case: (&Grid<f64, D>, &Body<f64, D>, Settings<f64>, Law<f64, D>),
     count: usize,
+    taken_up: Option<&[SavedState]>,
+) -> (Vec<SavedState>, Vec<Of<D>>)
+where
+    f64: Scalar<D>,
+{
+    save_and_go_on_in(case, (count, None), taken_up)
+}
+
+/// As [`save_and_go_on`], with so many processes along each axis where that is told.
+fn save_and_go_on_in<const D: usize>(
+    (grid, whole, settings, law): (&Grid<f64, D>, &Body<f64, D>, Settings<f64>, Law<f64, D>),
+    (count, along_axes): (usize, Option<[usize; D]>),
     taken_up: Option<&[SavedState]>,
 ) -> (Vec<SavedState>, Vec<Of<D>>)
 where
@@ -344,6 +489,10 @@ where
 {
     let found = in_process(count, |ranks| {
         let rank = ranks.rank();
+        let ranks = match along_axes {
+            Some(along_axes) => arranged(ranks, along_axes.to_vec()),
+            None => ranks,
+        };
         let (body, ids) = share(whole, &*ranks);
         let share = Share { ranks, ids };
         let mut part =
@@ -390,6 +539,33 @@ fn what_any_number_of_processes_saved_any_other_goes_on_with() {
             // Particles that share corners are in the parts of all processes that have these.
             let is_alone = settings.shape != Shape::Cpdi2;
             assert!(!is_alone || (1..7).all(|array| bytes(&again, array) == bytes(saved, array)));
+        }
+    }
+}
+
+#[test]
+fn what_a_grid_of_processes_saved_another_one_goes_on_with() {
+    let lattices = schemes::schemes().map(flying).step_by(11).map(|settings| {
+        let (grid, whole) = wide::<2>(settings.transfer == Transfer::Flip);
+        (grid, whole, Settings { time_step: 1.0 / 1024.0, ..settings })
+    });
+    let clipped = polygon_settings().step_by(6).map(|settings| {
+        let (grid, whole) = widened(polygons::<2>(30.0), &[84]);
+        (grid, whole, settings)
+    });
+    for (n, (grid, whole, settings)) in lattices.chain(clipped).enumerate() {
+        let law = || if n % 2 == 0 { law().into() } else { projected() };
+        let case = || (&grid, &whole, settings, law());
+        let (one, expected) = save_and_go_on(case(), 1, None);
+        let (many, _) = save_and_go_on_in(case(), along([[2, 2], [3, 1], [2, 3]][n % 3]), None);
+        for (saved, processes) in
+            [(&one, [3, 2]), (&many, [1, 1]), (&many, [[2, 1], [1, 3]][n % 2])]
+        {
+            let (again, found) = save_and_go_on_in(case(), along(processes), Some(saved));
+            let other = found.iter().zip(&expected).find(|(a, b)| a != b);
+            let what = format!("{} to {processes:?} processes, {settings:?}", saved.len());
+            assert_eq!((found.len(), other), (expected.len(), None), "{what}");
+            assert_eq!(again.len(), processes.iter().product::<usize>(), "{what}");
         }
     }
 }
@@ -454,20 +630,27 @@ fn record<const D: usize>(settings: &Settings<f64>) -> u64 {
 /// Enough for particles to come into other layers.
 const STEPS: usize = 30;
 
-fn sends_what_the_formula_says<const D: usize>(settings: Settings<f64>, count: usize)
-where
+/// Bytes that processes along each axis of a grid send in the steps of a body that flies down, against the formulas: `halo` bytes in each pass, and
+/// as many numbers of particles as `counts` where these are sorted.
+fn sends_what_the_formula_says<const D: usize>(
+    (grid, mut whole): (Grid<f64, D>, Body<f64, D>),
+    settings: Settings<f64>,
+    along_axes: [usize; D],
+    (halo, counts): (u64, u64),
+) where
     f64: Scalar<D>,
 {
-    let mut whole = body::<D>(-30.0, false);
+    let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
     // Fast and as good as rigid, so that it lasts.
     let p = &mut whole.particles;
     p.v.iter_mut().for_each(|v| *v = SVector::from_fn(|a, _| if a == D - 1 { -30.0 } else { 0.0 }));
     p.F.fill(SMatrix::identity());
+    let count: usize = along_axes.iter().product();
     let found = in_process(count, |ranks| {
-        let (ranks, traffic) = counted(ranks);
+        let (ranks, traffic) = counted(arranged(ranks, along_axes.to_vec()));
         let (body, ids) = share(&whole, &*ranks);
         let share = Share { ranks, ids };
-        let mut part = Simulation::shared_out(grid::<D>(), body, share, law(), settings).unwrap();
+        let mut part = Simulation::shared_out(grid.clone(), body, share, law(), settings).unwrap();
         let step = |_| {
             let (before, arrangement) = (traffic.sent(), part.arrangement().unwrap());
             let (version, ids) = (arrangement.version, arrangement.ids.to_vec());
@@ -479,13 +662,8 @@ where
         };
         (0..STEPS).map(step).collect::<Vec<_>>()
     });
-    let cells = grid::<D>().cells;
-    // Rows of a layer, of a grid with three nodes below its cells and six above.
-    let height: u64 = if D == 1 { 256 } else { 8 };
-    let nodes: u64 = cells[..D - 1].iter().map(|&cells| cells as u64 + 9).product();
-    let layers = cells[D - 1] as u64 / height;
-    let (others, cuts) = (count as u64 - 1, count as u64 - 1);
-    let halo = 2 * cuts * height * nodes * (2 * D as u64 + 1) * 8;
+    let others = count as u64 - 1;
+    let cuts: u64 = along_axes.iter().filter(|of| **of > 1).map(|of| *of as u64 + 1).sum();
     let (mut is_first, mut moved) = (true, 0);
     for step in 0..STEPS {
         let of = |n: usize| found[n][step];
@@ -493,20 +671,65 @@ where
         let left: u64 = (0..count).map(|n| of(n).2).sum();
         let mut expected = passes(&settings, is_first) * halo;
         if of(0).1 {
-            // The first process hears how many particles are in each layer, and tells the cuts, both in a tree; all tell each other how many
-            // particles they send.
-            let counts = others * layers * 8;
-            let lengths = others * count as u64 * 8;
-            expected += counts + others * (count as u64 + 1) * 8 + lengths;
+            // The first process hears how many particles there are, and tells the cuts, both in a tree; all tell each other how many particles they
+            // send.
+            expected += others * counts * 8 + others * cuts * 8 + others * count as u64 * 8;
             expected += left * record::<D>(&settings);
         } else {
             assert_eq!(left, 0, "{settings:?}");
         }
-        assert_eq!(bytes, expected, "{D}D, step {step}, {left} of it moved, {settings:?}");
+        let what = format!("{along_axes:?}, step {step}, {left} of it moved, {settings:?}");
+        assert_eq!(bytes, expected, "{what}");
         is_first = of(0).1;
         moved += left;
     }
     assert!(moved > 0, "{settings:?}: nothing has moved");
+}
+
+/// That of layers alone.
+fn layers_send_what_the_formula_says<const D: usize>(settings: Settings<f64>, count: usize)
+where
+    f64: Scalar<D>,
+{
+    let cells = grid::<D>().cells;
+    // Rows of a layer, of a grid with three nodes below its cells and six above.
+    let height: u64 = if D == 1 { 256 } else { 8 };
+    let nodes: u64 = cells[..D - 1].iter().map(|&cells| cells as u64 + 9).product();
+    let halo = 2 * (count as u64 - 1) * height * nodes * (2 * D as u64 + 1) * 8;
+    let mut along_axes = [1; D];
+    along_axes[D - 1] = count;
+    let case = (grid::<D>(), body::<D>(-30.0, false));
+    let layers = cells[D - 1] as u64 / height;
+    sends_what_the_formula_says(case, settings, along_axes, (halo, layers));
+}
+
+/// That of processes side by side, whose particles reach so many nodes along an axis at most.
+fn boxes_send_what_the_formula_says(shape: Shape, width: u64, layers: u64) {
+    let mut grid = grid::<2>();
+    // Two tiles of 64 cells, eight layers.
+    grid.cells = [128, 64];
+    let at = |X: &SVector<f64, 2>| (X - grid.lower) / grid.spacing;
+    let whole = Body::lattice(&grid, 2, 2.0, |X| {
+        (54.0..74.0).contains(&at(X)[0]) && (18.0..40.0).contains(&at(X)[1])
+    });
+    let settings = flying(schemes::settings(shape, Integrator::Cd, Transfer::Flip));
+    let rows = 64 + 9;
+    // The windows of layers begin at the row 8 l + 1, those of the first at the row 0, and end where stencils do that have risen by two rows, or where
+    // the next layer but one begins.
+    let height = |layer: u64| {
+        let first = if layer == 0 { 0 } else { 8 * layer + 1 };
+        let end = match layer {
+            7 => rows,
+            6 => 8 * layer + 12 + width,
+            _ => (8 * layer + 17).min(8 * layer + 12 + width),
+        };
+        end - first
+    };
+    let across = 2 * (layers - 1) * 8 * (128 + 9);
+    let lent = (0..8).map(height).sum::<u64>() * (width + 1);
+    let returned = (rows + 8 * (layers - 1)) * (width + 1);
+    let halo = (across + lent + returned) * 5 * 8;
+    sends_what_the_formula_says((grid, whole), settings, [2, layers as usize], (halo, 16));
 }
 
 #[test]
@@ -514,14 +737,22 @@ fn messages_have_the_bytes_that_the_formula_says() {
     // Those with shared corners have a formula of their own.
     let without = schemes::schemes().filter(|settings| settings.shape != Shape::Cpdi2);
     for settings in without.map(flying) {
-        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
-        sends_what_the_formula_says::<2>(settings, 4);
+        layers_send_what_the_formula_says::<2>(settings, 4);
     }
     for shape in [Shape::Gimp, Shape::Cpdi] {
         let settings = flying(schemes::settings(shape, Integrator::Cd, Transfer::Flip));
-        let settings = Settings { time_step: 1.0 / 1024.0, ..settings };
-        sends_what_the_formula_says::<1>(settings, 3);
-        sends_what_the_formula_says::<3>(settings, 3);
+        layers_send_what_the_formula_says::<1>(settings, 3);
+        layers_send_what_the_formula_says::<3>(settings, 3);
+    }
+    for (shape, width) in [
+        (Shape::Linear, 2),
+        (Shape::Bspline2, 3),
+        (Shape::Bspline3, 4),
+        (Shape::Gimp, 6),
+        (Shape::Cpdi, 6),
+    ] {
+        boxes_send_what_the_formula_says(shape, width, 2);
+        boxes_send_what_the_formula_says(shape, width, 3);
     }
 }
 

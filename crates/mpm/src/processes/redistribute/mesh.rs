@@ -1,4 +1,4 @@
-//! Particles that share corners go to the processes of the layers of these.
+//! Particles that share corners go to the processes of the tiles of these.
 //!
 //! The process of its first corner holds a particle, and gives it to all others that have corners of it: see
 //! [`corner_halo`](crate::processes::corner_halo).
@@ -30,16 +30,12 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let first_corner = |p: usize| mesh.corners[mesh.places(p).start];
 
         let tiles = *self.grid.bins.tiles();
-        let layer_of = |corner: u32| tiles.layer_of(keys[corner as usize]);
-        let mut counts = vec![0_u64; tiles.layers()];
-        for corner in (0..particles).map(first_corner).filter(|corner| is_own(*corner)) {
-            counts[layer_of(corner)] += 1;
-        }
-        let held = part.cut(counts);
+        let first_corners = (0..particles).map(first_corner).filter(|corner| is_own(*corner));
+        let held = part.cut(&tiles, first_corners.map(|corner| keys[corner as usize]));
         let part = &*part;
+        let holder = |corner: u32| part.holder(keys[corner as usize]);
         let holders = |corners: &[u32]| -> Vec<usize> {
-            let mut holders: Vec<usize> =
-                corners.iter().map(|&c| part.holder(layer_of(c))).collect();
+            let mut holders: Vec<usize> = corners.iter().map(|&corner| holder(corner)).collect();
             holders.sort_unstable();
             holders.dedup();
             holders
@@ -60,7 +56,8 @@ impl<T: Lanes, const D: usize> State<T, D> {
         drop(of_particles);
         let coming = Coming::new(&mesh, keys, &moved);
 
-        let is_other = |tile: u32| !held.contains(&tiles.layer_of(tile));
+        let rank = held.cuts.rank(&held.at);
+        let is_other = |tile: u32| held.cuts.holder(&tiles.pieces_of(tile)) != rank;
         let assembled = mesh.assemble(keys, moved.sources(), &coming, &loads, is_other);
         drop((mesh, coming));
         let (mesh, mut keys) = assembled;
@@ -68,7 +65,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let halo = self.part.as_mut().zip(mesh.numbers.as_ref()).map(|(part, numbers)| {
             part.own = Some(own_particles(&mesh, own, &part.ids));
             let (known, others) = numbers.corners.split_at(own);
-            let holders = keys[own..].iter().map(|&tile| part.holder(tiles.layer_of(tile)));
+            let holders = keys[own..].iter().map(|&tile| part.holder(tile));
             CornerHalo::new(&part.ranks, known, others, holders)
         });
         let ids = self.part.as_ref().map_or_else(Default::default, |part| part.ids.clone());

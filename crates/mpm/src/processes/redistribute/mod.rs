@@ -1,4 +1,4 @@
-//! Particles go to the process of their layer of tiles.
+//! Particles go to the process of their tile.
 
 mod mesh;
 
@@ -20,30 +20,27 @@ impl<T: Lanes, const D: usize> State<T, D> {
         if self.part.is_some() {
             keys = match self.corners {
                 Some(_) => self.give_mesh(&keys),
-                None => self.give_to_layers(keys),
+                None => self.give_to_holders(keys),
             };
         }
         match (&self.part, &self.corners) {
-            (Some(part), None) => self.grid.bins.sort_as(keys, &|p| part.ids[p]),
+            (Some(part), None) => self.grid.bins.sort_as(keys, Some(&|p| part.ids[p])),
             // Kernels copy corners one by one.
-            (_, Some(_)) => self.grid.bins.sort_as(keys, &|_| 0),
-            (None, None) => self.grid.bins.sort_as(keys, &|p| p as u64),
+            (_, Some(_)) => self.grid.bins.sort_as(keys, None),
+            (None, None) => self.grid.bins.sort_as(keys, Some(&|p| p as u64)),
         }
     }
 
     /// Gives every particle to the process of its tile. Gives the tiles of those that are here then.
-    fn give_to_layers(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
-        let bins: Vec<usize> =
-            keys.iter().map(|&key| self.grid.bins.tiles().layer_of(key)).collect();
-        let mut counts = vec![0_u64; self.grid.bins.tiles().layers()];
-        bins.iter().for_each(|&bin| counts[bin] += 1);
+    fn give_to_holders(&mut self, mut keys: Vec<u32>) -> Vec<u32> {
+        let tiles = *self.grid.bins.tiles();
         let Some(part) = &mut self.part else { return keys };
-        let own = part.cut(counts);
-        let holders: Vec<usize> = bins.into_iter().map(|bin| part.holder(bin)).collect();
+        let held = part.cut(&tiles, keys.iter().copied());
+        let holders: Vec<usize> = keys.iter().map(|&key| part.holder(key)).collect();
         if let Some(moved) = self.give(&|p| slice::from_ref(&holders[p])) {
             moved.replace(&mut keys);
         }
-        self.grid.hold(own, keys.len());
+        self.grid.hold(held, keys.len());
         keys
     }
 
