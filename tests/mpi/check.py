@@ -56,8 +56,8 @@ CASES = [
     "axis-aligned --cells 64 --shape linear --integrator usl --cfl 1.9",
 ]
 
-# Processes along several axes.
-LONG = Path(__file__).resolve().parent / "long-box.toml"
+# Processes along several axes, also in a box that is long enough to be cut across axis 0.
+CUBE, LONG = Path(__file__).resolve().parents[2] / "mms-specs" / "axis-aligned-3d.toml", FOLDER.resolve() / "long-box.toml"
 GRIDS = [
     ("2x2", "axis-aligned --cells 128 --periods 0.02 --transfer apic --integrator usl"),
     ("2x3", "ring --cells 128 --periods 0.02 --shape cpdi2 --layout clipped --grid-angle 20"),
@@ -203,6 +203,9 @@ def check_kills():
 
 FOLDER.mkdir(parents=True, exist_ok=True)
 FOLDER = FOLDER.resolve()
+cube = CUBE.read_text()
+assert cube.count("upper = [1, 1, 1]") == 1
+LONG.write_text(cube.replace("upper = [1, 1, 1]", "upper = [32, 2, 3]"))
 check_files()
 if not options.quick:
     check_kills()

@@ -86,7 +86,7 @@ const ROUNDED: f64 = 0.5 + 1e-6;
 const NEARLY_ROUNDED: f64 = 0.5 + 1e-3;
 
 #[test]
-#[ignore = "a minute and more in release mode"]
+#[ignore = "a minute and more in release mode: .ci/long runs it"]
 fn logarithms_are_the_nearest_numbers() {
     assert_none(&at_every_number(|x, found| {
         let wide = f64::from(x);
@@ -113,7 +113,7 @@ fn logarithms_are_the_nearest_numbers() {
 }
 
 #[test]
-#[ignore = "a minute and more in release mode"]
+#[ignore = "a minute and more in release mode: .ci/long runs it"]
 fn sines_of_multiples_of_pi_are_the_nearest_numbers() {
     assert_none(&at_every_number(|x, found| {
         let wide = f64::from(x);
@@ -134,7 +134,7 @@ fn sines_of_multiples_of_pi_are_the_nearest_numbers() {
 }
 
 #[test]
-#[ignore = "a minute and more in release mode"]
+#[ignore = "a minute and more in release mode: .ci/long runs it"]
 fn sines_and_exponentials_are_the_nearest_numbers() {
     assert_none(&at_every_number(|x, found| {
         let wide = f64::from(x);
@@ -151,7 +151,7 @@ fn sines_and_exponentials_are_the_nearest_numbers() {
 
 /// Numbers from zero on: others are no `z = (a - b)^2/(2 a b)`.
 #[test]
-#[ignore = "a minute and more in release mode"]
+#[ignore = "a minute and more in release mode: .ci/long runs it"]
 fn logarithms_of_ratios_are_the_nearest_numbers() {
     assert_none(&at_every_number(|z, found| {
         if !(z >= 0.0 && z.is_finite()) {
@@ -180,7 +180,7 @@ fn logarithms_of_ratios_are_the_nearest_numbers() {
 
 /// Numbers from zero to where the values leave single precision.
 #[test]
-#[ignore = "a minute and more in release mode"]
+#[ignore = "a minute and more in release mode: .ci/long runs it"]
 fn hyperbolic_cosines_of_roots_are_the_nearest_numbers() {
     assert_none(&at_every_number(|y, found| {
         if !(0.0..7.5e3).contains(&y) {
