@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use crate::region::Region;
+
 /// The cuts that divide tiles among processes: for each axis the first piece of each process, and the number of pieces. Processes are numbered along axis 0
 /// first.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,19 +30,19 @@ impl<const D: usize> Cuts<D> {
         self.0[axis].last().copied().unwrap_or(0)
     }
 
+    /// The places of the grid of processes.
+    fn places(&self) -> Region<D> {
+        Region(std::array::from_fn(|a| 0..self.count(a)))
+    }
+
     /// The number of the process at a place of the grid of processes.
     pub fn rank(&self, at: &[usize; D]) -> usize {
-        (0..D).rev().fold(0, |rank, a| rank * self.count(a) + at[a])
+        self.places().index(at)
     }
 
     /// The place of a process in the grid of processes.
     pub fn place(&self, rank: usize) -> [usize; D] {
-        let mut rest = rank;
-        std::array::from_fn(|a| {
-            let place = rest % self.count(a);
-            rest /= self.count(a);
-            place
-        })
+        self.places().place(rank)
     }
 
     /// The process that holds the tile of these pieces.

@@ -18,7 +18,7 @@ pub struct TileLattice<const D: usize> {
     reach: [usize; D],
     held: Held<D>,
     /// The pieces along each axis of the tiles here and of those that come.
-    around: [Range<usize>; D],
+    around: Region<D>,
     /// The elements that the windows of the tiles here cover.
     region: Region<D>,
     /// Elements of these that no process completes but this one and those of the layers below and above.
@@ -94,7 +94,7 @@ impl<const D: usize> TileLattice<D> {
         let mut own = Self {
             windows,
             reach,
-            around: none.0.clone(),
+            around: none.clone(),
             region: none.clone(),
             own: none,
             held,
@@ -139,7 +139,7 @@ impl<const D: usize> TileLattice<D> {
             let (around, completed) = (self.around_of(&at), self.completed_by(&at));
             let own = (0..self.count()).filter(|tile| {
                 let pieces = self.pieces(*tile);
-                self.is_own(*tile) && (0..D).all(|a| around[a].contains(&pieces[a]))
+                self.is_own(*tile) && (0..D).all(|a| around.0[a].contains(&pieces[a]))
             });
             let parts: Vec<_> = own
                 .map(|tile| (tile, Region(self.window(tile)).intersection(&completed)))
@@ -247,24 +247,17 @@ impl<const D: usize> TileLattice<D> {
     }
 
     /// The pieces along each axis of the tiles of a process and of those that come to it.
-    fn around_of(&self, at: &[usize; D]) -> [Range<usize>; D] {
-        std::array::from_fn(|a| {
+    fn around_of(&self, at: &[usize; D]) -> Region<D> {
+        Region(std::array::from_fn(|a| {
             let Range { start, end } = self.held.pieces_at(a, at[a]);
             if a == D - 1 { start..end } else { start.saturating_sub(self.reach[a])..end }
-        })
+        }))
     }
 
     /// Whether this process holds a tile.
     fn is_own(&self, tile: usize) -> bool {
         let pieces = self.pieces(tile);
         (0..D).all(|a| self.held.pieces(a).contains(&pieces[a]))
-    }
-
-    /// The number here of the tile of these pieces.
-    fn tile_of(&self, pieces: &[usize; D]) -> usize {
-        (0..D)
-            .rev()
-            .fold(0, |tile, a| tile * self.around[a].len() + pieces[a] - self.around[a].start)
     }
 
     /// The elements that the buffer of a tile has: those of its window, or of a tile that comes the ones that this process completes.
@@ -317,23 +310,17 @@ impl<const D: usize> TileLattice<D> {
 
     /// Number of tiles here, with those that come.
     pub fn count(&self) -> usize {
-        self.around[D - 1].len() * self.in_a_layer()
+        self.around.len()
     }
 
     /// Number of them in a layer.
     fn in_a_layer(&self) -> usize {
-        self.around[..D - 1].iter().map(ExactSizeIterator::len).product()
+        self.around.0[..D - 1].iter().map(ExactSizeIterator::len).product()
     }
 
     /// The pieces of a tile along each axis.
     pub fn pieces(&self, tile: usize) -> [usize; D] {
-        let mut rest = tile;
-        std::array::from_fn(|a| {
-            let around = &self.around[a];
-            let piece = around.start + rest % around.len();
-            rest /= around.len();
-            piece
-        })
+        self.around.place(tile)
     }
 
     /// The window of a tile along each axis.
@@ -366,21 +353,12 @@ impl<const D: usize> TileLattice<D> {
     /// The other tiles here whose windows may overlap with that of a tile.
     fn neighbours(&self, tile: usize) -> impl Iterator<Item = usize> + '_ {
         let pieces = self.pieces(tile);
-        let near: [Range<usize>; D] = std::array::from_fn(|a| {
+        let near = Region(std::array::from_fn(|a| {
             let (first, end) =
                 (pieces[a].saturating_sub(self.reach[a]), pieces[a] + self.reach[a] + 1);
-            first.max(self.around[a].start)..end.min(self.around[a].end)
-        });
-        let count: usize = near.iter().map(ExactSizeIterator::len).product();
-        let found = (0..count).map(move |number| {
-            let mut rest = number;
-            let pieces = near.each_ref().map(|near| {
-                let piece = near.start + rest % near.len();
-                rest /= near.len();
-                piece
-            });
-            self.tile_of(&pieces)
-        });
+            first.max(self.around.0[a].start)..end.min(self.around.0[a].end)
+        }));
+        let found = (0..near.len()).map(move |number| self.around.index(&near.place(number)));
         found.filter(move |&other| other != tile)
     }
 

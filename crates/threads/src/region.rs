@@ -26,6 +26,24 @@ impl<const D: usize> Region<D> {
         strides
     }
 
+    /// The place of the element of an index in an array of this region alone.
+    #[inline]
+    pub fn place(&self, index: usize) -> [usize; D] {
+        let mut rest = index;
+        self.0.each_ref().map(|range| {
+            let place = range.start + rest % range.len();
+            rest /= range.len();
+            place
+        })
+    }
+
+    /// The index of an element there.
+    #[inline]
+    pub fn index(&self, place: &[usize; D]) -> usize {
+        let of = |index, a: usize| index * self.0[a].len() + place[a] - self.0[a].start;
+        (0..D).rev().fold(0, of)
+    }
+
     /// The elements of both.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
@@ -132,6 +150,10 @@ mod tests {
             }
             prop_assert_eq!(&own.lines(&whole).flatten().collect::<Vec<_>>(), &expected);
             prop_assert_eq!(own.lines(&own).flatten().count(), own.len());
+            for (index, line) in (0..own.len()).zip(own.lines(&whole).flatten()) {
+                prop_assert_eq!(own.index(&own.place(index)), index);
+                prop_assert_eq!(whole.index(&own.place(index)), line);
+            }
             let mut numbers: Vec<usize> = (0..whole.len()).collect();
             prop_assert_eq!(&own.slices(&whole, &numbers).concat(), &expected);
             let lines = own.slices_mut(&whole, &mut numbers);

@@ -10,6 +10,7 @@ use mmsmith_particles::{Arrangement, SetupError, StepError};
 use mmsmith_ranks::{Ranks, add_to_first, share};
 use mmsmith_rare_states::{RareState, met};
 use mmsmith_threads::held::{Cuts, Held};
+use mmsmith_threads::region::Region;
 use nalgebra::RealField;
 
 use crate::grid::Layout;
@@ -236,8 +237,8 @@ fn shapes<const D: usize>(count: usize, most: &[usize; D]) -> Vec<[usize; D]> {
 
 /// Numbers of particles by the pieces along some axes.
 struct Counts<const D: usize> {
-    /// How many pieces are told apart along each axis: all or one.
-    pieces: [usize; D],
+    /// The pieces that are told apart along each axis: all or one.
+    pieces: Region<D>,
     particles: Vec<u64>,
 }
 
@@ -245,26 +246,16 @@ impl<const D: usize> Counts<D> {
     /// Numbers of particles in these tiles, which are told apart along these axes.
     fn of(tiles: &Tiles<D>, told_apart: [bool; D], keys: impl Iterator<Item = u32>) -> Self {
         let all = tiles.pieces();
-        let pieces = std::array::from_fn(|a| if told_apart[a] { all[a] } else { 1 });
+        let pieces = Region(std::array::from_fn(|a| 0..if told_apart[a] { all[a] } else { 1 }));
         let mut of_tiles = vec![0; tiles.count()];
         keys.for_each(|key| of_tiles[key as usize] += 1);
-        let mut particles = vec![0; pieces.iter().product()];
+        let mut particles = vec![0; pieces.len()];
         for (tile, count) in (0..).zip(of_tiles) {
             let of_tile = tiles.pieces_of(tile);
-            let place = (0..D).rev().filter(|&a| told_apart[a]);
-            particles[place.fold(0, |place, a| place * pieces[a] + of_tile[a])] += count;
+            let place = std::array::from_fn(|a| if told_apart[a] { of_tile[a] } else { 0 });
+            particles[pieces.index(&place)] += count;
         }
         Self { pieces, particles }
-    }
-
-    /// The pieces of a place in the list.
-    fn pieces_of(&self, place: usize) -> [usize; D] {
-        let mut rest = place;
-        self.pieces.map(|pieces| {
-            let piece = rest % pieces;
-            rest /= pieces;
-            piece
-        })
     }
 
     /// Cuts across each axis that share out the particles along it evenly.
@@ -276,7 +267,7 @@ impl<const D: usize> Counts<D> {
             }
             let mut along = vec![0; all[a]];
             for (place, count) in self.particles.iter().enumerate() {
-                along[self.pieces_of(place)[a]] += count;
+                along[self.pieces.place(place)[a]] += count;
             }
             let (least, last) = (tiles.least_held(a), if a + 1 < D { 0 } else { 1 });
             cuts(&along, along_axes[a], (least, least + last))
@@ -287,7 +278,7 @@ impl<const D: usize> Counts<D> {
     fn of_ranks(&self, cuts: &Cuts<D>) -> Vec<u64> {
         let mut of_ranks = vec![0; (0..D).map(|a| cuts.count(a)).product()];
         for (place, count) in self.particles.iter().enumerate() {
-            of_ranks[cuts.holder(&self.pieces_of(place))] += count;
+            of_ranks[cuts.holder(&self.pieces.place(place))] += count;
         }
         of_ranks
     }
