@@ -56,21 +56,20 @@ impl<T: Lanes, const D: usize> State<T, D> {
         drop(of_particles);
         let coming = Coming::new(&mesh, keys, &moved);
 
-        let rank = held.cuts.rank(&held.at);
-        let is_other = |tile: u32| held.cuts.holder(&tiles.pieces_of(tile)) != rank;
+        let Some(part) = &mut self.part else { return Vec::new() };
+        let is_other = |tile: u32| part.holder(tile) != part.ranks.rank();
         let assembled = mesh.assemble(keys, moved.sources(), &coming, &loads, is_other);
         drop((mesh, coming));
         let (mesh, mut keys) = assembled;
         let own = keys.partition_point(|tile| !is_other(*tile));
-        let halo = self.part.as_mut().zip(mesh.numbers.as_ref()).map(|(part, numbers)| {
-            part.own = Some(own_particles(&mesh, own, &part.ids));
+        let halo = mesh.numbers.as_ref().map(|numbers| {
             let (known, others) = numbers.corners.split_at(own);
             let holders = keys[own..].iter().map(|&tile| part.holder(tile));
             CornerHalo::new(&part.ranks, known, others, holders)
         });
-        let ids = self.part.as_ref().map_or_else(Default::default, |part| part.ids.clone());
+        part.own = Some(own_particles(&mesh, own, &part.ids));
         if let Some(corners) = &mut self.corners {
-            corners.replace(SharedCorners::of_part(mesh, at_corner, &ids, (own, halo)));
+            corners.replace(SharedCorners::of_part(mesh, at_corner, &part.ids, (own, halo)));
         }
         self.grid.hold(held, own);
         keys.truncate(own);
