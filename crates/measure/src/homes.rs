@@ -70,11 +70,10 @@ impl Homes {
         let own = ids.len();
         let mut all = Self { ranks, count, groups, joined, out, counts, own, order: Vec::new() };
         let others = all.hear(|places| ids[places].to_vec());
-        all.order = vec![0; here];
         let own = all.out[rank].iter().flat_map(|run| run.clone().map(|place| (place, ids[place])));
         let others = others.into_iter().enumerate().map(|(place, id)| (ids.len() + place, id));
         let mut of_group = 0;
-        let mut order = std::mem::take(&mut all.order);
+        let mut order = vec![0; here];
         let mut put = |(place, id): (usize, u64)| {
             let group = id as usize / GROUP;
             // Mostly that of the particle before.

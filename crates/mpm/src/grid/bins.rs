@@ -173,36 +173,27 @@ impl<N: Copy + Send + Sync, const D: usize> Bins<N, D> {
     /// Calls `add` for every tile here, in parallel.
     pub(crate) fn for_each(
         &mut self,
-        layout: &Layout<D>,
         nodes: &mut [N],
         hooks: Hooks<'_, N>,
         add: &AddToWindow<'_, N, D>,
     ) {
-        self.for_each_mut(
-            layout,
-            nodes,
-            hooks,
-            |order| &*order,
-            &|window, order: &&Partition, part| {
-                if let Some(particles) = order.part(part) {
-                    add(window, particles);
-                }
-            },
-        );
+        self.for_each_mut(nodes, hooks, |order| &*order, &|window, order: &&Partition, part| {
+            if let Some(particles) = order.part(part) {
+                add(window, particles);
+            }
+        });
     }
 
     /// As [`for_each`](Self::for_each) for kernels that change the tile's particles: `divide(partition)` divides them among tiles, and
     /// `add(window, divided, part)` finds those of the tile there.
     pub(crate) fn for_each_mut<'a, P: Sync>(
         &'a mut self,
-        layout: &Layout<D>,
         elements: &mut [N],
         hooks: Hooks<'_, N>,
         divide: impl FnOnce(&'a mut Partition) -> P,
         add: &UpdateAndAdd<'_, N, P, D>,
     ) {
         let Self { tiles, order, lattice, buffers, .. } = self;
-        debug_assert_eq!(layout.held, *lattice.region());
         let has_particles: Vec<bool> =
             (0..lattice.count()).map(|part| order.part(part) != Some(&[])).collect();
         let divided = divide(order);
@@ -328,7 +319,7 @@ mod tests {
                 }
             };
             let mut nodes = vec![9; layout.nodes];
-            bins.for_each(&layout, &mut nodes, hooks, &add);
+            bins.for_each(&mut nodes, hooks, &add);
             let mut expected = vec![1_000_000; layout.nodes];
             for edges in &edges {
                 let at = |a: usize| (edges[a].floor() as usize + PAD_BELOW) * layout.strides[a];
@@ -339,7 +330,7 @@ mod tests {
             let divide = |order: &mut Partition| {
                 (0..).map_while(|part| order.part(part).map(<[u32]>::to_vec)).collect::<Vec<_>>()
             };
-            bins.for_each_mut(&layout, &mut seen, hooks, divide, &|window, divided, part| {
+            bins.for_each_mut(&mut seen, hooks, divide, &|window, divided, part| {
                 add(window, &divided[part]);
             });
             assert_eq!(seen, nodes);

@@ -276,7 +276,7 @@ where
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
-            bins.for_each(self.layout, nodes, hooks, add);
+            bins.for_each(nodes, hooks, add);
         });
     }
 
@@ -290,7 +290,7 @@ where
     ) {
         let ranks = bins.ranks();
         self.with_hooks(ranks.as_deref(), nodes, |nodes, hooks| {
-            bins.for_each_mut(self.layout, nodes, hooks, divide, add);
+            bins.for_each_mut(nodes, hooks, divide, add);
         });
     }
 

@@ -52,22 +52,25 @@ impl<T: Lanes, const D: usize> NodesAround<T, D> {
         let mut here = own.clone();
         for axis in (0..D).rev() {
             let (at, own) = (held.at[axis], &own.0[axis]);
-            if let Some(below) = held.neighbour(axis, false) {
-                let lacks = lattice.extent(axis, at - 1).end..around_of(axis, at - 1).end;
+            let neighbours = || {
+                let sides = [false, true].into_iter();
+                sides.filter_map(|is_above| Some((is_above, held.neighbour(axis, is_above)?)))
+            };
+            for (is_above, process) in neighbours() {
+                let at = if is_above { at + 1 } else { at - 1 };
+                let (extent, around) = (lattice.extent(axis, at), around_of(axis, at));
+                let lacks = match is_above {
+                    false => extent.end..around.end,
+                    true => around.start..extent.start,
+                };
                 let lines = here.along(axis, lacks).slices(&whole, padded);
-                send_nodes(&*ranks, below, c.sent, &lines);
+                send_nodes(&*ranks, process, c.sent, &lines);
             }
-            if let Some(above) = held.neighbour(axis, true) {
-                let lacks = around_of(axis, at + 1).start..lattice.extent(axis, at + 1).start;
-                let lines = here.along(axis, lacks).slices(&whole, padded);
-                send_nodes(&*ranks, above, c.sent, &lines);
-            }
-            let sides = [
-                (held.neighbour(axis, false), whole.0[axis].start..own.start),
-                (held.neighbour(axis, true), own.end..whole.0[axis].end),
-            ];
-            for (process, comes) in sides {
-                let Some(process) = process else { continue };
+            for (is_above, process) in neighbours() {
+                let comes = match is_above {
+                    false => whole.0[axis].start..own.start,
+                    true => own.end..whole.0[axis].end,
+                };
                 let mut lines = here.along(axis, comes).slices_mut(&whole, padded);
                 receive_nodes(&*ranks, process, c.sent, &mut lines);
             }

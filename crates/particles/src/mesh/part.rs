@@ -1,12 +1,11 @@
 //! The domains of some of a body's particles, and what processes tell each other of them.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use bytemuck::Pod;
 use nalgebra::{RealField, SVector};
 
-use super::{Faces, Interpolation, Load, Mesh, Numbers, start};
+use super::{Interpolation, Load, Mesh, Numbers, start};
 use mmsmith_ranks::{Lists, Move, Source};
 
 /// The polygons of particles that come from other processes.
@@ -198,7 +197,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
         for source in sources {
             match source {
                 Source::Here(p) => {
-                    own.append_polygons(self, self.polygons(p));
+                    own.read_topology(&topology(self, p));
                     own.corners.extend(self.of_particle(p).iter().map(|&c| now[c as usize]));
                 }
                 Source::Elsewhere(p) => {
@@ -228,25 +227,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
         D == 3 && self.interpolation == Interpolation::Triangles
     }
 
-    /// Appends a particle's polygons, but for the corners in `corners`.
-    fn append_polygons(&mut self, other: &Self, polygons: Range<usize>) {
-        let mut corners = self.ends.last().copied().unwrap_or(0);
-        for polygon in polygons {
-            corners += other.ends[polygon] - start(&other.ends, polygon) as u32;
-            self.ends.push(corners);
-            if self.has_faces() {
-                let Faces { corners, ends, of_polyhedra } = &mut self.faces;
-                for face in other.faces.of(polygon) {
-                    corners.extend(face);
-                    ends.push(corners.len() as u32);
-                }
-                of_polyhedra.push(ends.len() as u32);
-            }
-        }
-        self.of_particles.push(self.ends.len() as u32);
-    }
-
-    /// As [`append_polygons`](Self::append_polygons) of a particle that comes.
+    /// Appends the polygons of a particle by its [`topology`], but for the corners in `corners`.
     fn read_topology(&mut self, record: &[u32]) {
         let mut record = record.iter().copied();
         let mut next = || record.next().unwrap_or(0);
