@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use bytemuck::Pod;
 use mmsmith_lanes::tensor::real;
 use mmsmith_scalar_functions::ScalarFunctions;
 use nalgebra::{RealField, SMatrix, SVector};
@@ -70,7 +71,10 @@ impl<T: RealField + Copy, const D: usize> Body<T, D> {
 
     /// Some successive particles alone, with their corners.
     #[must_use]
-    pub fn part(&self, own: &Range<usize>) -> Self {
+    pub fn part(&self, own: &Range<usize>) -> Self
+    where
+        T: Pod,
+    {
         let Self { particles, half_edges, mesh, revolves, sticks } = self;
         let places: Vec<u32> = own.clone().map(|p| p as u32).collect();
         let particles = particles.some(&places);

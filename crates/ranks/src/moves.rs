@@ -84,6 +84,41 @@ impl Move {
         for p in 0..ids.len() {
             to(p).iter().for_each(|&rank| out[rank].push(p as u32));
         }
+        Self::arrange(ranks, ids, out)
+    }
+
+    /// The move of parts that elements may share, `of(place)` those of each element: to the processes of its elements, once to each. `ids` are the numbers
+    /// of the parts; those of the parts that are here afterwards ascend. Collective.
+    ///
+    /// A part that several processes have comes from this one if it stays, or from the first of the others.
+    pub fn of_parts<'a>(&self, ids: &[u64], of: &dyn Fn(usize) -> &'a [u32]) -> (Self, Vec<u64>) {
+        let mut out: Vec<Vec<u32>> = Vec::with_capacity(self.out.len());
+        let own = self.ranks.as_ref().map_or(0, |ranks| ranks.rank());
+        let here = self.order.iter().copied().filter(|&p| (p as usize) < self.before);
+        let stay: Vec<u32> = here.collect();
+        // For each part behind the last process that has it.
+        let mut given = vec![0; ids.len()];
+        for (rank, elements) in self.out.iter().enumerate() {
+            let elements = if rank == own { &stay } else { elements };
+            let parts = elements.iter().flat_map(|&p| of(p as usize)).copied();
+            let is_new =
+                |part: &u32| std::mem::replace(&mut given[*part as usize], rank + 1) <= rank;
+            out.push(parts.filter(is_new).collect());
+        }
+        let (mut moved, mut ids) = Self::arrange(self.ranks.as_ref(), ids, out);
+        let mut last = None;
+        let mut is_first = ids.iter().map(|&id| last.replace(id) != Some(id));
+        moved.order.retain(|_| is_first.next().unwrap_or(false));
+        ids.dedup();
+        (moved, ids)
+    }
+
+    /// The move of the elements at the places `out` to each process.
+    fn arrange(
+        ranks: Option<&Arc<dyn Ranks>>,
+        ids: &[u64],
+        mut out: Vec<Vec<u32>>,
+    ) -> (Self, Vec<u64>) {
         let stay = std::mem::take(&mut out[ranks.map_or(0, |ranks| ranks.rank())]);
         let lengths: Vec<usize> = out.iter().map(Vec::len).collect();
         let counts = ranks.map_or_else(|| vec![0], |ranks| announce(&**ranks, &lengths));
@@ -94,7 +129,7 @@ impl Move {
         let mut moved = Self { ranks: ranks.cloned(), before, out, counts, order };
         let ids = moved.all(ids);
         let mut by_id: Vec<u32> = (0..ids.len() as u32).collect();
-        by_id.sort_unstable_by_key(|&place| ids[place as usize]);
+        by_id.sort_unstable_by_key(|&place| (ids[place as usize], place));
         moved.order = by_id.iter().map(|&place| moved.order[place as usize]).collect();
         let ids = by_id.iter().map(|&place| ids[place as usize]).collect();
         (moved, ids)

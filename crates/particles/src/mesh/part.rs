@@ -9,29 +9,12 @@ use super::{Interpolation, Load, Mesh, Numbers, start};
 use mmsmith_ranks::{Lists, Move, Source};
 
 /// The polygons of particles that come from other processes.
-pub struct Coming<T, const D: usize> {
+struct Coming {
     /// For each particle the number of its polygons, and for each polygon: how many corners it has, how many faces, and of each face how
     /// many corners, and their places in the polyhedron.
     topology: Lists<u32>,
     /// The numbers in the whole body of a particle's corners, in the order of its polygons.
     numbers: Lists<u64>,
-    /// Their reference positions.
-    X: Lists<SVector<T, D>>,
-    /// Their current positions.
-    x: Lists<SVector<T, D>>,
-    /// Their tiles.
-    tiles: Lists<u32>,
-}
-
-/// A corner of the particles that are here after a move.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Corner {
-    is_behind: bool,
-    /// In the whole body.
-    number: u64,
-    /// Its number here before, or behind all of these a place in the list of those that come.
-    from: usize,
-    tile: u32,
 }
 
 /// Loads, each with its number in the whole body and those of its corners.
@@ -40,33 +23,6 @@ pub struct LoadRecords<T, const D: usize> {
     corners: Vec<SVector<u64, D>>,
     shares: Vec<SVector<T, D>>,
     X: Vec<SVector<T, D>>,
-}
-
-impl<T: RealField + Pod, const D: usize> Coming<T, D> {
-    /// The polygons that come with a move of the particles of `own`, whose corners are in these tiles. Collective.
-    pub fn new(own: &Mesh<T, D>, tiles: &[u32], moved: &Move) -> Self {
-        let corners = |p: usize| own.of_particle(p).iter().map(|&corner| corner as usize);
-        Self {
-            topology: moved.coming_lists(|p| topology(own, p)),
-            numbers: moved.coming_lists(|p| corners(p).map(|corner| own.number(corner))),
-            X: moved.coming_lists(|p| corners(p).map(|corner| own.X[corner])),
-            x: moved.coming_lists(|p| corners(p).map(|corner| own.x[corner])),
-            tiles: moved.coming_lists(|p| corners(p).map(|corner| tiles[corner])),
-        }
-    }
-}
-
-impl<T, const D: usize> Coming<T, D> {
-    /// No particles.
-    fn none() -> Self {
-        Self {
-            topology: Lists::none(),
-            numbers: Lists::none(),
-            X: Lists::none(),
-            x: Lists::none(),
-            tiles: Lists::none(),
-        }
-    }
 }
 
 impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
@@ -106,7 +62,10 @@ impl<T: RealField + Copy, const D: usize> LoadRecords<T, D> {
 impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     /// The mesh of some of the particles, with the loads that act on them, each a part of one particle's surface.
     #[must_use]
-    pub fn part(&self, particles: &[usize]) -> Self {
+    pub fn part(&self, particles: &[usize]) -> Self
+    where
+        T: Pod,
+    {
         // The particles at the corners of loads.
         let mut at: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for &corner in self.loads.iter().flat_map(|load| &load.corners) {
@@ -129,72 +88,54 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
         };
         let loads: Vec<usize> = (0..self.loads.len()).filter(acts_here).collect();
         let loads = LoadRecords::new(self, &loads);
-        let own = particles.iter().map(|&p| Source::Here(p));
-        self.assemble(&vec![0; self.X.len()], own, &Coming::none(), &loads, |_| false).0
+        let places: Vec<u64> = (0..is_own.len() as u64).collect();
+        let (moved, _) = Move::new(None, &places, &|p| if is_own[p] { &[0] } else { &[] });
+        self.follow(&moved, &vec![0; self.X.len()], &loads, |_| false).0
     }
 
-    /// The mesh of the particles of these sources with such loads, and the tile of each corner. The corners come in the order of their
-    /// numbers, those in tiles that `is_behind` says behind all others. `tiles` has the tiles of the corners here.
-    pub fn assemble(
+    /// The mesh after a move of the particles, with the loads that are here then, and the tile of each corner. The corners come in the order of their
+    /// numbers, those in tiles that `is_behind` says behind all others. `tiles` has the tiles of the corners before. Collective.
+    pub fn follow(
         &self,
+        moved: &Move,
         tiles: &[u32],
-        sources: impl Iterator<Item = Source> + Clone,
-        coming: &Coming<T, D>,
         loads: &LoadRecords<T, D>,
         is_behind: impl Fn(u32) -> bool,
-    ) -> (Self, Vec<u32>) {
-        let before = self.X.len();
-        let corner = |number: u64, from: usize, tile: u32| Corner {
-            is_behind: is_behind(tile),
-            number,
-            from,
-            tile,
+    ) -> (Self, Vec<u32>)
+    where
+        T: Pod,
+    {
+        let numbers: Vec<u64> = (0..self.X.len()).map(|corner| self.number(corner)).collect();
+        let coming = Coming {
+            topology: moved.coming_lists(|p| topology(self, p)),
+            numbers: moved.coming_lists(|p| {
+                self.of_particle(p).iter().map(|&corner| numbers[corner as usize])
+            }),
         };
-        let mut corners = Vec::new();
-        let mut is_met = vec![false; before];
-        for source in sources.clone() {
-            match source {
-                Source::Here(p) => {
-                    for &known in self.of_particle(p) {
-                        let known = known as usize;
-                        if !std::mem::replace(&mut is_met[known], true) {
-                            corners.push(corner(self.number(known), known, tiles[known]));
-                        }
-                    }
-                }
-                Source::Elsewhere(p) => {
-                    let (from, tiles) = (before + coming.numbers.start(p), coming.tiles.of(p));
-                    let each = coming.numbers.of(p).iter().zip(tiles).zip(from..);
-                    corners.extend(each.map(|((&number, &tile), from)| corner(number, from, tile)));
-                }
-            }
-        }
-        corners.sort_unstable();
-        corners.dedup_by_key(|corner| corner.number);
-
+        let (corners, known) = moved.of_parts(&numbers, &|p| self.of_particle(p));
+        drop(numbers);
+        let tiles = corners.all(tiles);
+        // For each place of a corner the corner by number.
+        let mut order: Vec<usize> = (0..known.len()).collect();
+        order.sort_by_key(|&corner| is_behind(tiles[corner]));
+        let ordered = |X: &[SVector<T, D>]| {
+            let X = corners.all(X);
+            order.iter().map(|&corner| X[corner]).collect()
+        };
         let mut own = Self::empty(self.interpolation, self.turn);
-        let at = |known: &[SVector<T, D>], others: &Lists<SVector<T, D>>| {
-            let of = |corner: &Corner| match corner.from.checked_sub(before) {
-                None => known[corner.from],
-                Some(place) => others.all()[place],
-            };
-            corners.iter().map(of).collect()
-        };
-        (own.X, own.x) = (at(&self.X, &coming.X), at(&self.x, &coming.x));
-        let mut now = vec![0; before];
-        for (number, corner) in (0..).zip(&corners) {
-            if let Some(now) = now.get_mut(corner.from) {
-                *now = number;
+        (own.X, own.x) = (ordered(&self.X), ordered(&self.x));
+
+        let mut place_of = vec![0; known.len()];
+        order.iter().zip(0..).for_each(|(&corner, place)| place_of[corner] = place);
+        let mut now = vec![0; self.X.len()];
+        for (source, &place) in corners.sources().zip(&place_of) {
+            if let Source::Here(before) = source {
+                now[before] = place;
             }
         }
-        let (front, back) = corners.split_at(corners.partition_point(|corner| !corner.is_behind));
-        let find = |number: u64| {
-            let among = |part: &[Corner]| part.binary_search_by_key(&number, |own| own.number);
-            among(front).or_else(|_| among(back).map(|place| front.len() + place))
-        };
         // A corner that comes is among those found, and so is one of a load, which is where the particle is on whose surface it acts.
-        let find = |number: &u64| find(*number).map_or(0, |place| place as u32);
-        for source in sources {
+        let find = |number: &u64| known.binary_search(number).map_or(0, |at| place_of[at]);
+        for source in moved.sources() {
             match source {
                 Source::Here(p) => {
                     own.read_topology(&topology(self, p));
@@ -211,8 +152,8 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
             let corners = std::array::from_fn(|k| find(&corners[k]));
             own.loads.push(Load { corners, shares: std::array::from_fn(|k| shares[k]), X: *X });
         }
-        let tiles = corners.iter().map(|corner| corner.tile).collect();
-        let corners = corners.into_iter().map(|corner| corner.number).collect();
+        let tiles = order.iter().map(|&corner| tiles[corner]).collect();
+        let corners = order.iter().map(|&corner| known[corner]).collect();
         own.numbers = Some(Numbers { corners, loads: numbers.clone() });
         (own, tiles)
     }
@@ -249,7 +190,7 @@ impl<T: RealField + Copy, const D: usize> Mesh<T, D> {
     }
 }
 
-/// The polygons of a particle, as [`Coming`] has them.
+/// The polygons of a particle, as `Coming` has them.
 fn topology<T: RealField + Copy, const D: usize>(own: &Mesh<T, D>, p: usize) -> Vec<u32> {
     let polygons = own.polygons(p);
     let mut record = vec![polygons.len() as u32];

@@ -12,7 +12,7 @@ use crate::processes::corner_halo::CornerHalo;
 use crate::processes::decomposition::Owned;
 use crate::step::state::State;
 use mmsmith_particles::mesh::Mesh;
-use mmsmith_particles::mesh::part::{Coming, LoadRecords};
+use mmsmith_particles::mesh::part::LoadRecords;
 use mmsmith_ranks::{Lists, Move};
 
 impl<T: Lanes, const D: usize> State<T, D> {
@@ -54,13 +54,11 @@ impl<T: Lanes, const D: usize> State<T, D> {
         let loads = loads.follow(&moved, numbers);
         let Some(moved) = self.give(&|p| of_particles.of(p)) else { return Vec::new() };
         drop(of_particles);
-        let coming = Coming::new(&mesh, keys, &moved);
-
         let Some(part) = &mut self.part else { return Vec::new() };
         let is_other = |tile: u32| part.holder(tile) != part.ranks.rank();
-        let assembled = mesh.assemble(keys, moved.sources(), &coming, &loads, is_other);
-        drop((mesh, coming));
-        let (mesh, mut keys) = assembled;
+        let followed = mesh.follow(&moved, keys, &loads, is_other);
+        drop(mesh);
+        let (mesh, mut keys) = followed;
         let own = keys.partition_point(|tile| !is_other(*tile));
         let halo = mesh.numbers.as_ref().map(|numbers| {
             let (known, others) = numbers.corners.split_at(own);
