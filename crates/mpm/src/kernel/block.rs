@@ -134,8 +134,7 @@ pub(crate) trait BlockWeights<T: Lanes, const D: usize>: Send {
         receiver: &mut [Interpolated<T, D>],
     );
 
-    /// G2P without affine velocities of as many particles as `interpolated` has places, by which they advance. Default: the values are
-    /// stored first.
+    /// G2P of as many particles as `interpolated` has places, by which they advance. Default: the values are stored first.
     fn g2p_and_advance(
         &mut self,
         strides: &[usize; D],

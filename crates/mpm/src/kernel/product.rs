@@ -127,7 +127,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         }
     }
 
-    /// G2P of the first `count` particles without affine velocities, to a receiver that is compiled into the kernel.
+    /// G2P of the first `count` particles to a receiver that is compiled into the kernel.
     fn g2p_with(
         &self,
         strides: &[usize; D],
@@ -136,7 +136,7 @@ impl<T: Lanes, const D: usize> ProductWeights<T, D> {
         receiver: impl Receive<T, D>,
     ) {
         let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
-        dispatch_by_width!(self.width, false, G2p<_, _, D>, of_block);
+        dispatch_by_width!(self.width, self.is_affine, G2p<_, _, D>, of_block);
     }
 
     /// Shape, position and half-sizes of a particle whose box has extended support.
@@ -192,13 +192,7 @@ impl<T: Lanes, const D: usize> BlockWeights<T, D> for ProductWeights<T, D> {
         if !EVERY_SCHEME {
             beyond("values that the usual scheme stores nowhere");
         }
-        let count = receiver.len();
-        if !self.is_affine {
-            self.g2p_with(strides, nodes, count, receiver);
-            return;
-        }
-        let of_block = G2pOfBlock { weights: self, strides, nodes, count, receiver };
-        dispatch_by_width!(self.width, true, G2p<_, _, D>, of_block);
+        self.g2p_with(strides, nodes, receiver.len(), receiver);
     }
 
     fn g2p_and_advance(

@@ -14,7 +14,6 @@ use mmsmith_particles::columns::{
 };
 
 use crate::domain::of_particles::{Domain, OfBlock};
-use crate::every_scheme::EVERY_SCHEME;
 use crate::grid::bins::Window;
 use crate::grid::geometry::Constants;
 use crate::grid::grid_update::{GridUpdate, NodeVectors, VelocityAndAcceleration};
@@ -24,9 +23,9 @@ use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::block::BlockLaw;
 use crate::kernel::buffers::{BufferPool, Buffers};
 use crate::kernel::copies::{BLOCK, Kinematics};
-use crate::scheme::Transfer;
+use crate::scheme::{Transfer, VelocityUpdate};
 use crate::step::forcing::Forcing;
-use crate::step::g2p::{Follow, grow};
+use crate::step::g2p::grow;
 use crate::step::health::{Outcome, SharedOutcome};
 use crate::step::state::State;
 
@@ -144,7 +143,7 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
         ids: &[u32],
         mut particles: Moving<'_, T, D>,
     ) -> Outcome {
-        let Moving { x, v, F, .. } = &mut particles;
+        let Moving { x, v, F, affine, .. } = &mut particles;
         let (x, v, F) = (whole(x), whole(v), whole(F));
         let &Self { c, domain, law, transfer, nodes, ref forcing, .. } = self;
         let is_with_memory = self.shares.internal > 0;
@@ -156,40 +155,33 @@ impl<T: Lanes, const D: usize> G2p2g<'_, T, D> {
             weights.compute(c, ids, Kinematics { x, F });
         }
         forcing.evaluate(ids, x, &mut contributions.b);
-        if self.follows_grid && (D == 2 || transfer != Transfer::Flip) {
+        if self.follows_grid && D == 2 {
             weights.g2p_scalars(&c.strides, nodes, &mut growth[..ids.len()]);
         }
         let interpolated = &mut interpolated[..ids.len()];
-        if EVERY_SCHEME && transfer != Transfer::Flip {
-            weights.g2p(&c.strides, nodes, interpolated);
-            let mut own = particles.first(ids.len());
-            let growth = self.follows_grid.then_some(&*growth);
-            let follow = Follow { c, law, late: c.time_step, early: None, growth };
-            follow.advance(transfer, interpolated, &mut own);
-            contributions.set_values(c, own.v, own.affine);
-        } else {
-            let start = is_with_memory.then(|| match law.follows_deformation() {
-                true => F.to_vec(),
-                false => Vec::new(),
-            });
-            let advance = AdvanceParticles {
-                c,
-                time_step: c.time_step,
-                per_cell: c.time_step * c.inverse_spacing,
-                x,
-                v,
-                F,
-                contributions,
-                growth,
-            };
-            weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
-            if self.follows_grid {
-                grow(particles.internal, growth);
-            } else if let Some(start) = start {
-                let Moving { x, F, internal, .. } = &mut particles;
-                law.evolve_to_stress(c, (&start, whole(F)), whole(x), internal, contributions);
-                has_stress = true;
-            }
+        let start = is_with_memory.then(|| match law.follows_deformation() {
+            true => F.to_vec(),
+            false => Vec::new(),
+        });
+        let advance = AdvanceParticles {
+            c,
+            time_step: c.time_step,
+            per_cell: c.time_step * c.inverse_spacing,
+            replaces: transfer.velocity_update() == VelocityUpdate::Replace,
+            x,
+            v,
+            F,
+            affine: transfer.is_affine().then(|| whole(affine)),
+            contributions,
+            growth,
+        };
+        weights.g2p_and_advance(&c.strides, nodes, interpolated, advance);
+        if self.follows_grid {
+            grow(particles.internal, growth);
+        } else if let Some(start) = start {
+            let Moving { x, F, internal, .. } = &mut particles;
+            law.evolve_to_stress(c, (&start, whole(F)), whole(x), internal, contributions);
+            has_stress = true;
         }
         let Moving { x, F, internal, .. } = particles;
         let (x, F) = (whole(x), whole(F));
