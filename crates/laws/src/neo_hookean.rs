@@ -1,6 +1,9 @@
 //! The neo-Hookean law.
 
-use mmsmith_lanes::tensor::{det_minus_one, determinant, inverse_transpose_minus_identity, real};
+use mmsmith_lanes::tensor::{
+    det_minus_one, determinant, inverse_transpose_minus_identity,
+    inverse_transpose_minus_identity_short, real,
+};
 use mmsmith_scalar_functions::logarithm::{is_near_one, ln_near_one, ln_of_both_in_range};
 use nalgebra::{RealField, SMatrix};
 
@@ -31,15 +34,15 @@ impl<T: RealField + Copy> NeoHookean<T> {
         self.lambda * log_jacobian(F)
     }
 
-    /// First Piola-Kirchhoff stress, from `lambda ln J`.
+    /// First Piola-Kirchhoff stress, from `lambda ln J` and `K = F^-T - I`.
     #[inline(always)]
     fn first_piola_kirchhoff_at<const D: usize>(
         &self,
         F: &SMatrix<T, D, D>,
         pressure: T,
+        K: SMatrix<T, D, D>,
     ) -> SMatrix<T, D, D> {
         let H = displacement_gradient(F);
-        let K = inverse_transpose_minus_identity(F);
         let P = plus_diagonal((H - K) * self.mu + K * pressure, pressure);
         if self.planted.is(Fault::TransposedLaw) { P.transpose() } else { P }
     }
@@ -89,7 +92,7 @@ impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
 
     #[inline(always)]
     fn first_piola_kirchhoff<const D: usize>(&self, F: &SMatrix<T, D, D>) -> SMatrix<T, D, D> {
-        self.first_piola_kirchhoff_at(F, self.pressure(F))
+        self.first_piola_kirchhoff_at(F, self.pressure(F), inverse_transpose_minus_identity(F))
     }
 
     #[inline(always)]
@@ -97,7 +100,8 @@ impl<T: RealField + Copy> LibraryLaw<T> for NeoHookean<T> {
         &self,
         F: &SMatrix<T, D, D>,
     ) -> SMatrix<T, D, D> {
-        self.first_piola_kirchhoff_at(F, self.lambda * log_jacobian_short(F))
+        let K = inverse_transpose_minus_identity_short(F);
+        self.first_piola_kirchhoff_at(F, self.lambda * log_jacobian_short(F), K)
     }
 
     fn strain_energy<const D: usize>(&self, F: &SMatrix<T, D, D>) -> T {

@@ -316,6 +316,9 @@ fn the_short_way_to_the_stress_is_taken_near_volumes_as_they_were_and_has_the_sa
             assert_eq!(law.is_short(&F), expected, "{J}");
             if expected {
                 assert_eq!(law.kirchhoff_short(&F), law.kirchhoff(&F), "{J}");
+                let (by_short, by_full) =
+                    (law.first_piola_kirchhoff_short(&F), law.first_piola_kirchhoff(&F));
+                assert_eq!(by_short, by_full, "{J}");
                 short += 1;
             } else {
                 long += 1;
