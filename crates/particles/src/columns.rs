@@ -118,18 +118,6 @@ macro_rules! columns {
         }
 
         impl<'a, T, const D: usize> Moving<'a, T, D> {
-            /// The first particles, as many as there are and no more than `count`.
-            pub fn first(&mut self, count: usize) -> Moving<'_, T, D> {
-                let (all, count) = (self.count.max(1), count.min(self.count));
-                Moving {
-                    count,
-                    $($moving: {
-                        let elements = self.$moving.len() / all * count;
-                        &mut self.$moving[..elements]
-                    },)*
-                }
-            }
-
             /// Takes the first particles away, as many as there are and no more than `count`.
             pub fn split_off(&mut self, count: usize) -> Moving<'a, T, D> {
                 let (all, count) = (self.count.max(1), count.min(self.count));

@@ -15,22 +15,12 @@ pub struct Lists<E> {
 impl<E> Lists<E> {
     /// Lists in the order of their places.
     pub fn new<I: IntoIterator<Item = E>>(lists: impl Iterator<Item = I>) -> Self {
-        let mut all = Self::none();
+        let mut all = Self { ends: Vec::new(), elements: Vec::new() };
         for list in lists {
             all.elements.extend(list);
             all.ends.push(all.elements.len());
         }
         all
-    }
-
-    /// No lists.
-    pub fn none() -> Self {
-        Self { ends: Vec::new(), elements: Vec::new() }
-    }
-
-    /// The elements of all lists, one list after the other.
-    pub fn all(&self) -> &[E] {
-        &self.elements
     }
 
     /// How many lists there are.
@@ -40,12 +30,8 @@ impl<E> Lists<E> {
 
     /// The list of a place.
     pub fn of(&self, p: usize) -> &[E] {
-        &self.elements[self.start(p)..self.ends[p]]
-    }
-
-    /// Where the list of a place begins among the elements of all.
-    pub fn start(&self, p: usize) -> usize {
-        if p == 0 { 0 } else { self.ends[p - 1] }
+        let start = if p == 0 { 0 } else { self.ends[p - 1] };
+        &self.elements[start..self.ends[p]]
     }
 }
 
