@@ -192,22 +192,50 @@ impl<T: Lanes, const D: usize> Linear<T, D> {
         r: &[Lane8<T>; D],
     ) -> Self {
         let mut slopes = [[Lane8::zero(); MOST_CORNERS / 2]; D];
-        for a in 0..D {
-            for pair in 0..1 << (D - 1 - a) {
-                let (lower, upper) = (values[2 * pair], values[2 * pair + 1]);
-                let along = vectors.sub8(upper, lower);
-                values[pair] = vectors.mul_add8(along, r[a], lower);
-                if SLOPES {
-                    slopes[a][pair] = along;
-                    for b in 0..a {
-                        let (lower, upper) = (slopes[b][2 * pair], slopes[b][2 * pair + 1]);
-                        let along = vectors.sub8(upper, lower);
-                        slopes[b][pair] = vectors.mul_add8(along, r[a], lower);
-                    }
-                }
+        let all = (&mut values, &mut slopes);
+        match D {
+            1 => along_axis::<T, V, SLOPES, D, 0, 1>(vectors, all, r),
+            2 => {
+                along_axis::<T, V, SLOPES, D, 0, 2>(vectors, (all.0, all.1), r);
+                along_axis::<T, V, SLOPES, D, 1, 1>(vectors, all, r);
+            }
+            _ => {
+                along_axis::<T, V, SLOPES, D, 0, 4>(vectors, (all.0, all.1), r);
+                along_axis::<T, V, SLOPES, D, 1, 2>(vectors, (all.0, all.1), r);
+                along_axis::<T, V, SLOPES, D, 2, 1>(vectors, all, r);
             }
         }
         Self { value: values[0], slopes: slopes.map(|of_axis| of_axis[0]) }
+    }
+}
+
+/// Interpolates along axis `A` between the two values of each of `PAIRS` pairs, and likewise the slopes along axes before it. Numbers of pairs are constants, so that all
+/// loops are unrolled and values stay in registers.
+#[inline(always)]
+fn along_axis<
+    T: Lanes,
+    V: Vectors,
+    const SLOPES: bool,
+    const D: usize,
+    const A: usize,
+    const PAIRS: usize,
+>(
+    vectors: V,
+    (values, slopes): (&mut [Lane8<T>; MOST_CORNERS], &mut [[Lane8<T>; MOST_CORNERS / 2]; D]),
+    r: &[Lane8<T>; D],
+) {
+    for pair in 0..PAIRS {
+        let (lower, upper) = (values[2 * pair], values[2 * pair + 1]);
+        let along = vectors.sub8(upper, lower);
+        values[pair] = vectors.mul_add8(along, r[A], lower);
+        if SLOPES {
+            slopes[A][pair] = along;
+            for of_axis in &mut slopes[..A] {
+                let (lower, upper) = (of_axis[2 * pair], of_axis[2 * pair + 1]);
+                let along = vectors.sub8(upper, lower);
+                of_axis[pair] = vectors.mul_add8(along, r[A], lower);
+            }
+        }
     }
 }
 
