@@ -192,39 +192,27 @@ impl<T: Lanes, const D: usize> Linear<T, D> {
         r: &[Lane8<T>; D],
     ) -> Self {
         let mut slopes = [[Lane8::zero(); MOST_CORNERS / 2]; D];
-        let all = (&mut values, &mut slopes);
-        match D {
-            1 => along_axis::<T, V, SLOPES, D, 0, 1>(vectors, all, r),
-            2 => {
-                along_axis::<T, V, SLOPES, D, 0, 2>(vectors, (all.0, all.1), r);
-                along_axis::<T, V, SLOPES, D, 1, 1>(vectors, all, r);
-            }
-            _ => {
-                along_axis::<T, V, SLOPES, D, 0, 4>(vectors, (all.0, all.1), r);
-                along_axis::<T, V, SLOPES, D, 1, 2>(vectors, (all.0, all.1), r);
-                along_axis::<T, V, SLOPES, D, 2, 1>(vectors, all, r);
-            }
+        along_axis::<T, V, SLOPES, D, 0>(vectors, &mut values, &mut slopes, r);
+        if D > 1 {
+            along_axis::<T, V, SLOPES, D, 1>(vectors, &mut values, &mut slopes, r);
+        }
+        if D > 2 {
+            along_axis::<T, V, SLOPES, D, 2>(vectors, &mut values, &mut slopes, r);
         }
         Self { value: values[0], slopes: slopes.map(|of_axis| of_axis[0]) }
     }
 }
 
-/// Interpolates along axis `A` between the two values of each of `PAIRS` pairs, and likewise the slopes along axes before it. Numbers of pairs are constants, so that all
-/// loops are unrolled and values stay in registers.
+/// Interpolates along axis `A` between the two values of each pair, and likewise the slopes along axes before it. The axis is a constant, and with it the
+/// number of pairs, so that all loops are unrolled and values stay in registers.
 #[inline(always)]
-fn along_axis<
-    T: Lanes,
-    V: Vectors,
-    const SLOPES: bool,
-    const D: usize,
-    const A: usize,
-    const PAIRS: usize,
->(
+fn along_axis<T: Lanes, V: Vectors, const SLOPES: bool, const D: usize, const A: usize>(
     vectors: V,
-    (values, slopes): (&mut [Lane8<T>; MOST_CORNERS], &mut [[Lane8<T>; MOST_CORNERS / 2]; D]),
+    values: &mut [Lane8<T>; MOST_CORNERS],
+    slopes: &mut [[Lane8<T>; MOST_CORNERS / 2]; D],
     r: &[Lane8<T>; D],
 ) {
-    for pair in 0..PAIRS {
+    for pair in 0..1 << (D - 1 - A) {
         let (lower, upper) = (values[2 * pair], values[2 * pair + 1]);
         let along = vectors.sub8(upper, lower);
         values[pair] = vectors.mul_add8(along, r[A], lower);
