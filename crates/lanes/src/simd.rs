@@ -3,6 +3,7 @@
 //! The instances differ in the width of registers alone. No sum is reordered, and only explicit `mul_add` is fused, by many
 //! instructions where the processor has no single one. All instances thus give the same bits.
 
+use std::hint::black_box;
 use std::ops::{Add, Mul, Sub};
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -568,6 +569,10 @@ impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
+        // A local that has to lie at whole cache lines makes the compiler align the whole frame. Registers that it puts aside would else lie across
+        // lines, and now and then across pages of memory, where a load waits some 40 cycles for the store before it.
+        let mut at_whole_lines = Lane8([0.0_f64; 8]);
+        black_box(&mut at_whole_lines);
         self.0.run(self.1);
     }
 }
