@@ -14,6 +14,9 @@ use crate::grid::PAD_BELOW;
 
 /// Largest supported half-size of a particle's box, in cells.
 pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
+
+/// Least half-size of a stretching box, in cells: a quarter turn makes `F_aa` zero, and the weights divide by the half-size.
+pub(crate) const LEAST_HALF_SIZE: f64 = 1e-6;
 /// Nodes along each axis of the extended support, which the largest box needs.
 pub(crate) const EXTENDED: usize = 6;
 /// How far a quadratic spline reaches beyond a hat function, in cells.
@@ -272,8 +275,7 @@ pub(crate) fn half_size<T: RealField + Copy, const STRETCHING: bool>(l: T, F_aa:
     if !STRETCHING {
         return l;
     }
-    // A quarter turn makes F_aa zero, and the weights divide by l.
-    let (l, least): (T, T) = ((l * F_aa).abs(), real(1e-6));
+    let (l, least): (T, T) = ((l * F_aa).abs(), real(LEAST_HALF_SIZE));
     if l > least { l } else { least }
 }
 
