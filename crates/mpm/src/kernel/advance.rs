@@ -34,6 +34,9 @@ impl<T: Lanes, const D: usize> Receive<T, D> for AdvanceParticles<'_, T, D> {
     fn receive(&mut self, k: usize, interpolated: &Interpolated<T, D>) {
         let Self { c, contributions, .. } = self;
         let (x, v, F) = (&mut self.x[k], &mut self.v[k], &mut self.F[k]);
+        prefetch(x, BLOCK);
+        prefetch(v, BLOCK);
+        prefetch(F, BLOCK);
         let mut velocity = interpolated.velocity;
         if self.replaces {
             *v = interpolated.second;
