@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::grid::geometry::Constants;
 use crate::grid::node::{LANES, Node};
-use crate::kernel::beyond;
+use crate::kernel::{nodes_from, nodes_from_mut};
 use crate::shape::one_axis::EXTENDED;
 use crate::shape::weights::Weights;
 
@@ -362,9 +362,7 @@ pub(crate) fn add_values<T, L, const A: usize, const C: usize, const W: usize>(
     for index in 0..rows::<A, W>() {
         let row = row(weights, start, strides, index);
         let [to_value, to_slope] = contributions_to_row::<T, A, C>(value, slope, &row, L::AFFINE);
-        let Some(nodes) = nodes.get_mut(row.start..).and_then(|n| n.first_chunk_mut::<W>()) else {
-            beyond("a stencil beyond its window")
-        };
+        let nodes = nodes_from_mut::<_, W>(nodes, row.start, "a stencil beyond its window");
         for (i, Node { values }) in nodes.iter_mut().enumerate() {
             let factors = Factors::of(weights, 0, i);
             for q in 0..LANES {
@@ -391,9 +389,7 @@ where
     let start = weights.first_node();
     for index in 0..rows::<D, W>() {
         let row = row(weights, start, strides, index);
-        let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-            beyond("a stencil beyond the grid")
-        };
+        let nodes = nodes_from::<_, W>(nodes, row.start, "a stencil beyond the grid");
         let mut of_row = T::zero();
         for (i, node) in nodes.iter().enumerate() {
             of_row += node.scalar() * weights.S(0, i);
@@ -421,9 +417,7 @@ impl<T: Lanes, const A: usize> InterpolationSums<T, A> {
         let start = weights.first_node();
         for index in 0..rows::<A, W>() {
             let row = row(weights, start, strides, index);
-            let Some(nodes) = nodes.get(row.start..).and_then(|n| n.first_chunk::<W>()) else {
-                beyond("a stencil beyond the grid")
-            };
+            let nodes = nodes_from::<_, W>(nodes, row.start, "a stencil beyond the grid");
             sums.add_row(weights, &row, nodes);
         }
         sums

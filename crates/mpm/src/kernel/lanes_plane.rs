@@ -6,7 +6,7 @@ use mmsmith_lanes::simd::{Lane4, Lanes, Vectors};
 
 use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Receive};
-use crate::kernel::beyond;
+use crate::kernel::{nodes_from, nodes_from_mut};
 use crate::shape::weights::{Weights, is_middle};
 
 /// The first four of a node's values: momentum and force in two dimensions; momentum, force and mass in one.
@@ -160,9 +160,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                 masses.0[W / 2] = masses.0[W / 2] - masses.0[0] - masses.0[W - 1];
             }
             let place = row_start(start, strides, j);
-            let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                beyond("a stencil beyond its window")
-            };
+            let nodes = nodes_from_mut::<_, W>(window, place, "a stencil beyond its window");
             for i in 0..W {
                 let Node { values } = &mut nodes[i];
                 let sum = vectors.add(half(values), sums[i]);
@@ -287,9 +285,7 @@ pub(crate) fn g2p_in_plane<T, L, V, const D: usize, const W: usize>(
         let mut changes = [[zero; W]; W];
         for j in 0..rows {
             let place = row_start(start, strides, j);
-            let Some(row) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                beyond("a stencil beyond the grid")
-            };
+            let row = nodes_from::<_, W>(nodes, place, "a stencil beyond the grid");
             for i in 0..W {
                 changes[j][i] = half(&row[i].values);
             }

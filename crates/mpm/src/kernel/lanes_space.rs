@@ -6,7 +6,7 @@ use mmsmith_lanes::simd::{Lane8, Lanes, Vectors};
 
 use crate::grid::node::{LANES, Node};
 use crate::kernel::any::{Contributions, Interpolated};
-use crate::kernel::beyond;
+use crate::kernel::{nodes_from, nodes_from_mut};
 use crate::shape::weights::Weights;
 
 /// The weights of a particle along an axis, each as a factor of eight numbers.
@@ -88,9 +88,7 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
             let to_value = vectors.mul_add8(to_across, G_across[row], with_value);
             let to_along = vectors.mul8(to_along, S_across[row]);
             let place = start + row * strides[1] + plane * strides[D - 1];
-            let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>()) else {
-                beyond("a stencil beyond its window")
-            };
+            let nodes = nodes_from_mut::<_, W>(window, place, "a stencil beyond its window");
             for (i, Node { values }) in nodes.iter_mut().enumerate() {
                 let with_slope = vectors.mul_add8(to_along, G[i], vectors.load8(values));
                 *values = vectors.mul_add8(to_value, S[i], with_slope).0;
@@ -139,9 +137,7 @@ where
         let (mut plane_value, mut plane_along, mut plane_across) = (zero, zero, zero);
         for row in 0..places::<W>() {
             let place = start + row * strides[1] + plane * strides[D - 1];
-            let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                beyond("a stencil beyond the grid")
-            };
+            let nodes = nodes_from::<_, W>(nodes, place, "a stencil beyond the grid");
             let (mut row_value, mut row_along) = (zero, zero);
             for (i, Node { values }) in nodes.iter().enumerate() {
                 let nodal = vectors.load8(values);

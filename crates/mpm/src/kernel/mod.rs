@@ -32,3 +32,39 @@ pub(crate) mod shared;
 pub(crate) fn beyond(what: &str) -> ! {
     panic!("{what}: a fault of the solver, not of the scene")
 }
+
+/// The nodes of a row from a place on.
+///
+/// The place is compared with the last at which a row can begin: a single comparison, from which the compiler knows that the row is inside.
+#[inline(always)]
+pub(crate) fn nodes_from<'a, N, const W: usize>(
+    nodes: &'a [N],
+    place: usize,
+    what: &str,
+) -> &'a [N; W] {
+    match nodes.len().checked_sub(W - 1) {
+        Some(end) if place < end => match nodes.get(place..).and_then(|n| n.first_chunk()) {
+            Some(row) => row,
+            None => beyond(what),
+        },
+        _ => beyond(what),
+    }
+}
+
+/// As [`nodes_from`], to be changed.
+#[inline(always)]
+pub(crate) fn nodes_from_mut<'a, N, const W: usize>(
+    nodes: &'a mut [N],
+    place: usize,
+    what: &str,
+) -> &'a mut [N; W] {
+    match nodes.len().checked_sub(W - 1) {
+        Some(end) if place < end => {
+            match nodes.get_mut(place..).and_then(|n| n.first_chunk_mut()) {
+                Some(row) => row,
+                None => beyond(what),
+            }
+        }
+        _ => beyond(what),
+    }
+}

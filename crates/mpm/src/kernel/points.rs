@@ -7,7 +7,7 @@ use crate::domain::corner_values::AlongAxes;
 use crate::domain::shared_corners::SharedCorners;
 use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
-use crate::kernel::beyond;
+use crate::kernel::{nodes_from, nodes_from_mut};
 use crate::shape::one_axis::{Hat, ShapeFunction, index};
 
 /// The nodes around a point.
@@ -148,8 +148,7 @@ fn put<T: Lanes, V: Vectors, const D: usize>(
 ) {
     for (row, sums) in sums.iter().enumerate().take(1 << (D - 1)) {
         let start = start_of_row(&c.strides, first, row);
-        let nodes = window.get_mut(start..).and_then(|nodes| nodes.first_chunk_mut::<2>());
-        let Some(nodes) = nodes else { beyond("a corner beyond its window") };
+        let nodes = nodes_from_mut::<_, 2>(window, start, "a corner beyond its window");
         for (Node { values }, sum) in nodes.iter_mut().zip(sums) {
             *values = vectors.add8(vectors.load8(values), *sum).0;
         }
@@ -211,11 +210,7 @@ impl<T: Lanes, const D: usize> Loop for FromGrid<'_, T, D> {
             for row in 0..1 << (D - 1) {
                 let (start, w) =
                     (start_of_row(&c.strides, around.first, row), around.of_row(row, 0));
-                let Some([low, high]) =
-                    nodes.get(start..).and_then(|nodes| nodes.first_chunk::<2>())
-                else {
-                    beyond("a corner beyond the grid")
-                };
+                let [low, high] = nodes_from::<_, 2>(nodes, start, "a corner beyond the grid");
                 let (low, high) = (vectors.load8(&low.values), vectors.load8(&high.values));
                 // Rounded before they are added: those of a node and of its mirror image cancel.
                 let of_low = vectors.mul8(low, vectors.splat8(near));

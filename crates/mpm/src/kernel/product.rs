@@ -12,11 +12,11 @@ use crate::grid::geometry::Constants;
 use crate::grid::node::Node;
 use crate::kernel::advance::AdvanceParticles;
 use crate::kernel::any::{Contributions, Interpolated, Receive, g2p, g2p_scalar, p2g};
-use crate::kernel::beyond;
 use crate::kernel::block::BlockWeights;
 use crate::kernel::copies::{BLOCK, Kinematics};
 use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
+use crate::kernel::{beyond, nodes_from, nodes_from_mut};
 use crate::shape::one_axis::{
     CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticMean, QuadraticSpline, ShapeFunction,
     half_size, index, moment,
@@ -602,10 +602,7 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
             }
             for (j, sums) in sums.into_iter().enumerate() {
                 let place = start + j * strides[D - 1];
-                let Some(nodes) = window.get_mut(place..).and_then(|n| n.first_chunk_mut::<W>())
-                else {
-                    beyond("a stencil beyond its window")
-                };
+                let nodes = nodes_from_mut::<_, W>(window, place, "a stencil beyond its window");
                 for (node, sum) in nodes.iter_mut().zip(sums) {
                     *node.scalar_mut() += sum;
                 }
@@ -650,9 +647,7 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
             let mut scalars = [[T::zero(); W]; W];
             for (j, scalars) in scalars.iter_mut().enumerate() {
                 let place = start + j * strides[D - 1];
-                let Some(nodes) = nodes.get(place..).and_then(|n| n.first_chunk::<W>()) else {
-                    beyond("a stencil beyond the grid")
-                };
+                let nodes = nodes_from::<_, W>(nodes, place, "a stencil beyond the grid");
                 for (scalar, node) in scalars.iter_mut().zip(nodes) {
                     *scalar = node.scalar();
                 }

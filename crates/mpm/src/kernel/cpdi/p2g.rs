@@ -7,9 +7,9 @@ use mmsmith_lanes::tensor::real;
 
 use crate::grid::node::Node;
 use crate::kernel::any::Contributions;
-use crate::kernel::beyond;
 use crate::kernel::copies::BLOCK;
 use crate::kernel::cpdi::parallelograms::{GROUP, Parallelograms, fold};
+use crate::kernel::{beyond, nodes_from_mut};
 use crate::shape::cells::{MOST_CORNERS, REACHED, is_upper};
 
 /// Nodes that a domain within two cells reaches in all.
@@ -169,10 +169,11 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for P2g<'_, T, D, AFFINE
                 let start = own.first_node[k];
                 for row in 0..weights.row_count {
                     let NodeRow { start: from_first, place } = weights.rows[row];
-                    let nodes = window.get_mut(start + from_first..);
-                    let Some(nodes) = nodes.and_then(|n| n.first_chunk_mut::<REACHED>()) else {
-                        beyond("a domain beyond its window")
-                    };
+                    let nodes = nodes_from_mut::<_, REACHED>(
+                        window,
+                        start + from_first,
+                        "a domain beyond its window",
+                    );
                     let mut of_row = value;
                     if AFFINE {
                         for a in 1..D {
