@@ -100,6 +100,14 @@ pub trait Vectors: Copy {
     fn div8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// `a b + c`, rounded once.
     fn mul_add8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
+    /// `a b` in the lower four lanes. In the others `a`, where that is zero, but for the sign of the zero, and else `a` or `a b`.
+    fn mul_low<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    /// `a b` in the upper four lanes; in the others as [`mul_low`](Self::mul_low).
+    fn mul_high<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
+    /// `a b + c` in the lower four lanes, rounded once. In the others `c`, where `a` is zero, but for the sign of a zero, and else `c` or `a b + c`.
+    fn mul_add_low<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
+    /// `a b + c` in the upper four lanes, rounded once; in the others as [`mul_add_low`](Self::mul_add_low).
+    fn mul_add_high<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
     /// The smaller of both; `b` where one is not a number.
     fn min8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// The larger of both; `b` where one is not a number.
@@ -175,6 +183,10 @@ lane_by_lane! {
     fn mul8(a, b; q of Lane8) { a[q] * b[q] }
     fn div8(a, b; q of Lane8) { a[q] / b[q] }
     fn mul_add8(a, b, c; q of Lane8) { a[q].mul_add(b[q], c[q]) }
+    fn mul_low(a, b; q of Lane8) { if q < 4 { a[q] * b[q] } else { a[q] } }
+    fn mul_high(a, b; q of Lane8) { if q < 4 { a[q] } else { a[q] * b[q] } }
+    fn mul_add_low(a, b, c; q of Lane8) { if q < 4 { a[q].mul_add(b[q], c[q]) } else { c[q] } }
+    fn mul_add_high(a, b, c; q of Lane8) { if q < 4 { c[q] } else { a[q].mul_add(b[q], c[q]) } }
     fn min8(a, b; q of Lane8) { if a[q] < b[q] { a[q] } else { b[q] } }
     fn max8(a, b; q of Lane8) { if a[q] > b[q] { a[q] } else { b[q] } }
     moves:
@@ -292,11 +304,16 @@ mod x86 {
             $(fn $eight:ident($vectors8:ident, $($a8:ident),*) {
                 each half $half:expr, whole $whole:expr, $single8:expr
             })*
+            one_half:
+            $(fn $one_half:ident($vectors1:ident, $($a1:ident),*) {
+                half $of_one:tt of $other:ident, $of_half:expr, like $whole_op:ident
+            })*
         ) => {
             /// The operations of [`Vectors`] in registers of up to 256 bits.
             pub trait Instructions: Sized {
                 $(fn $four(vectors: V3, $($a: Lane4<Self>),*) -> Lane4<Self>;)*
                 $(fn $eight(vectors: V3, $($a8: Lane8<Self>),*) -> Lane8<Self>;)*
+                $(fn $one_half(vectors: V3, $($a1: Lane8<Self>),*) -> Lane8<Self>;)*
                 fn splat(vectors: V3, value: Self) -> Lane4<Self>;
                 fn splat8(vectors: V3, value: Self) -> Lane8<Self>;
                 fn load(vectors: V3, values: &[Self; 4]) -> Lane4<Self>;
@@ -309,6 +326,11 @@ mod x86 {
                 $(#[inline(always)]
                 fn $eight(vectors: V4, $($a8: Lane8<Self>),*) -> Lane8<Self> {
                     <Self as Instructions>::$eight(*vectors, $($a8),*)
+                })*
+
+                $(#[inline(always)]
+                fn $one_half(vectors: V4, $($a1: Lane8<Self>),*) -> Lane8<Self> {
+                    <Self as WideInstructions>::$whole_op(vectors, $($a1),*)
                 })*
 
                 #[inline(always)]
@@ -363,6 +385,15 @@ mod x86 {
                     Lane8(must_cast([low, high]))
                 })*
 
+                $(#[inline(always)]
+                fn $one_half($vectors1: V3, $($a1: Lane8<Self>),*) -> Lane8<Self> {
+                    $(let $a1: [__m256d; 2] = must_cast($a1.0);)*
+                    let mut halves = $other;
+                    $(let $a1 = $a1[$of_one];)*
+                    halves[$of_one] = $of_half;
+                    Lane8(must_cast(halves))
+                })*
+
                 #[inline(always)]
                 fn splat(vectors: V3, value: Self) -> Lane4<Self> {
                     Lane4(must_cast(vectors.avx._mm256_set1_pd(value)))
@@ -397,6 +428,11 @@ mod x86 {
                     Lane8(must_cast($single8))
                 })*
 
+                $(#[inline(always)]
+                fn $one_half(vectors: V3, $($a1: Lane8<Self>),*) -> Lane8<Self> {
+                    <Self as Instructions>::$whole_op(vectors, $($a1),*)
+                })*
+
                 #[inline(always)]
                 fn splat(vectors: V3, value: Self) -> Lane4<Self> {
                     Lane4(must_cast(vectors.sse._mm_set1_ps(value)))
@@ -427,6 +463,11 @@ mod x86 {
                 $(#[inline(always)]
                 fn $eight<T: Lanes>(self, $($a8: Lane8<T>),*) -> Lane8<T> {
                     <T as WideInstructions>::$eight(self, $($a8),*)
+                })*
+
+                $(#[inline(always)]
+                fn $one_half<T: Lanes>(self, $($a1: Lane8<T>),*) -> Lane8<T> {
+                    <T as WideInstructions>::$one_half(self, $($a1),*)
                 })*
 
                 #[inline(always)]
@@ -464,6 +505,11 @@ mod x86 {
                 $(#[inline(always)]
                 fn $eight<T: Lanes>(self, $($a8: Lane8<T>),*) -> Lane8<T> {
                     <T as Instructions>::$eight(self, $($a8),*)
+                })*
+
+                $(#[inline(always)]
+                fn $one_half<T: Lanes>(self, $($a1: Lane8<T>),*) -> Lane8<T> {
+                    <T as Instructions>::$one_half(self, $($a1),*)
                 })*
 
                 #[inline(always)]
@@ -558,6 +604,15 @@ mod x86 {
             each half vectors.fma._mm256_fmadd_pd(a, b, c),
             whole vectors.avx512f._mm512_fmadd_pd(a, b, c),
             vectors.fma._mm256_fmadd_ps(a, b, c)
+        }
+        one_half:
+        fn mul_low(vectors, a, b) { half 0 of a, vectors.avx._mm256_mul_pd(a, b), like mul8 }
+        fn mul_high(vectors, a, b) { half 1 of a, vectors.avx._mm256_mul_pd(a, b), like mul8 }
+        fn mul_add_low(vectors, a, b, c) {
+            half 0 of c, vectors.fma._mm256_fmadd_pd(a, b, c), like mul_add8
+        }
+        fn mul_add_high(vectors, a, b, c) {
+            half 1 of c, vectors.fma._mm256_fmadd_pd(a, b, c), like mul_add8
         }
     }
 }
@@ -655,6 +710,7 @@ pub fn widest<W: WithSimd>(work: W) -> W::Output {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::ops::Range;
 
     /// All operations on some numbers, one after the other.
     fn operations<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 4]> {
@@ -703,11 +759,31 @@ mod tests {
         .into()
     }
 
+    /// The operations on half of eight lanes, one after the other: where the other half of `a` is zero, what is left of it and of `c`.
+    fn operations_of_halves<T: Lanes>(vectors: impl Vectors) -> Vec<[T; 8]> {
+        let lanes = |from: f64, of: Range<usize>| {
+            let value = |q: usize| if of.contains(&q) { (from + q as f64).sqrt() } else { 0.0 };
+            Lane8(std::array::from_fn(|q| nalgebra::convert::<f64, T>(value(q))))
+        };
+        let (low, high) = (lanes(2.0, 0..4), lanes(3.0, 4..8));
+        let (b, c) = (lanes(11.0, 0..8), lanes(20.0, 0..8));
+        [
+            vectors.mul_low(low, b),
+            vectors.mul_high(high, b),
+            vectors.mul_add_low(low, b, c),
+            vectors.mul_add_high(high, b, c),
+        ]
+        .map(|Lane8(values)| values)
+        .into()
+    }
+
     #[cfg(target_arch = "x86_64")]
     fn check(simd: impl Vectors) {
         assert_eq!(operations::<f64>(simd), operations::<f64>(Scalar::new()));
         assert_eq!(operations::<f32>(simd), operations::<f32>(Scalar::new()));
         assert_eq!(operations8::<f64>(simd), operations8::<f64>(Scalar::new()));
+        assert_eq!(operations_of_halves::<f64>(simd), operations_of_halves(Scalar::new()));
+        assert_eq!(operations_of_halves::<f32>(simd), operations_of_halves(Scalar::new()));
         assert_eq!(operations8::<f32>(simd), operations8::<f32>(Scalar::new()));
     }
 

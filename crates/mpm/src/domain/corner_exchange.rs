@@ -114,8 +114,8 @@ impl<T: Lanes, const D: usize> Exchange<T, D> {
             for (&corner, &share) in load.corners.iter().zip(&load.shares) {
                 // The process that sorts a corner has all loads at it.
                 let Some(&sum) = corners.sums_of(corner as usize).first() else { continue };
-                let Node { values } = &mut sums[sum as usize];
-                (0..D).for_each(|i| values[D + i] += force[i] * share);
+                let sums = sums[sum as usize].second_mut();
+                (0..D).for_each(|i| sums[i] += force[i] * share);
             }
         }
     }

@@ -119,7 +119,10 @@ impl<T: Lanes, const D: usize> Extension<T, D> {
                     *light += value * share;
                 }
             }
-            nodes[*node].values[..2 * D].copy_from_slice(&light[..2 * D]);
+            let own = &mut nodes[*node];
+            let light = Node::<T, D> { values: light };
+            own.values[..D].copy_from_slice(&light.values[..D]);
+            own.second_mut().copy_from_slice(light.second().as_slice());
         }
         grid.on_walls(nodes, first_row);
     }

@@ -51,7 +51,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
             nodes_before: layout.nodes_before() as f64,
             tiles: *tiles,
             time_step,
-            sent: 2 * D + 1,
+            sent: Node::<T, D>::SCALAR,
             // Weights below the square of the rounding error only come about by rounding.
             least_mass: least_particle_mass * T::default_epsilon() * T::default_epsilon(),
             planted: Planted::here(),
@@ -121,7 +121,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
     #[inline(always)]
     pub(crate) fn ghost(&self, mut ghost: Node<T, D>) -> Node<T, D> {
         if self.planted.is(Fault::GhostMassLost) {
-            ghost.values[2 * D] = T::zero();
+            ghost.values[Node::<T, D>::MASS] = T::zero();
         }
         ghost
     }
@@ -136,7 +136,7 @@ impl<T: RealField + Copy, const D: usize> Constants<T, D> {
                 node.values[a] = kept.values[a];
             }
             if self.planted.is(Fault::WallsKeepAcceleration) {
-                node.values[D + a] = kept.values[D + a];
+                node.second_mut()[a] = kept.second()[a];
             }
         }
     }

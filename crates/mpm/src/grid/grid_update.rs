@@ -85,7 +85,7 @@ impl NodeVectors {
         time_step: T,
     ) {
         let end = velocity + acceleration * time_step;
-        (node.values[a], node.values[D + a]) = match self {
+        (node.values[a], node.values[Node::<T, D>::SECOND + a]) = match self {
             Self::VelocityAndAcceleration => (end, acceleration),
             Self::VelocityTwice => (end, end),
             Self::StartAndAcceleration => (velocity, acceleration),
@@ -107,7 +107,7 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for VelocityAndAccele
         for node in nodes {
             let inverse = c.inverse_mass(node);
             for a in 0..D {
-                let acceleration = node.values[D + a] * (inverse * self.scale);
+                let acceleration = node.values[Node::<T, D>::SECOND + a] * (inverse * self.scale);
                 let velocity = node.values[a] * inverse;
                 self.vectors.set(node, a, (velocity, acceleration), c.time_step);
             }
@@ -155,7 +155,7 @@ impl<T: RealField + Copy, const D: usize> NodeUpdate<T, D> for Acceleration<T> {
         for node in nodes {
             let inverse = c.inverse_mass(node) * self.scale;
             for a in 0..D {
-                let acceleration = node.values[D + a] * inverse;
+                let acceleration = node.values[Node::<T, D>::SECOND + a] * inverse;
                 self.vectors.set(node, a, (node.values[a], acceleration), c.time_step);
             }
         }
@@ -474,7 +474,8 @@ mod tests {
         let value = |index: usize, q: usize| ((index * 8 + q) as f64 * 0.7).sin();
         let node = |index| {
             let mut node = Node { values: std::array::from_fn(|q| value(index, q)) };
-            node.values[2 * D] = if index % 5 == 3 { 0.0 } else { 2.0 + node.values[2 * D] };
+            let mass = &mut node.values[Node::<f64, D>::MASS];
+            *mass = if index % 5 == 3 { 0.0 } else { 2.0 + *mass };
             node
         };
         (0..count).map(node).collect()

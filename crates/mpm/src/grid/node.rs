@@ -5,6 +5,9 @@ use nalgebra::{RealField, SVector};
 /// Numbers in a node: enough for three dimensions, and whole vector registers in both precisions.
 pub(crate) const LANES: usize = 8;
 
+/// Numbers in half of a node.
+const HALF: usize = LANES / 2;
+
 /// Components of vectors: those that vanish on a wall, and change their signs in its mirror image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Components(u8);
@@ -37,14 +40,24 @@ impl Components {
     }
 }
 
-/// Values at a node in the order `[velocity, acceleration, mass, scalar, zeros]`, D + D + 2 numbers and padding, so that they go through
-/// vector instructions together. P2G sums momentum in place of velocity and force in place of acceleration; the grid update
+/// Values at a node, 2 D + 2 numbers and padding, so that they go through vector instructions together: in space in the order `[velocity,
+/// mass, acceleration, scalar]`, of which registers of 256 bits hold a half each, so that work for one half alone costs half; else in the
+/// order `[velocity, acceleration, mass, scalar, zeros]`, of which such a register holds both vectors. P2G sums momentum in place of velocity and force in place of acceleration; the grid update
 /// divides by the mass. Where a change of volume follows the grid, the scalar is that of [`VolumeRates`](crate::grid::volume_rates::VolumeRates), else
 /// zero.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Node<T, const D: usize> {
     pub(crate) values: [T; LANES],
+}
+
+impl<T, const D: usize> Node<T, D> {
+    /// Place of the first component of the second vector, the acceleration.
+    pub(crate) const SECOND: usize = if D == 3 { HALF } else { D };
+    /// Place of the mass.
+    pub(crate) const MASS: usize = if D == 3 { D } else { 2 * D };
+    /// Place of the scalar, the last number.
+    pub(crate) const SCALAR: usize = 2 * D + 1;
 }
 
 impl<T: RealField + Copy, const D: usize> Node<T, D> {
@@ -58,9 +71,9 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
         let mut values = [T::zero(); LANES];
         for a in 0..D {
             values[a] = velocity[a];
-            values[D + a] = acceleration[a];
+            values[Self::SECOND + a] = acceleration[a];
         }
-        values[2 * D] = mass;
+        values[Self::MASS] = mass;
         Self { values }
     }
 
@@ -71,17 +84,17 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
 
     #[inline(always)]
     pub(crate) fn mass(&self) -> T {
-        self.values[2 * D]
+        self.values[Self::MASS]
     }
 
     #[inline(always)]
     pub(crate) fn scalar(&self) -> T {
-        self.values[2 * D + 1]
+        self.values[Self::SCALAR]
     }
 
     #[inline(always)]
     pub(crate) fn scalar_mut(&mut self) -> &mut T {
-        &mut self.values[2 * D + 1]
+        &mut self.values[Self::SCALAR]
     }
 
     /// Clears components of velocity and acceleration.
@@ -89,7 +102,7 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
     pub(crate) fn clear(&mut self, components: Components) {
         for a in components.each::<D>() {
             self.values[a] = T::zero();
-            self.values[D + a] = T::zero();
+            self.values[Self::SECOND + a] = T::zero();
         }
     }
 
@@ -98,15 +111,27 @@ impl<T: RealField + Copy, const D: usize> Node<T, D> {
     pub(crate) fn flipped(mut self, components: Components) -> Self {
         for a in components.each::<D>() {
             self.values[a] = -self.values[a];
-            self.values[D + a] = -self.values[D + a];
+            self.values[Self::SECOND + a] = -self.values[Self::SECOND + a];
         }
         self
+    }
+
+    /// The acceleration.
+    #[inline(always)]
+    pub(crate) fn second(&self) -> SVector<T, D> {
+        SVector::from_fn(|a, _| self.values[Self::SECOND + a])
+    }
+
+    /// Its components, to be changed.
+    #[inline(always)]
+    pub(crate) fn second_mut(&mut self) -> &mut [T] {
+        &mut self.values[Self::SECOND..][..D]
     }
 
     /// Adds the acceleration and the scalar alone.
     pub(crate) fn add_acceleration(&mut self, other: &Self) {
         for a in 0..D {
-            self.values[D + a] += other.values[D + a];
+            self.values[Self::SECOND + a] += other.values[Self::SECOND + a];
         }
         *self.scalar_mut() += other.scalar();
     }

@@ -241,8 +241,8 @@ impl<T: Lanes, const D: usize> VolumeRates<T, D> {
                         }
                     }
                 }
-                for (a, force) in force.into_iter().enumerate() {
-                    node.values[D + a] += force * scale;
+                for (own, force) in node.second_mut().iter_mut().zip(force) {
+                    *own += force * scale;
                 }
             }
         });
@@ -502,7 +502,7 @@ mod tests {
         for (n, node) in nodes.iter_mut().enumerate() {
             let at: [usize; D] = std::array::from_fn(|a| n / layout.strides[a] % layout.dims[a]);
             if (0..D).all(|a| at[a] >= PAD_BELOW && at[a] <= PAD_BELOW + cells[a]) {
-                node.values[2 * D] = mass(n, at.map(|at| at - PAD_BELOW));
+                node.values[Node::<f64, D>::MASS] = mass(n, at.map(|at| at - PAD_BELOW));
             }
         }
         let mut rates = VolumeRates::new(4.0);
@@ -579,7 +579,7 @@ mod tests {
             let of_stress: f64 =
                 nodes.iter().zip(&sums).map(|(node, sum)| node.scalar() * sum).sum();
             let of_forces = |node: &Node<f64, D>| -> f64 {
-                (0..D).map(|a| node.values[a] * node.values[D + a]).sum()
+                (0..D).map(|a| node.values[a] * node.second()[a]).sum()
             };
             let of_forces: f64 = forced.iter().map(of_forces).sum();
             assert!(
@@ -608,7 +608,7 @@ mod tests {
             }
             rates.add_forces(place, nodes);
             for node in nodes.iter().filter(|node| node.mass() > 0.0) {
-                let acceleration = node.values[2].hypot(node.values[3]) / node.mass();
+                let acceleration = node.second()[0].hypot(node.second()[1]) / node.mass();
                 assert!(acceleration < 100.0, "{acceleration} of a mass of {}", node.mass());
             }
         });

@@ -33,13 +33,13 @@ impl<T: Lanes, const D: usize> Interpolated<T, D> {
         slope: &[[T; R]; D],
     ) -> Self {
         let mut own = Self::zero();
-        own.scalar = value.get(2 * D + 1).copied().unwrap_or(T::zero());
+        own.scalar = value.get(Node::<T, D>::SCALAR).copied().unwrap_or(T::zero());
         let mut moments = SMatrix::zeros();
         for i in 0..D {
-            (own.velocity[i], own.second[i]) = (value[i], value[D + i]);
+            (own.velocity[i], own.second[i]) = (value[i], value[Node::<T, D>::SECOND + i]);
             for j in 0..D {
                 own.velocity_gradient[(i, j)] = slope[j][i];
-                moments[(i, j)] = slope[j][(D + i).min(R - 1)];
+                moments[(i, j)] = slope[j][(Node::<T, D>::SECOND + i).min(R - 1)];
             }
         }
         if L::AFFINE {
@@ -210,7 +210,7 @@ impl<T: Lanes, const D: usize, const N: usize> Contributions<T, D, N> {
     pub(crate) fn slope_lanes(&self, k: usize, axis: usize, is_affine: bool) -> Lane8<T> {
         let mut lanes = [T::zero(); LANES];
         for i in 0..D {
-            lanes[D + i] = self.stress_flux[k][(i, axis)];
+            lanes[Node::<T, D>::SECOND + i] = self.stress_flux[k][(i, axis)];
             if is_affine {
                 lanes[i] = self.affine[k][(i, axis)];
             }
@@ -256,13 +256,13 @@ impl<T: Lanes> Factors<T> {
     /// The slope that goes with number `q` of a node of vectors with `C` components in P2G: forces have gradients, affine momenta arms.
     #[inline(always)]
     fn p2g_slope<const C: usize>(&self, is_affine: bool, q: usize) -> T {
-        if is_affine && q < C { self.Z } else { self.G }
+        if is_affine && q < Node::<T, C>::SECOND { self.Z } else { self.G }
     }
 
     /// The slope that goes with number `q` of a node in G2P: the first vector has a gradient, the second a moment.
     #[inline(always)]
     fn g2p_slope<const C: usize>(&self, is_affine: bool, q: usize) -> T {
-        if is_affine && q >= C { self.Z } else { self.G }
+        if is_affine && q >= Node::<T, C>::SECOND { self.Z } else { self.G }
     }
 }
 

@@ -102,7 +102,7 @@ impl<T: Lanes, S: StressesOfSpace<T>> BlockLaw<T, 2> for HalfPlane<S> {
         let mut radial = [T::zero(); BLOCK];
         self.0.set(c, F, internal, contributions, &mut radial);
         for (force, value) in radial.iter().zip(&mut contributions.value) {
-            value.values[2] += *force;
+            value.second_mut()[0] += *force;
         }
     }
 
@@ -241,7 +241,7 @@ impl<T: Lanes> BlockLaw<T, 2> for WithMemory<T> {
             let tau = block.stress(n);
             let in_plane = Matrix2::from_fn(|i, j| tau[((2 * i) % 3, (2 * j) % 3)]);
             let radial = set_flux(c, (n, &F[n]), (&in_plane, tau[(1, 1)], hoop), contributions);
-            contributions.value[n].values[2] += radial;
+            contributions.value[n].second_mut()[0] += radial;
         }
     }
 

@@ -166,7 +166,7 @@ pub(crate) fn p2g_in_plane<T, L, V, const D: usize, const W: usize, const N: usi
                 let sum = vectors.add(half(values), sums[i]);
                 values[..4].copy_from_slice(&sum.0);
                 if D == 2 {
-                    values[2 * D] += masses.0[i];
+                    values[Node::<T, D>::MASS] += masses.0[i];
                 }
             }
         }

@@ -1,5 +1,8 @@
 //! P2G and G2P in space: the values of a node in eight lanes.
 //!
+//! Without affine velocities slopes belong to one vector of a node alone, forces in P2G and velocities in G2P: to one half of the lanes, which is one
+//! of two registers where these have 256 bits.
+//!
 //! Loops, not closures: functions of the standard library that call one are compiled without the registers of the kernel.
 
 use mmsmith_lanes::simd::{Lane8, Lanes, Vectors};
@@ -47,13 +50,42 @@ where
         *factor = vectors.splat8(weights.G(axis, place));
         if L::AFFINE {
             let Z = weights.Z(axis, place);
-            let arms = if arms_first { 0..D } else { D..LANES };
+            let arms = if arms_first { 0..LANES / 2 } else { LANES / 2..LANES };
             for q in arms {
                 factor.0[q] = Z;
             }
         }
     }
     factors
+}
+
+/// A slope times a weight in P2G: in the upper lanes, and with affine velocities in all.
+#[inline(always)]
+fn p2g_weighted<T, L, const D: usize, const W: usize>(
+    vectors: impl Vectors,
+    slope: Lane8<T>,
+    S: Lane8<T>,
+) -> Lane8<T>
+where
+    T: Lanes,
+    L: Weights<T, D, W>,
+{
+    if L::AFFINE { vectors.mul8(slope, S) } else { vectors.mul_high(slope, S) }
+}
+
+/// Adds a slope times a gradient in P2G, in the lanes of [`p2g_weighted`].
+#[inline(always)]
+fn p2g_slope<T, L, const D: usize, const W: usize>(
+    vectors: impl Vectors,
+    slope: Lane8<T>,
+    G: Lane8<T>,
+    sum: Lane8<T>,
+) -> Lane8<T>
+where
+    T: Lanes,
+    L: Weights<T, D, W>,
+{
+    if L::AFFINE { vectors.mul_add8(slope, G, sum) } else { vectors.mul_add_high(slope, G, sum) }
 }
 
 /// P2G of particle `k`, as [`p2g`](crate::kernel::any::p2g): plane by plane, row by row, node by node.
@@ -79,18 +111,19 @@ pub(crate) fn p2g_in_space<T, L, V, const D: usize, const W: usize, const N: usi
     let (S_up, G_up) =
         (weights_on_axis(vectors, weights, D - 1), slopes_on_axis(vectors, weights, D - 1, true));
     for plane in 0..places::<W>() {
-        let with_value = vectors.mul8(value, S_up[plane]);
-        let to_value = vectors.mul_add8(up, G_up[plane], with_value);
-        let to_along = vectors.mul8(along, S_up[plane]);
-        let to_across = vectors.mul8(across, S_up[plane]);
+        let (S_up, G_up) = (S_up[plane], G_up[plane]);
+        let to_value = p2g_slope::<T, L, D, W>(vectors, up, G_up, vectors.mul8(value, S_up));
+        let to_along = p2g_weighted::<T, L, D, W>(vectors, along, S_up);
+        let to_across = p2g_weighted::<T, L, D, W>(vectors, across, S_up);
         for row in 0..places::<W>() {
             let with_value = vectors.mul8(to_value, S_across[row]);
-            let to_value = vectors.mul_add8(to_across, G_across[row], with_value);
-            let to_along = vectors.mul8(to_along, S_across[row]);
+            let to_value = p2g_slope::<T, L, D, W>(vectors, to_across, G_across[row], with_value);
+            let to_along = p2g_weighted::<T, L, D, W>(vectors, to_along, S_across[row]);
             let place = start + row * strides[1] + plane * strides[D - 1];
             let nodes = nodes_from_mut::<_, W>(window, place, "a stencil beyond its window");
             for (i, Node { values }) in nodes.iter_mut().enumerate() {
-                let with_slope = vectors.mul_add8(to_along, G[i], vectors.load8(values));
+                let with_slope =
+                    p2g_slope::<T, L, D, W>(vectors, to_along, G[i], vectors.load8(values));
                 *values = vectors.mul_add8(to_value, S[i], with_slope).0;
             }
         }
@@ -103,16 +136,51 @@ fn places<const W: usize>() -> usize {
     if W > 3 { std::hint::black_box(W) } else { W }
 }
 
-/// Adds the sum over the places before this one; the first place has none.
+/// Adds a value times a slope, or a slope times a weight, in G2P: in the lower lanes, and with affine velocities in all.
 #[inline(always)]
-fn after<T: Lanes>(vectors: impl Vectors, sum: Lane8<T>, term: Lane8<T>, place: usize) -> Lane8<T> {
-    if place == 0 { term } else { vectors.add8(sum, term) }
+fn g2p_slope<T, L, const D: usize, const W: usize>(
+    vectors: impl Vectors,
+    a: Lane8<T>,
+    b: Lane8<T>,
+    sum: Lane8<T>,
+) -> Lane8<T>
+where
+    T: Lanes,
+    L: Weights<T, D, W>,
+{
+    if L::AFFINE { vectors.mul_add8(a, b, sum) } else { vectors.mul_add_low(a, b, sum) }
+}
+
+/// The place that comes `n`-th in sums of G2P: of three, the middle one last.
+#[inline(always)]
+fn in_order<const W: usize>(n: usize) -> usize {
+    match (W, n) {
+        (3, 1) => 2,
+        (3, 2) => 1,
+        _ => n,
+    }
+}
+
+/// Adds the `n`-th term of a value, the product of a value and its weight.
+///
+/// Products are rounded before they are added, not fused: those of a node and of its mirror image then cancel, and a particle on a wall stays there. The
+/// middle one of three nodes is its own image, and comes last.
+#[inline(always)]
+fn add_term<T: Lanes, const W: usize>(
+    vectors: impl Vectors,
+    n: usize,
+    sum: Lane8<T>,
+    value: Lane8<T>,
+    S: Lane8<T>,
+) -> Lane8<T> {
+    match n {
+        0 => vectors.mul8(value, S),
+        2 if W == 3 => vectors.mul_add8(value, S, sum),
+        _ => vectors.add8(sum, vectors.mul8(value, S)),
+    }
 }
 
 /// G2P, as [`g2p`](crate::kernel::any::g2p): nodes are summed to rows, rows to planes, planes to the result.
-///
-/// Products that make up a value are rounded before they are added, not fused: those of a node and of its mirror image
-/// then cancel, and a particle on a wall stays there.
 #[inline(always)]
 pub(crate) fn g2p_in_space<T, L, V, const D: usize, const W: usize>(
     vectors: V,
@@ -135,24 +203,27 @@ where
     let (mut value, mut along, mut across, mut up) = (zero, zero, zero, zero);
     for plane in 0..places::<W>() {
         let (mut plane_value, mut plane_along, mut plane_across) = (zero, zero, zero);
-        for row in 0..places::<W>() {
+        for n in 0..places::<W>() {
+            let row = in_order::<W>(n);
             let place = start + row * strides[1] + plane * strides[D - 1];
             let nodes = nodes_from::<_, W>(nodes, place, "a stencil beyond the grid");
             let (mut row_value, mut row_along) = (zero, zero);
-            for (i, Node { values }) in nodes.iter().enumerate() {
-                let nodal = vectors.load8(values);
-                row_value = after(vectors, row_value, vectors.mul8(nodal, S[i]), i);
-                row_along = vectors.mul_add8(nodal, G[i], row_along);
+            for n in 0..W {
+                let i = in_order::<W>(n);
+                let nodal = vectors.load8(&nodes[i].values);
+                row_value = add_term::<T, W>(vectors, n, row_value, nodal, S[i]);
+                row_along = g2p_slope::<T, L, D, W>(vectors, nodal, G[i], row_along);
             }
-            let weighted = vectors.mul8(row_value, S_across[row]);
-            plane_value = after(vectors, plane_value, weighted, row);
-            plane_along = vectors.mul_add8(row_along, S_across[row], plane_along);
-            plane_across = vectors.mul_add8(row_value, G_across[row], plane_across);
+            plane_value = add_term::<T, W>(vectors, n, plane_value, row_value, S_across[row]);
+            plane_along = g2p_slope::<T, L, D, W>(vectors, row_along, S_across[row], plane_along);
+            plane_across = g2p_slope::<T, L, D, W>(vectors, row_value, G_across[row], plane_across);
         }
-        value = after(vectors, value, vectors.mul8(plane_value, S_up[plane]), plane);
-        along = vectors.mul_add8(plane_along, S_up[plane], along);
-        across = vectors.mul_add8(plane_across, S_up[plane], across);
-        up = vectors.mul_add8(plane_value, G_up[plane], up);
+        let (S_up, G_up) = (S_up[plane], G_up[plane]);
+        // Planes are a loop: the first adds to zeros, so that all are alike.
+        value = vectors.add8(value, vectors.mul8(plane_value, S_up));
+        along = g2p_slope::<T, L, D, W>(vectors, plane_along, S_up, along);
+        across = g2p_slope::<T, L, D, W>(vectors, plane_across, S_up, across);
+        up = g2p_slope::<T, L, D, W>(vectors, plane_value, G_up, up);
     }
     let mut slopes = [along.0; D];
     slopes[1] = across.0;

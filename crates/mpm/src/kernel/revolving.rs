@@ -34,6 +34,9 @@ const RADIUS: usize = 0;
 const HEIGHT: usize = 2;
 /// The direction around the axis.
 const AROUND: usize = 1;
+/// Places in a node of space.
+const SECOND: usize = Node::<f64, 3>::SECOND;
+const MASS: usize = Node::<f64, 3>::MASS;
 /// The components that vanish on the axis.
 const ACROSS_AXIS: Components = Components::along(RADIUS).with(Components::along(AROUND));
 
@@ -117,20 +120,20 @@ impl<T: Lanes> Frame<T> {
     ) -> ([T; LANES], [[T; LANES]; 2]) {
         let from = &contributions.value[k].values;
         let [momentum, force] =
-            [0, 3].map(|first| self.vector_in(std::array::from_fn(|i| from[first + i])));
+            [0, SECOND].map(|first| self.vector_in(std::array::from_fn(|i| from[first + i])));
         let flux = self.matrix_in(&contributions.stress_flux[k]);
         let (mut value, mut slope) = ([T::zero(); LANES], [[T::zero(); LANES]; 2]);
         for i in 0..3 {
-            (value[i], value[3 + i]) = (momentum[i], force[i]);
+            (value[i], value[SECOND + i]) = (momentum[i], force[i]);
             for (slope, axis) in slope.iter_mut().zip([RADIUS, HEIGHT]) {
-                slope[3 + i] = flux[(i, axis)];
+                slope[SECOND + i] = flux[(i, axis)];
             }
         }
         if !planted.is(Fault::HoopStressDropped) {
-            value[3 + RADIUS] += flux[(AROUND, AROUND)] * self.per_radius;
-            value[3 + AROUND] -= flux[(RADIUS, AROUND)] * self.per_radius;
+            value[SECOND + RADIUS] += flux[(AROUND, AROUND)] * self.per_radius;
+            value[SECOND + AROUND] -= flux[(RADIUS, AROUND)] * self.per_radius;
         }
-        value[6] = from[6];
+        value[MASS] = from[MASS];
         if is_affine {
             let affine = self.matrix_in(&contributions.affine[k]);
             for i in 0..3 {
@@ -148,7 +151,7 @@ impl<T: Lanes> Frame<T> {
         sums: &InterpolationSums<T, 2>,
     ) -> Interpolated<T, 3> {
         let InterpolationSums { value, slope } = sums;
-        let [velocity, second] = [0, 3].map(|first| std::array::from_fn(|i| value[first + i]));
+        let [velocity, second] = [0, SECOND].map(|first| std::array::from_fn(|i| value[first + i]));
         let mut gradient = Matrix3::zeros();
         for i in 0..3 {
             (gradient[(i, RADIUS)], gradient[(i, HEIGHT)]) = (slope[0][i], slope[1][i]);
@@ -159,7 +162,7 @@ impl<T: Lanes> Frame<T> {
         if L::AFFINE {
             let mut own = Matrix3::zeros();
             for rows in [[RADIUS, HEIGHT], [AROUND, AROUND]] {
-                let moments = Matrix2::from_fn(|i, a| slope[a][3 + rows[i]]);
+                let moments = Matrix2::from_fn(|i, a| slope[a][SECOND + rows[i]]);
                 let gradient = Matrix2::from_fn(|i, a| slope[a][rows[i]]);
                 let of_rows = weights.affine(moments, &gradient);
                 for (i, row) in rows.into_iter().enumerate() {

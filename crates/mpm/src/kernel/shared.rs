@@ -374,7 +374,8 @@ impl<T: Lanes, const D: usize> InterpolatedValue<T, D> {
     #[inline(always)]
     fn store(&self, spacing: T, own: &mut Interpolated<T, D>) {
         for i in 0..D {
-            (own.velocity[i], own.second[i]) = (self.value.0[i], self.value.0[D + i]);
+            (own.velocity[i], own.second[i]) =
+                (self.value.0[i], self.value.0[Node::<T, D>::SECOND + i]);
             for a in 0..D {
                 own.velocity_gradient[(i, a)] = self.slopes[a].0[i] * spacing;
             }
@@ -403,7 +404,8 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> Loop for Interpolating<'_, T,
                 if AFFINE {
                     for a in 0..D {
                         for i in 0..D {
-                            own.affine[(i, a)] = over.slopes[a].0[D + i] * spacing;
+                            own.affine[(i, a)] =
+                                over.slopes[a].0[Node::<T, D>::SECOND + i] * spacing;
                         }
                     }
                 }

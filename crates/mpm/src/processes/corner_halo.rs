@@ -52,7 +52,9 @@ impl CornerHalo {
         let of = |corners: &Vec<u32>| {
             let mut numbers = Vec::with_capacity(per_corner * corners.len());
             for &corner in corners {
-                numbers.extend(&nodes[corner as usize].values[..2 * D]);
+                let node = &nodes[corner as usize];
+                numbers.extend(&node.values[..D]);
+                numbers.extend(&node.second());
                 let moments = moments.get(corner as usize).into_iter().flatten();
                 moments.for_each(|along| numbers.extend(&along.0[..D]));
             }

@@ -185,7 +185,7 @@ impl<T: Lanes, const D: usize> State<T, D> {
         }
         self.p2g_momentum();
         for node in &mut self.grid.nodes {
-            node.values.copy_within(..D, D);
+            node.values.copy_within(..D, Node::<T, D>::SECOND);
         }
         let Self { particles, grid, domain, corners, buffers, .. } = self;
         let GridState { constants, nodes, .. } = grid;

@@ -119,13 +119,13 @@ impl<T: Lanes, const D: usize> State<T, D> {
             self.means_of(&Scalar::OfNodes, is_early);
             let GridState { means, means_again, .. } = &mut self.grid;
             for ((node, again), theta) in means.iter_mut().zip(means_again).zip(theta) {
-                node.values[D] = node.values[0] + node.values[0] - again.values[0];
+                node.second_mut()[0] = node.values[0] + node.values[0] - again.values[0];
                 node.values[0] = theta;
             }
         } else {
             let GridState { means, means_again, .. } = &mut self.grid;
             for (node, again) in means.iter_mut().zip(means_again) {
-                node.values[D] = again.values[0];
+                node.second_mut()[0] = again.values[0];
             }
         }
         self.take_projected(is_early);

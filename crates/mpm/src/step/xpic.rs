@@ -46,9 +46,9 @@ impl<T: Lanes, const D: usize> State<T, D> {
         each_chunk(&mut self.grid.nodes, CHUNK, &|chunk, nodes| {
             for (node, filtered) in nodes.iter_mut().zip(&filtered[chunk * CHUNK..]) {
                 for a in 0..D {
-                    let change = node.values[D + a] * dt;
+                    let change = node.second()[a] * dt;
                     node.values[a] += change;
-                    node.values[D + a] = filtered[a] + change;
+                    node.second_mut()[a] = filtered[a] + change;
                 }
             }
         });

@@ -251,7 +251,8 @@ impl<T: Lanes, const D: usize> Sums<T, D> {
         let value = vectors.mul8(self.value, vectors.splat8(share));
         let mut result = Interpolated::zero();
         for i in 0..D {
-            (result.velocity[i], result.second[i]) = (value.0[i], value.0[D + i]);
+            (result.velocity[i], result.second[i]) =
+                (value.0[i], value.0[Node::<T, D>::SECOND + i]);
         }
         for j in 0..D {
             let (mut slope, mut affine) = (Lane8::zero(), Lane8::zero());
@@ -266,7 +267,7 @@ impl<T: Lanes, const D: usize> Sums<T, D> {
             for i in 0..D {
                 result.velocity_gradient[(i, j)] = slope.0[i];
                 if AFFINE {
-                    result.affine[(i, j)] = affine.0[D + i];
+                    result.affine[(i, j)] = affine.0[Node::<T, D>::SECOND + i];
                 }
             }
         }
