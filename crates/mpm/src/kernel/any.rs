@@ -7,7 +7,6 @@ use nalgebra::{SMatrix, SVector};
 use crate::grid::geometry::Constants;
 use crate::grid::node::{LANES, Node};
 use crate::kernel::{nodes_from, nodes_from_mut};
-use crate::shape::one_axis::EXTENDED;
 use crate::shape::weights::Weights;
 
 /// Values of the grid at a particle, the result of G2P.
@@ -279,8 +278,8 @@ struct RowWeights<T, const D: usize> {
 #[inline(always)]
 fn rows<const D: usize, const W: usize>() -> usize {
     let rows = W.pow(D as u32 - 1);
-    // The extended support is rare: `black_box` prevents unrolling, which would cost minutes of compile time.
-    if W == EXTENDED { std::hint::black_box(rows) } else { rows }
+    // Wide supports are rare here: `black_box` prevents unrolling, which would cost minutes of compile time.
+    if W > 3 { std::hint::black_box(rows) } else { rows }
 }
 
 #[inline(always)]

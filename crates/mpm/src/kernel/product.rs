@@ -18,8 +18,8 @@ use crate::kernel::lanes_plane::{g2p_in_plane, p2g_in_plane};
 use crate::kernel::lanes_space::{g2p_in_space, p2g_in_space};
 use crate::kernel::{beyond, nodes_from, nodes_from_mut};
 use crate::shape::one_axis::{
-    CubicSpline, Gimp, Hat, OnAxis, ProductShape, QuadraticMean, QuadraticSpline, ShapeFunction,
-    half_size, index, moment,
+    CubicSpline, EXTENDED, Gimp, Hat, OF_TWO_CELLS, OnAxis, ProductShape, QuadraticMean,
+    QuadraticSpline, ShapeFunction, half_size, index, moment,
 };
 use crate::shape::weights::{ExtendedWeights, Weights, is_middle};
 
@@ -246,6 +246,11 @@ pub(super) struct Extended<T, const D: usize> {
 }
 
 impl<T: Lanes, const D: usize> Extended<T, D> {
+    /// Whether the box has at most two cells along each axis.
+    fn is_of_two_cells(&self) -> bool {
+        self.l.iter().all(|&l| l <= T::one())
+    }
+
     pub(super) fn weights<const AFFINE: bool>(
         &self,
         strides: (&[usize; D], usize),
@@ -502,15 +507,64 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     }
 }
 
+/// P2G of particle `k`, whose box has extended support: a loop of its own, so that the others do not become longer, with the registers of these.
 #[inline(never)]
 fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     extended: &Extended<T, D>,
-    (strides, nodes_before): (&[usize; D], usize),
+    strides: (&[usize; D], usize),
     window: &mut [Node<T, D>],
     contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
-    let weights = extended.weights::<AFFINE>((strides, nodes_before));
-    p2g(&weights, strides, window, contribution);
+    let own = ExtendedP2g { extended, strides, window, contribution };
+    if extended.is_of_two_cells() {
+        dispatch(OfExtended::<_, OF_TWO_CELLS, AFFINE>(own));
+    } else {
+        dispatch(OfExtended::<_, EXTENDED, AFFINE>(own));
+    }
+}
+
+/// A pass of a particle with extended support, to or from the first `W` nodes along each axis.
+struct OfExtended<P, const W: usize, const AFFINE: bool>(P);
+
+struct ExtendedP2g<'a, T, const D: usize> {
+    extended: &'a Extended<T, D>,
+    /// With the nodes before those of a window.
+    strides: (&'a [usize; D], usize),
+    window: &'a mut [Node<T, D>],
+    contribution: (&'a Contributions<T, D, BLOCK>, usize),
+}
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for OfExtended<ExtendedP2g<'_, T, D>, W, AFFINE>
+{
+    const IS_WIDE: bool = is_wide::<T, D>();
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(ExtendedP2g { extended, strides, window, contribution }) = self;
+        let weights = extended.weights::<AFFINE>(strides);
+        p2g::<_, _, D, W, BLOCK>(&weights, strides.0, window, contribution);
+    }
+}
+
+struct ExtendedG2p<'a, T, const D: usize> {
+    extended: &'a Extended<T, D>,
+    strides: (&'a [usize; D], usize),
+    nodes: &'a [Node<T, D>],
+    interpolated: &'a mut Interpolated<T, D>,
+}
+
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
+    for OfExtended<ExtendedG2p<'_, T, D>, W, AFFINE>
+{
+    const IS_WIDE: bool = is_wide::<T, D>();
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self(ExtendedG2p { extended, strides, nodes, interpolated }) = self;
+        let weights = extended.weights::<AFFINE>(strides);
+        *interpolated = g2p::<_, _, D, W>(&weights, strides.0, nodes);
+    }
 }
 
 struct G2p<'a, T, A, const D: usize, const W: usize, const AFFINE: bool>(G2pOfBlock<'a, T, A, D>);
@@ -558,14 +612,21 @@ where
     }
 }
 
+/// G2P of a particle whose box has extended support, as [`p2g_extended`].
 #[inline(never)]
 fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     extended: &Extended<T, D>,
-    (strides, nodes_before): (&[usize; D], usize),
+    strides: (&[usize; D], usize),
     nodes: &[Node<T, D>],
 ) -> Interpolated<T, D> {
-    let weights = extended.weights::<AFFINE>((strides, nodes_before));
-    g2p(&weights, strides, nodes)
+    let mut result = Interpolated::zero();
+    let own = ExtendedG2p { extended, strides, nodes, interpolated: &mut result };
+    if extended.is_of_two_cells() {
+        dispatch(OfExtended::<_, OF_TWO_CELLS, AFFINE>(own));
+    } else {
+        dispatch(OfExtended::<_, EXTENDED, AFFINE>(own));
+    }
+    result
 }
 
 struct ToNodes<'a, T, const D: usize, const W: usize, const AFFINE: bool>(ScalarsToNodes<'a, T, D>);
@@ -632,7 +693,7 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
         while k < count {
             if let Some(extended) = weights.extended(k) {
                 let of_particle = extended.weights::<AFFINE>((strides, weights.nodes_before));
-                values[k] = g2p_scalar(&of_particle, strides, nodes);
+                values[k] = g2p_scalar::<_, _, D, EXTENDED>(&of_particle, strides, nodes);
                 k += 1;
                 continue;
             }

@@ -356,7 +356,7 @@ impl<T: Lanes, const W: usize, const AFFINE: bool> Loop for G2p<'_, T, W, AFFINE
                     let weights = extended.weights::<AFFINE>((&strides, product.nodes_before));
                     frame.interpolated::<EXTENDED, _>(
                         &weights,
-                        &InterpolationSums::of(&weights, &strides, nodes),
+                        &InterpolationSums::of::<_, EXTENDED>(&weights, &strides, nodes),
                     )
                 }
                 None => {

@@ -19,6 +19,9 @@ pub(crate) const HALF_SIZE_LIMIT: f64 = 2.0;
 pub(crate) const LEAST_HALF_SIZE: f64 = 1e-6;
 /// Nodes along each axis of the extended support, which the largest box needs.
 pub(crate) const EXTENDED: usize = 6;
+
+/// Nodes along an axis of a box of at most two cells.
+pub(crate) const OF_TWO_CELLS: usize = 4;
 /// How far a quadratic spline reaches beyond a hat function, in cells.
 const HALF_A_CELL: f64 = 0.5;
 

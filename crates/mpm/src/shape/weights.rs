@@ -56,23 +56,28 @@ impl<T: Lanes, const D: usize, const AFFINE: bool> ExtendedWeights<T, D, AFFINE>
     }
 }
 
-impl<T: Lanes, const D: usize, const AFFINE: bool> Weights<T, D, EXTENDED>
+/// At the first `W` nodes along each axis; the others have to have no weight.
+impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Weights<T, D, W>
     for ExtendedWeights<T, D, AFFINE>
 {
     const AFFINE: bool = AFFINE;
 
+    #[inline(always)]
     fn first_node(&self) -> usize {
         self.first_node
     }
 
+    #[inline(always)]
     fn S(&self, axis: usize, place: usize) -> T {
         self.axes[axis].S[place]
     }
 
+    #[inline(always)]
     fn G(&self, axis: usize, place: usize) -> T {
         self.axes[axis].G[place]
     }
 
+    #[inline(always)]
     fn Z(&self, axis: usize, place: usize) -> T {
         self.axes[axis].S[place] * (real::<T>(place as f64) - self.place[axis])
     }

@@ -27,7 +27,8 @@ fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extend
             let F: [SMatrix<f64, D, D>; BLOCK] = array::from_fn(|k| {
                 let mut F = SMatrix::identity();
                 if extended.contains(&k) {
-                    F[(k % D, k % D)] = 3.0 + noise(k);
+                    // Boxes of up to two cells, and larger ones.
+                    F[(k % D, k % D)] = if k % 3 == 0 { 5.0 } else { 3.0 } + noise(k);
                 }
                 F
             });
@@ -41,7 +42,7 @@ fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extend
                 let mut interpolated = [Interpolated::zero(); BLOCK];
                 block.g2p(&c.strides, &grid, &mut interpolated[..count]);
                 for k in 0..count {
-                    let alone = g2p(&exact(k), &c.strides, &grid);
+                    let alone = g2p::<_, _, D, EXTENDED>(&exact(k), &c.strides, &grid);
                     let off = (interpolated[k].velocity - alone.velocity).amax();
                     assert!(off < 1e-13, "{extended:?} {k} {off:e}");
                     let off = (interpolated[k].second - alone.second).amax();
@@ -58,7 +59,12 @@ fn particles_of_a_block_exchange_what_their_boxes_cover_however_many_have_extend
                 let mut one_by_one = sums.clone();
                 block.p2g(&c.strides, &mut sums, &contributions, count);
                 for k in 0..count {
-                    p2g(&exact(k), &c.strides, &mut one_by_one, (&contributions, k));
+                    p2g::<_, _, D, EXTENDED, BLOCK>(
+                        &exact(k),
+                        &c.strides,
+                        &mut one_by_one,
+                        (&contributions, k),
+                    );
                 }
                 for (a, b) in sums.iter().zip(&one_by_one) {
                     for (a, b) in a.values.iter().zip(&b.values) {
