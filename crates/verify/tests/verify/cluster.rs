@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::hand_coded;
 use crate::ranks::timeless;
@@ -87,7 +88,7 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
     let seeds = std::env::var("MMSMITH_SCHEDULES");
     // Each is several runs.
     let seeds = seeds.map_or(9, |text| text.parse::<u64>().expect("a number") / 4);
-    let (mut killed, mut resumed) = (0, 0);
+    let (killed, resumed) = (AtomicU64::new(0), AtomicU64::new(0));
     for (n, problem) in problems().iter().enumerate() {
         let calls = [2, 3, 4].map(|count| {
             let folder = tempfile::tempdir().expect("a folder");
@@ -96,7 +97,7 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
             assert_eq!(found.failed, None);
             found.calls
         });
-        for seed in 0..seeds {
+        let one = |seed: u64| {
             let mut random = (seed + 1000 * n as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let mut below = |end: u64| {
                 random =
@@ -114,11 +115,11 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
                 let found = simulated(count, schedule, |ranks| problem.part(folder.path(), ranks));
                 let what =
                     format!("seed {seed}, attempt {attempt}, {count} processes, {schedule:?}");
-                resumed += u64::from(begun.is_some());
+                resumed.fetch_add(u64::from(begun.is_some()), Ordering::Relaxed);
                 match found.failed {
                     None => {}
                     Some(Failed::Killed { rank }) if Some(rank) == kill.map(|kill| kill.0) => {
-                        killed += 1;
+                        killed.fetch_add(1, Ordering::Relaxed);
                     }
                     Some(failed) => panic!("{what}: {failed}"),
                 }
@@ -130,7 +131,20 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
                     break;
                 }
             }
-        }
+        };
+        let next = AtomicU64::new(0);
+        let work = || {
+            loop {
+                let seed = next.fetch_add(1, Ordering::Relaxed);
+                if seed >= seeds {
+                    break;
+                }
+                one(seed);
+            }
+        };
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
     }
+    let (killed, resumed) = (killed.into_inner(), resumed.into_inner());
     assert!(killed > seeds && resumed > seeds, "{killed} killed, {resumed} resumed");
 }
