@@ -100,13 +100,15 @@ pub trait Vectors: Copy {
     fn div8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
     /// `a b + c`, rounded once.
     fn mul_add8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
-    /// `a b` in the lower four lanes. In the others `a`, where that is zero, but for the sign of the zero, and else `a` or `a b`.
+    /// `a b` in the lower four lanes. The upper lanes have no defined value, but zeros of `a` stay zeros, of either sign. Where registers have 256 bits
+    /// this is half the work.
     fn mul_low<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
-    /// `a b` in the upper four lanes; in the others as [`mul_low`](Self::mul_low).
+    /// `a b` in the upper four lanes; the lower ones are as the upper ones of [`mul_low`](Self::mul_low).
     fn mul_high<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
-    /// `a b + c` in the lower four lanes, rounded once. In the others `c`, where `a` is zero, but for the sign of a zero, and else `c` or `a b + c`.
+    /// `a b + c` in the lower four lanes, rounded once. The upper lanes have no defined value, but keep `c` where `a` is zero; a zero may change its
+    /// sign.
     fn mul_add_low<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
-    /// `a b + c` in the upper four lanes, rounded once; in the others as [`mul_add_low`](Self::mul_add_low).
+    /// `a b + c` in the upper four lanes, rounded once; the lower ones are as the upper ones of [`mul_add_low`](Self::mul_add_low).
     fn mul_add_high<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>, c: Lane8<T>) -> Lane8<T>;
     /// The smaller of both; `b` where one is not a number.
     fn min8<T: Lanes>(self, a: Lane8<T>, b: Lane8<T>) -> Lane8<T>;
@@ -624,8 +626,8 @@ impl<L: Loop, V: Vectors> WithSimd for Instance<L, V> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        // A local that has to lie at whole cache lines makes the compiler align the whole frame. Registers that it puts aside would else lie across
-        // lines, and now and then across pages of memory, where a load waits some 40 cycles for the store before it.
+        // A local variable that has to begin at a cache line makes the compiler align the whole frame. Else registers that the compiler spills lie across
+        // cache lines, and in some frames across pages of memory, where a load waits some 40 cycles for its store.
         let mut at_whole_lines = Lane8([0.0_f64; 8]);
         black_box(&mut at_whole_lines);
         self.0.run(self.1);

@@ -117,8 +117,8 @@ impl<T: Lanes, const D: usize, const STRETCHING: bool> Boxes<'_, T, D, STRETCHIN
         let Self { c, kinematics: Kinematics { x, F }, .. } = self;
         let constant = |value: T| Eight { lanes: vectors.splat8(value), vectors };
         let (zero, one) = (constant(T::zero()), constant(T::one()));
-        // The sign of a difference is exact: these may not be negative, those have to be positive. A number that is none, which minima leave out,
-        // makes the sum of zeros one that is none, too.
+        // The sign of a difference is exact: no slack may be negative, all room has to be positive. Minima leave out what is not a number; the sum
+        // of zeros is not a number then.
         let (mut slack, mut room, mut zeros) = (one.lanes, one.lanes, zero.lanes);
         for group in 0..groups {
             let mut lanes_of_F = [[one; D]; D];

@@ -507,7 +507,8 @@ impl<T: Lanes, const D: usize, const W: usize, const AFFINE: bool> Loop
     }
 }
 
-/// P2G of particle `k`, whose box has extended support: a loop of its own, so that the others do not become longer, with the registers of these.
+/// P2G of particle `k`, whose box has extended support. It has a loop of its own: the loops of the other particles stay short, and it is compiled with their
+/// registers all the same.
 #[inline(never)]
 fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     extended: &Extended<T, D>,
