@@ -517,10 +517,21 @@ fn p2g_extended<T: Lanes, const D: usize, const AFFINE: bool>(
     contribution: (&Contributions<T, D, BLOCK>, usize),
 ) {
     let own = ExtendedP2g { extended, strides, window, contribution };
+    dispatch_extended::<T, _, D, AFFINE>(extended, own);
+}
+
+/// Dispatches a pass of a particle with extended support with a constant for the nodes along each axis that its box reaches.
+fn dispatch_extended<T: Lanes, P, const D: usize, const AFFINE: bool>(
+    extended: &Extended<T, D>,
+    pass: P,
+) where
+    OfExtended<P, OF_TWO_CELLS, AFFINE>: Loop,
+    OfExtended<P, EXTENDED, AFFINE>: Loop,
+{
     if extended.is_of_two_cells() {
-        dispatch(OfExtended::<_, OF_TWO_CELLS, AFFINE>(own));
+        dispatch(OfExtended::<_, OF_TWO_CELLS, AFFINE>(pass));
     } else {
-        dispatch(OfExtended::<_, EXTENDED, AFFINE>(own));
+        dispatch(OfExtended::<_, EXTENDED, AFFINE>(pass));
     }
 }
 
@@ -622,11 +633,7 @@ fn g2p_extended<T: Lanes, const D: usize, const AFFINE: bool>(
 ) -> Interpolated<T, D> {
     let mut result = Interpolated::zero();
     let own = ExtendedG2p { extended, strides, nodes, interpolated: &mut result };
-    if extended.is_of_two_cells() {
-        dispatch(OfExtended::<_, OF_TWO_CELLS, AFFINE>(own));
-    } else {
-        dispatch(OfExtended::<_, EXTENDED, AFFINE>(own));
-    }
+    dispatch_extended::<T, _, D, AFFINE>(extended, own);
     result
 }
 

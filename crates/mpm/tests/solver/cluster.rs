@@ -9,6 +9,7 @@ use mmsmith_mpm::{
     Body, Grid, Integrator, Settings, Shape, Share, Simulation, StepError, Transfer,
 };
 use mmsmith_ranks::{Failed, Ranks, Schedule, arranged, simulated};
+use rayon::prelude::*;
 
 use crate::ranks::{
     Of, body, fly, flying, grid, law, polygon_settings, polygons, share, wide, widened,
@@ -98,7 +99,7 @@ fn seeds(few: u64) -> u64 {
 #[test]
 fn every_schedule_has_the_bits_of_one_process_or_names_who_was_killed() {
     let problems = problems();
-    let (next, killed, late) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+    let (killed, late) = (AtomicU64::new(0), AtomicU64::new(0));
     let one = |seed: u64| {
         let problem = &problems[seed as usize % problems.len()];
         let count = 2 + seed as usize / problems.len() % 4;
@@ -128,15 +129,7 @@ fn every_schedule_has_the_bits_of_one_process_or_names_who_was_killed() {
         assert_eq!(all.iter().find(differs), None, "{what}");
     };
     let seeds = seeds(240);
-    let work = || loop {
-        let seed = next.fetch_add(1, Ordering::Relaxed);
-        if seed >= seeds {
-            break;
-        }
-        one(seed);
-    };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+    (0..seeds).into_par_iter().for_each(one);
     let (killed, late) = (killed.into_inner(), late.into_inner());
     assert!(killed > seeds / 20 && late > seeds, "{killed} killed, {late} results");
 }

@@ -14,6 +14,7 @@ use mmsmith_verify::{
     Arithmetic, Case, CheckpointFolder, Checkpoints, Integrator, Moment, Outputs, Row, Scheme,
     Shape, Transfer, Updated, run,
 };
+use rayon::prelude::*;
 
 /// A row and a history as text, in which what is not a number equals itself.
 type Told = (Row, String);
@@ -132,18 +133,7 @@ fn a_killed_run_goes_on_from_a_whole_checkpoint_under_every_schedule() {
                 }
             }
         };
-        let next = AtomicU64::new(0);
-        let work = || {
-            loop {
-                let seed = next.fetch_add(1, Ordering::Relaxed);
-                if seed >= seeds {
-                    break;
-                }
-                one(seed);
-            }
-        };
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+        (0..seeds).into_par_iter().for_each(one);
     }
     let (killed, resumed) = (killed.into_inner(), resumed.into_inner());
     assert!(killed > seeds && resumed > seeds, "{killed} killed, {resumed} resumed");
